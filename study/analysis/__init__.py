@@ -1,0 +1,1 @@
+"""Responses in, estimates out: pure functions."""

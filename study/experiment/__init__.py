@@ -1,0 +1,1 @@
+"""A protocol becomes a plan, stimuli, sessions and responses."""

@@ -1,0 +1,1 @@
+"""Motion files and synthetic motions, as one type: Clip."""

@@ -1,0 +1,1 @@
+"""Estimates become figures, tables and one self-contained page."""

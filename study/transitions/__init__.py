@@ -1,0 +1,1 @@
+"""Two clips and a method in, one clip out."""
