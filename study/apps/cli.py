@@ -1,0 +1,119 @@
+"""The `segue` command: verbs, exit statuses, and one line for each refusal.
+
+Exit status 0: done. 2: bad input (one line: what was expected, what was found, where, what to do). 1: a fault of ours.
+Verbs are imported when they are called or listed; nothing heavy is imported before one runs.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+from typing import TextIO
+
+import click
+
+from study import __version__
+from study.errors import SegueError
+
+# Verb -> module and name of its click command, in the order of a study's life.
+VERBS = {
+    "demo": "study_commands:demo",
+    "motions": "motion_commands:motions",
+    "preview": "motion_commands:preview",
+    "blend-length": "transition_commands:blend_length",
+    "transition": "transition_commands:transition",
+    "check": "study_commands:check",
+    "render": "study_commands:render",
+    "simulate": "study_commands:simulate",
+    "analyse": "study_commands:analyse",
+    "report": "study_commands:report",
+    "export": "study_commands:export",
+    "doctor": "doctor_command:doctor",
+}
+
+
+class Verbs(click.Group):
+    """A group whose commands are imported on demand."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """All verbs, in order."""
+        del ctx
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """One verb, imported now."""
+        del ctx
+        if cmd_name not in VERBS:
+            return None
+        module, _, name = VERBS[cmd_name].partition(":")
+        command: click.Command = getattr(importlib.import_module(f"study.apps.{module}"), name)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click does, with the nearest verb named where there is none of that name."""
+        import difflib
+
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            near = difflib.get_close_matches(args[0], VERBS, n=1)
+            hint = f" Did you mean {near[0]!r}?" if near else " `segue --help` lists the verbs."
+            raise click.UsageError(f"no verb {args[0]!r}.{hint}")
+        return super().resolve_command(ctx, args)
+
+
+@click.command(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="segue")
+def segue() -> None:
+    """Perceptual studies of motion transitions: from motion capture to thresholds, preferences and a report."""
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    del category, filename, lineno, file, line
+    click.echo(f"segue: warning: {message}", err=True)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line on arguments (default: the process's own) and return the exit status."""
+    from renderer.errors import RendererError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            segue.main(list(sys.argv[1:] if arguments is None else arguments), prog_name="segue", standalone_mode=False)
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    except click.ClickException as refusal:
+        click.echo(f"segue: {refusal.format_message()}", err=True)
+        return 2
+    except (SegueError, RendererError) as refusal:
+        click.echo(f"segue: {refusal}", err=True)
+        return 2
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("segue: interrupted; what was finished is kept, and the same command goes on from there.", err=True)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output went away (`segue ... | head`): not a fault; keep Python from complaining at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as fault:  # the one place where everything is caught: to say that it is our fault
+        traceback.print_exc()
+        click.echo(f"segue: a fault of Segue's own ({type(fault).__name__}); please report the lines above.", err=True)
+        return 1
+    return 0
+
+
+def main() -> None:
+    """Entry point of the `segue` script."""
+    sys.exit(run())
