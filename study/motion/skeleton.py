@@ -35,7 +35,7 @@ _ARM_NAMES = {
     "collar": ("collar", "clavicle", "shoulder"),
     "shoulder": ("uparm", "upperarm", "arm", "humerus", "shoulder"),
     "elbow": ("forearm", "lowerarm", "lowarm", "radius", "elbow"),
-    "wrist": ("hand", "wrist"),
+    "wrist": ("wrist", "hand"),
 }
 
 

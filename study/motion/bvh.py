@@ -1,0 +1,439 @@
+"""BVH files to clips and back.
+
+In: Biovision hierarchy files as real tools write them. Out: `Clip` (Y up, metres, radians, wxyz). Rotation channels
+multiply in the order in which each joint lists them; position channels are the joint's place in its parent's frame
+and replace its OFFSET, wherever they stand in the list. What a clip can't hold (a limb that changes its length) is
+warned of; what can't be read is refused with file, line and column.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import tempfile
+import warnings
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import MotionWarning
+from study.motion import quaternions as quat
+from study.motion.clip import Clip
+from study.motion.numbers import parse_table
+from study.motion.skeleton import Skeleton
+from study.motion.source import Source, number, read_source
+from study.motion.units import find_scale
+
+FloatArray = NDArray[np.float64]
+
+_CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
+_CANONICAL = {name.lower(): name for name in _CHANNELS}
+_TOKEN = re.compile(rb"[{}]|[^\s{}]+")
+# A bone whose length the data changes by less than this (metres) is taken as rigid.
+_RIGID_M = 1e-4
+
+
+@dataclass
+class _Joint:
+    """A joint while the hierarchy is read; offsets in the file's unit."""
+
+    name: str
+    parent: int
+    start: int
+    offset: FloatArray | None = None
+    channels: tuple[str, ...] = ()
+    first_column: int = 0
+
+    def columns(self, kind: str) -> list[tuple[int, str]]:
+        """(column, axis letter) of each position or rotation channel, in the file's order."""
+        return [(self.first_column + k, c[0]) for k, c in enumerate(self.channels) if c.endswith(kind)]
+
+
+@dataclass
+class _Hierarchy:
+    joints: list[_Joint] = field(default_factory=list)
+    ends: list[tuple[int, FloatArray]] = field(default_factory=list)
+    columns: int = 0
+
+
+def read_bvh(path: Path | str, *, metres_per_unit: float | None = None) -> Clip:
+    """Read a BVH file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    metres_per_unit
+        Metres in a unit of the file; by default found from the size of the body (`study.motion.units`), and said
+        in the clip's history.
+
+    Raises
+    ------
+    MotionFileError
+        For anything that can't be read without guessing, with line and column.
+
+    Warns
+    -----
+    MotionWarning
+        Where `Frames:` disagrees with the rows (the rows are trusted), a joint's position varies (its median is
+        taken), or a body has no plausible size.
+    """
+    source = read_source(path, "a BVH file")
+    hierarchy, offset = _read_hierarchy(source)
+    fps, stated, offset = _read_motion_header(source, offset)
+    values = parse_table(source, offset, hierarchy.columns)
+    if stated is not None and stated != len(values):
+        _warn(f"{source.path}: says Frames: {stated}, but holds {len(values)} rows; the rows are trusted")
+    return _assemble(source, hierarchy, values, fps, metres_per_unit)
+
+
+class _Tokens:
+    """The words and braces of the hierarchy, one ahead."""
+
+    def __init__(self, source: Source) -> None:
+        self.source, self.offset = source, 0
+
+    def next(self, expected: str) -> tuple[bytes, int]:
+        """The next token and where it starts."""
+        found = _TOKEN.search(self.source.raw, self.offset)
+        if found is None:
+            raise self.source.error(
+                len(self.source.raw.rstrip()), f"Expected {expected}, found the end of the file. Copy it again."
+            )
+        self.offset = found.end()
+        return found.group(), found.start()
+
+    def name(self) -> str:
+        """The rest of the line up to a brace: names may hold blanks."""
+        line = re.compile(rb"[^{}\r\n]*").match(self.source.raw, self.offset)
+        assert line is not None  # the pattern matches nothing as well
+        self.offset = line.end()
+        return " ".join(self.source.text(line.start(), line.end()).split())
+
+    def word(self, expected: str) -> None:
+        token, start = self.next(expected)
+        if token.upper() != expected.encode().upper():
+            raise self.source.error(start, f"Expected {expected}, found {_shown(token)}.")
+
+    def number(self, what: str) -> float:
+        token, start = self.next(what)
+        return number(self.source, token, start, what)
+
+
+def _shown(token: bytes) -> str:
+    return repr(token.decode("utf-8", "replace")[:40])
+
+
+def _read_hierarchy(source: Source) -> tuple[_Hierarchy, int]:
+    """The joints, and the offset just behind the word MOTION."""
+    tokens = _Tokens(source)
+    token, start = tokens.next("HIERARCHY")
+    if token.upper() != b"HIERARCHY":
+        raise source.error(start, f"Expected HIERARCHY at the start of a BVH file, found {_shown(token)}.")
+    hierarchy = _Hierarchy()
+    open_joints: list[int] = []
+    while True:
+        token, start = tokens.next("JOINT, End Site, '}' or MOTION")
+        word = token.upper()
+        if word == b"MOTION":
+            if open_joints:
+                name = hierarchy.joints[open_joints[-1]].name
+                raise source.error(start, f"Expected '}}' to close joint {name!r} before MOTION. Balance the braces.")
+            if not hierarchy.joints:
+                raise source.error(start, "Expected ROOT and its joints before MOTION, found none.")
+            return hierarchy, tokens.offset
+        if word == b"}":
+            if not open_joints:
+                raise source.error(start, "Expected MOTION, found a '}' that closes nothing. Balance the braces.")
+            _closed(source, hierarchy.joints[open_joints.pop()], start)
+        elif word == b"ROOT" or (word == b"JOINT" and open_joints):
+            if word == b"ROOT" and hierarchy.joints:
+                raise source.error(start, "Expected one ROOT, found a second. Put each body into a file of its own.")
+            open_joints.append(_open_joint(tokens, hierarchy, start, open_joints))
+        elif word == b"END" and open_joints:
+            _read_end(tokens, hierarchy, open_joints[-1])
+        elif word in (b"OFFSET", b"CHANNELS") and open_joints:
+            _read_property(tokens, hierarchy, hierarchy.joints[open_joints[-1]], word, start)
+        else:
+            expected = "OFFSET, CHANNELS, JOINT, End Site or '}'" if open_joints else "ROOT or MOTION"
+            raise source.error(start, f"Expected {expected}, found {_shown(token)}.")
+
+
+def _open_joint(tokens: _Tokens, hierarchy: _Hierarchy, start: int, open_joints: list[int]) -> int:
+    name = tokens.name()
+    if not name:
+        raise tokens.source.error(start, "Expected a name after ROOT or JOINT, found none.")
+    tokens.word("{")
+    taken = {joint.name for joint in hierarchy.joints}
+    if name in taken:
+        unique = next(f"{name}_{k}" for k in range(2, len(taken) + 3) if f"{name}_{k}" not in taken)
+        _warn(f"{tokens.source.path}: two joints are called {name!r}; the second is read as {unique!r}")
+        name = unique
+    hierarchy.joints.append(_Joint(name, open_joints[-1] if open_joints else -1, start))
+    return len(hierarchy.joints) - 1
+
+
+def _closed(source: Source, joint: _Joint, start: int) -> None:
+    if joint.offset is None:
+        raise source.error(start, f"Expected an OFFSET in joint {joint.name!r} before its '}}'.")
+
+
+def _read_end(tokens: _Tokens, hierarchy: _Hierarchy, joint: int) -> None:
+    tokens.name()  # `Site`, or whatever the tool calls it
+    tokens.word("{")
+    tokens.word("OFFSET")
+    name = hierarchy.joints[joint].name
+    hierarchy.ends.append((joint, np.array([tokens.number(f"a length in the End Site of {name!r}") for _ in range(3)])))
+    tokens.word("}")
+
+
+def _read_property(tokens: _Tokens, hierarchy: _Hierarchy, joint: _Joint, word: bytes, start: int) -> None:
+    source = tokens.source
+    if (joint.offset is not None) if word == b"OFFSET" else bool(joint.channels):
+        raise source.error(start, f"Expected one {word.decode()} in joint {joint.name!r}, found a second.")
+    if word == b"OFFSET":
+        joint.offset = np.array([tokens.number(f"a length in the OFFSET of {joint.name!r}") for _ in range(3)])
+        return
+    token, at = tokens.next("the number of channels")
+    if not token.isdigit():
+        raise source.error(at, f"Expected the number of channels of {joint.name!r}, found {_shown(token)}.")
+    channels: list[str] = []
+    for k in range(int(token)):
+        token, at = tokens.next("a channel name")
+        channels.append(_channel(source, token, at, f"channel {k + 1} of {joint.name!r}"))
+        if channels[-1].endswith("position") and channels.count(channels[-1]) > 1:
+            raise source.error(
+                at, f"Expected each position channel once in {joint.name!r}, found {channels[-1]} twice."
+            )
+    joint.channels, joint.first_column = tuple(channels), hierarchy.columns
+    hierarchy.columns += len(channels)
+
+
+def _channel(source: Source, token: bytes, offset: int, what: str) -> str:
+    name = _CANONICAL.get(token.decode("utf-8", "replace").lower())
+    if name is None:
+        near = difflib.get_close_matches(token.decode("utf-8", "replace"), _CHANNELS, n=1)
+        hint = f" Did you mean {near[0]}?" if near else ""
+        raise source.error(offset, f"Expected {what} to be one of {', '.join(_CHANNELS)}, found {_shown(token)}.{hint}")
+    return name
+
+
+def _read_motion_header(source: Source, offset: int) -> tuple[float, int | None, int]:
+    """Frames per second, the stated number of frames (None where it is missing), and where the rows start."""
+    stated: int | None = None
+    line = re.compile(rb"[ \t]*([^\r\n]*)(\r\n|\r|\n|$)")
+    while True:
+        found = line.match(source.raw, offset)
+        if found is None or offset >= len(source.raw):
+            raise source.error(len(source.raw.rstrip()), "Expected 'Frame Time:', found the end of the file.")
+        content, start, offset = found.group(1), found.start(1), found.end()
+        if not content.strip():
+            continue
+        key = re.match(rb"(frames|frame\s*time)\s*:?\s*", content, re.IGNORECASE)
+        if key is None:
+            raise source.error(
+                start,
+                f"Expected 'Frame Time:' before the data rows, found {_shown(content)}. "
+                "Add the line, for instance 'Frame Time: 0.0083333' for 120 fps.",
+            )
+        value, at = content[key.end() :].strip(), start + key.end()
+        if key.group(1).lower() == b"frames":
+            if not re.fullmatch(rb"\d+", value):
+                raise source.error(at, f"Expected the number of frames after 'Frames:', found {_shown(value)}.")
+            stated = int(value)
+            continue
+        seconds = number(source, value, at, "the seconds between frames after 'Frame Time:'")
+        if seconds <= 0.0:
+            raise source.error(
+                at,
+                f"Expected a Frame Time above 0, found {_shown(value)}. Write 1 / fps, such as 0.0083333 for 120 fps.",
+            )
+        return frame_rate(value.decode()), stated, offset
+
+
+# Frame rates that cameras and tools run at; tried first where few digits are printed.
+_COMMON_FPS = tuple(Fraction(f) for f in (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 200, 240))
+_NTSC_FPS = tuple(Fraction(f * 1000, 1001) for f in (24, 30, 48, 60, 120, 240))
+_COMMON_WITHIN = Fraction(2, 100)
+
+
+def frame_rate(printed: str) -> float:
+    """Frames per second of a printed frame time.
+
+    `0.0083333` means 120 and not 120.00048: where a common rate, a whole number or an NTSC rate (30000/1001) lies
+    within what the printed digits leave open, it is meant. A frame time that names none of them is not rounded.
+
+    Examples
+    --------
+    >>> frame_rate("0.0083333"), frame_rate("0.033367"), frame_rate("0.0123456789")
+    (120.0, 29.97002997002997, 81.0000007371)
+    """
+    exact = Fraction(printed)
+    mantissa, _, exponent = printed.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+    # Half a unit of the last digit; or of a double, for those who print all 17 digits of one.
+    open_by = max(Fraction(1, 2) / Fraction(10) ** decimals, Fraction(float(np.spacing(float(exact)))))
+    plain = 1 / exact
+
+    def fits(rate: Fraction) -> bool:
+        return abs(1 / rate - exact) <= open_by
+
+    if plain.denominator == 1:
+        return float(plain)
+    common = [r for r in (*_COMMON_FPS, *_NTSC_FPS) if fits(r) and abs(r / plain - 1) <= _COMMON_WITHIN]
+    if common:
+        return float(min(common, key=lambda rate: abs(rate - plain)))
+    whole = Fraction(round(plain))
+    neighbours = [Fraction(round(plain) + step) for step in (-1, 1)]
+    if whole > 0 and fits(whole) and not any(n > 0 and fits(n) for n in neighbours):
+        return float(whole)
+    return float(plain)
+
+
+def _assemble(
+    source: Source, hierarchy: _Hierarchy, values: FloatArray, fps: float, metres_per_unit: float | None
+) -> Clip:
+    names = [joint.name for joint in hierarchy.joints]
+    parents = np.array([joint.parent for joint in hierarchy.joints])
+    offsets = np.array([joint.offset for joint in hierarchy.joints])
+    ends = hierarchy.ends
+    rotations = _rotations(hierarchy.joints, values)
+    paths = {j: _path(joint, values) for j, joint in enumerate(hierarchy.joints) if joint.columns("position") or j == 0}
+    # Constant places first: on rigs with six channels everywhere the data say how long the bones are.
+    for j, path in paths.items():
+        if j > 0:
+            offsets[j] = np.median(path, axis=0)
+    history = [f"read from {source.path.name}"]
+    scale = find_scale(names, parents, offsets)
+    if metres_per_unit is None:
+        metres_per_unit = scale.metres_per_unit
+        history.append(scale.note)
+        if not scale.plausible and scale.by_legs:
+            _warn(f"{source.path}: {scale.note}; a person has another size: give metres_per_unit")
+    else:
+        history.append(f"lengths x {metres_per_unit:.6g} m, as told")
+    root = 0
+    while _rides(root, parents, [p for p, _ in ends], paths, metres_per_unit):
+        child = root + 1
+        paths[child] = paths[root] + quat.rotate(rotations[:, root], paths[child])
+        rotations[:, child] = quat.multiply(rotations[:, root], rotations[:, child])
+        history.append(f"joint {names[root]!r} folded into {names[child]!r}, which moves in it")
+        root = child
+    for j, path in paths.items():
+        if j > root:
+            _check_rigid(source, names[j], path, offsets[j], metres_per_unit)
+    skeleton = Skeleton(
+        tuple(names[root:]),
+        np.where(parents[root:] < root, -1, parents[root:] - root),
+        offsets[root:] * metres_per_unit,
+        np.array([p - root for p, _ in ends], dtype=np.int64),
+        np.array([o for _, o in ends]).reshape(-1, 3) * metres_per_unit,
+    )
+    return Clip(
+        skeleton,
+        paths[root] * metres_per_unit,
+        rotations[:, root:],
+        fps,
+        name=source.path.stem,
+        history=tuple(history),
+    )
+
+
+def _rotations(joints: list[_Joint], values: FloatArray) -> FloatArray:
+    """Local rotations `(frames, joints, 4)`; joints with the same order of axes are turned at once."""
+    rotations = np.empty((len(values), len(joints), 4))
+    groups: dict[str, list[int]] = {}
+    for j, joint in enumerate(joints):
+        groups.setdefault("".join(axis for _, axis in joint.columns("rotation")), []).append(j)
+    for order, members in groups.items():
+        if not order:
+            rotations[:, members] = quat.IDENTITY
+            continue
+        columns = np.array([[c for c, _ in joints[j].columns("rotation")] for j in members])
+        rotations[:, members] = quat.from_euler(order, np.radians(values[:, columns]))
+    return rotations
+
+
+def _path(joint: _Joint, values: FloatArray) -> FloatArray:
+    """A joint's place in its parent's frame `(frames, 3)`: OFFSET where no channel replaces it."""
+    path = np.tile(np.asarray(joint.offset), (len(values), 1))
+    for column, axis in joint.columns("position"):
+        path[:, "XYZ".index(axis)] = values[:, column]
+    return path
+
+
+def _rides(
+    root: int, parents: NDArray[np.int64], ends: list[int], paths: dict[int, FloatArray], metres_per_unit: float
+) -> bool:
+    """Whether the root only carries one joint, which moves in it: then that one is the body's root."""
+    children = np.flatnonzero(parents == root)
+    if len(children) != 1 or root in ends or root + 1 not in paths:
+        return False
+    path = paths[root + 1]
+    return bool(np.max(np.abs(path - np.median(path, axis=0))) * metres_per_unit > _RIGID_M)
+
+
+def _check_rigid(source: Source, name: str, path: FloatArray, offset: FloatArray, metres_per_unit: float) -> None:
+    strays = np.linalg.norm(path - offset, axis=1) * metres_per_unit
+    worst = int(np.argmax(strays))
+    if strays[worst] > _RIGID_M:
+        _warn(
+            f"{source.path}: joint {name!r} changes its place in its parent by up to {strays[worst] * 100:.2f} cm "
+            f"(frame {worst}); a clip has bones of constant length, so its median is taken"
+        )
+
+
+def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) -> None:
+    """Write a clip as a BVH file, whole or not at all; reading it back gives the same motion.
+
+    Parameters
+    ----------
+    clip
+        What to write; channels are `Zrotation Yrotation Xrotation`, in degrees.
+    path
+        The file; one that is there is replaced.
+    metres_per_unit
+        The length unit to write; centimetres, which most tools expect, by default.
+    """
+    path = Path(path)
+    lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
+    lines += ["MOTION", f"Frames: {clip.frames}", f"Frame Time: {1.0 / clip.fps!r}"]
+    degrees = np.degrees(quat.to_euler("ZYX", clip.rotations)).reshape(clip.frames, -1)
+    table = np.concatenate([clip.root_positions / metres_per_unit, degrees], axis=1)
+    row = " ".join(["%.10g"] * table.shape[1])
+    lines += [row % tuple(values) for values in table.tolist()]
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write("\n".join(lines) + "\n")
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:
+    def place(offset: FloatArray) -> str:
+        return "OFFSET " + " ".join(f"{value:.10g}" for value in offset * scale)
+
+    def joint_lines(joint: int, depth: int) -> list[str]:
+        tab = "\t" * depth
+        position = "6 Xposition Yposition Zposition" if joint == 0 else "3"
+        lines = [f"{tab}{'ROOT' if joint == 0 else 'JOINT'} {skeleton.names[joint]}", f"{tab}{{"]
+        lines += [f"{tab}\t{place(skeleton.offsets[joint])}"]
+        lines += [f"{tab}\tCHANNELS {position} Zrotation Yrotation Xrotation"]
+        for end in np.flatnonzero(skeleton.end_parents == joint):
+            lines += [f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\t{place(skeleton.end_offsets[end])}", f"{tab}\t}}"]
+        for child in np.flatnonzero(skeleton.parents == joint):
+            lines += joint_lines(int(child), depth + 1)
+        return [*lines, f"{tab}}}"]
+
+    return joint_lines(0, 0)
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, MotionWarning, stacklevel=3)

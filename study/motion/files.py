@@ -1,0 +1,49 @@
+"""Any motion file to a clip, by its suffix."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from study.errors import MotionError, MotionFileError
+from study.motion.acclaim import CMU_FPS, read_amc
+from study.motion.bvh import read_bvh
+from study.motion.clip import Clip
+
+SUFFIXES = (".bvh", ".amc")
+
+
+def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: float | None = None) -> Clip:
+    """Read a motion file.
+
+    Parameters
+    ----------
+    path
+        A `.bvh` file, or an `.amc` file with its `.asf` beside it.
+    metres_per_unit
+        Metres in a unit of the file; by default found from the body, and said in the clip's history.
+    fps
+        Frames per second in place of what the file says (AMC files don't say; 120 is assumed).
+
+    Raises
+    ------
+    MotionFileError
+        For another suffix, or a file that can't be read.
+    """
+    path = Path(path)
+    for label, value in (("metres_per_unit", metres_per_unit), ("fps", fps)):
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise MotionError(f"Expected {label} above 0 for {path}, got {value}.")
+    suffix = path.suffix.lower()
+    if suffix == ".amc":
+        return read_amc(path, metres_per_unit=metres_per_unit, fps=CMU_FPS if fps is None else fps)
+    if suffix == ".bvh":
+        clip = read_bvh(path, metres_per_unit=metres_per_unit)
+        if fps is None or fps == clip.fps:
+            return clip
+        note = f"taken at {fps:g} fps, as told, and not at the file's {clip.fps:g}"
+        return replace(clip, fps=fps, history=(*clip.history, note))
+    hint = "; name the .amc file, and its .asf is found beside it" if suffix == ".asf" else ""
+    raise MotionFileError(f"Expected a motion file ({', '.join(SUFFIXES)}), found {suffix or 'no suffix'}{hint}.", path)

@@ -1,0 +1,93 @@
+"""The bytes of a motion file, and refusals that say where in it: `walk.bvh:41:7`.
+
+Lines end with LF, CRLF or CR; a byte order mark is passed over; lines and columns count from 1.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from study.errors import MotionFileError
+
+_LINE_END = re.compile(rb"\r\n|\r|\n")
+# A number as motion files write it; Python's own reading would also take `1_000`, `nan` and `inf`.
+NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A text file in memory.
+
+    Parameters
+    ----------
+    path
+        Where it came from, for messages.
+    raw
+        Its bytes, UTF-8 or another superset of ASCII.
+    """
+
+    path: Path
+    raw: bytes
+
+    def error(self, offset: int, message: str) -> MotionFileError:
+        """The refusal of what stands at a byte offset; to be raised by the caller."""
+        before = self.raw[:offset]
+        ends = list(_LINE_END.finditer(before))
+        start = ends[-1].end() if ends else 0
+        column = len(before[start:].decode("utf-8", "replace")) + 1
+        return MotionFileError(message, self.path, len(ends) + 1, column)
+
+    def text(self, start: int, stop: int) -> str:
+        """A piece of the file as text, for names and messages."""
+        return self.raw[start:stop].decode("utf-8", "replace").lstrip("\ufeff")
+
+
+def read_source(path: Path | str, kind: str) -> Source:
+    """The file at `path`; refused where it can't be read, is empty, or is not text.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        What it should be, for messages: `"a BVH file"`.
+    """
+    path = Path(path)
+    try:
+        raw = path.read_bytes()
+    except OSError as problem:
+        reason = problem.strerror or type(problem).__name__
+        raise MotionFileError(
+            f"Expected {kind}, but it can't be read ({reason}). Check the path and its permissions.", path
+        ) from problem
+    for mark, encoding in ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+        if raw.startswith(mark):
+            raw = raw.decode(encoding, "replace").encode()
+    if raw.startswith(codecs.BOM_UTF8):
+        # Blanks in its place keep every offset; the column of line 1 is then counted with them, so cut instead.
+        raw = raw[len(codecs.BOM_UTF8) :]
+    if not raw.strip():
+        raise MotionFileError(f"Expected {kind}, but the file is empty. Copy or download it again.", path)
+    if b"\0" in raw[:4096] or b"\0" in raw:
+        raise MotionFileError(f"Expected {kind}, which is text, but found binary data. Check what the file is.", path)
+    return Source(path, raw)
+
+
+def number(source: Source, token: bytes, offset: int, what: str) -> float:
+    """One number, or the refusal that names its place."""
+    if NUMBER.fullmatch(token):
+        value = float(token)
+        if abs(value) != float("inf"):
+            return value
+    shown = token.decode("utf-8", "replace")[:40]
+    hint = "Check the line."
+    if b"," in token:
+        hint = "Write decimals with a point and separate numbers by blanks."
+    elif re.fullmatch(rb"[+-]?nan.*|[+-]?inf.*", token, re.IGNORECASE):
+        hint = "The frame holds no measurement: export again, or cut it out."
+    elif len(re.findall(rb"\.", token)) > 1 or re.fullmatch(rb".*[\d.][+-]\d.*", token):
+        hint = "Two numbers seem to be glued together: put a blank between them."
+    raise source.error(offset, f"Expected {what}, found {shown!r}. {hint}")

@@ -1,0 +1,100 @@
+"""How long a unit of a motion file is: found from the body that it describes.
+
+BVH files don't state their unit. A leg of an adult, hip to ankle, is about 0.8 m; the units in use (metres, the
+CMU database's 1/0.45 inch, inches, centimetres, millimetres) lie at least a factor of 1.7 apart, so the leg tells.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.motion.skeleton import find_roles
+
+FloatArray = NDArray[np.float64]
+
+INCH = 0.0254
+CMU_UNIT = INCH / 0.45
+
+# Metres in a unit, with the name that messages give it.
+UNITS = {
+    1.0: "metres",
+    CMU_UNIT: "1/0.45 inch, as in the CMU database",
+    INCH: "inches",
+    0.01: "centimetres",
+    0.001: "millimetres",
+}
+
+_LEG_M = 0.8
+_BODY_M = 1.7
+# From a toddler's leg to that of the tallest; outside, a unit is a guess.
+_PLAUSIBLE_LEG_M = (0.3, 1.3)
+_PLAUSIBLE_BODY_M = (0.7, 3.0)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What a unit of a file is taken to be.
+
+    Parameters
+    ----------
+    metres_per_unit
+        Metres in a unit of the file.
+    plausible
+        Whether the body that results has a person's size.
+    by_legs
+        Whether legs were found to judge by; anything else is a guess from the whole rig's size.
+    note
+        What was assumed and why, in words, for the clip's history.
+    """
+
+    metres_per_unit: float
+    plausible: bool
+    by_legs: bool
+    note: str
+
+
+def find_scale(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatArray) -> Scale:
+    """The unit in which a rig's legs, or else its whole body, come out nearest to an adult's.
+
+    Parameters
+    ----------
+    names, parents
+        The joints, parents before children.
+    offsets : (joints, 3)
+        Each joint in its parent's frame, in the file's unit.
+    """
+    leg = _leg_length(names, parents, offsets)
+    if leg > 0.0:
+        size, usual, plausible, what = leg, _LEG_M, _PLAUSIBLE_LEG_M, "leg"
+    else:
+        size, usual, plausible, what = _extent(parents, offsets), _BODY_M, _PLAUSIBLE_BODY_M, "longest chain of bones"
+    if size <= 0.0:
+        return Scale(1.0, False, False, "lengths taken as metres: the rig has no length to judge by")
+    scale = min(UNITS, key=lambda unit: abs(math.log(size * unit / usual)))
+    metres = size * scale
+    return Scale(
+        scale,
+        plausible[0] <= metres <= plausible[1],
+        leg > 0.0,
+        f"lengths taken as {UNITS[scale]} (x {scale:.6g} m): the {what} measures {size:.4g}, so {metres:.2f} m",
+    )
+
+
+def _leg_length(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatArray) -> float:
+    roles = find_roles(names, parents)
+    sides = [side for side in "LR" if f"knee.{side}" in roles and f"ankle.{side}" in roles]
+    lengths = np.linalg.norm(offsets, axis=1)
+    return float(np.mean([lengths[roles[f"knee.{s}"]] + lengths[roles[f"ankle.{s}"]] for s in sides])) if sides else 0.0
+
+
+def _extent(parents: NDArray[np.int64], offsets: FloatArray) -> float:
+    """The longest way from the root along bones, twice where it stands in the body's middle: near the stature."""
+    reach = np.zeros(len(parents))
+    for joint in range(1, len(parents)):
+        reach[joint] = reach[parents[joint]] + np.linalg.norm(offsets[joint])
+    return float(2.0 * reach.max())
