@@ -1,0 +1,330 @@
+"""How long a blend should be: fixed, by geodesic distance, or by joint velocity.
+
+In: two clips of one rig at one frame rate, a start frame in the source and an end frame in the destination. Out:
+a `BlendLength`. Wang & Bodenheimer 2004, section 3.1: the geodesic method (Eqs. 1 and 2) for cyclic motions,
+the velocity method (Eqs. 3 and 4) for motions that don't repeat, and the fixed 0.33 s that both are compared to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import TransitionError
+from study.motion import quaternions as quat
+from study.motion.clip import Clip
+from study.transitions.distances import check_same_rig, frame_distance, half_angle_squares, joint_differences
+from study.transitions.weights import MAJOR_ROLES, joint_weights
+from study.transitions.windows import check_frames, longest_available, shortfall, window
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+METHODS = ("fixed", "geodesic", "velocity")
+
+# 2004: blends normally take 0.03 to 2 s, 1 to 60 frames at 30 fps; the fixed one 0.33 s, 10 frames.
+SHORTEST_S, LONGEST_S, FIXED_S = 1.0 / 30.0, 2.0, 1.0 / 3.0
+
+
+@dataclass(frozen=True)
+class BlendLength:
+    """A blend length and what it rests on.
+
+    Parameters
+    ----------
+    method
+        `"fixed"`, `"geodesic"` or `"velocity"`.
+    blend_frames, blend_s
+        The length, in frames of the clips and in seconds.
+    cost
+        2004 Eq. 1 at this length; NaN where the clips don't supply the frames to know it.
+    lengths, costs
+        The candidate lengths in frames and the cost of each (Figure 3); None but for the geodesic method.
+    joint
+        The role with the largest joint difference, by which the velocity method goes.
+    differences
+        Half angle between start and end frame for each major joint (2004 Table 1), by role.
+    joint_speed
+        The mean half-angle speed of that joint, radians a second (the `|v|` of Eq. 4).
+    unclipped_s
+        What Eq. 4 gave, before it was held to the shortest and longest length.
+    note
+        What a reader should know: that the length was clipped, or candidates left out.
+    """
+
+    method: str
+    blend_frames: int
+    blend_s: float
+    cost: float
+    lengths: IntArray | None = None
+    costs: FloatArray | None = None
+    joint: str | None = None
+    differences: Mapping[str, float] = field(default_factory=dict)
+    joint_speed: float | None = None
+    unclipped_s: float | None = None
+    note: str = ""
+
+
+def default_frames(fps: float, seconds: float) -> int:
+    """A duration of the paper in whole frames, at least one."""
+    return max(1, round(seconds * fps))
+
+
+def blend_length(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    *,
+    method: str = "geodesic",
+    fixed_frames: int | None = None,
+    shortest: int | None = None,
+    longest: int | None = None,
+    weights: str | Mapping[str, float] = "wang2003",
+    specification: str = "start-end",
+    restrict: bool = False,
+) -> BlendLength:
+    """The blend length for a transition, by one of the methods of Wang & Bodenheimer 2004.
+
+    Parameters
+    ----------
+    source, destination
+        Clips of one rig at one frame rate.
+    start_frame, end_frame
+        The frame of the source at which the blend starts, and the frame of the destination at which it ends.
+    method
+        `"fixed"`, `"geodesic"` (Eqs. 1, 2) or `"velocity"` (Eqs. 3, 4).
+    fixed_frames
+        The fixed length in frames; 0.33 s (10 frames at 30 fps) unless given.
+    shortest, longest
+        The range of lengths in frames; 0.03 to 2 s (1 to 60 frames at 30 fps) unless given.
+    weights
+        As `joint_weights` takes them.
+    specification
+        What the two frames mean; see `study.transitions.windows`.
+    restrict
+        Leave out lengths that the clips can't supply, rather than refuse them.
+
+    Raises
+    ------
+    TransitionError
+        Where the clips don't supply the frames (the message counts them), differ in rig or frame rate, or an
+        option is not known.
+    MotionError
+        Where the rig lacks a joint that the weights or the velocity method need.
+
+    Examples
+    --------
+    >>> from study.motion.synthetic import synthesize
+    >>> walk, run = synthesize("walk", seconds=4.0), synthesize("run", seconds=4.0)
+    >>> blend_length(walk, run, 40, 80, method="fixed").blend_frames
+    10
+    """
+    check_same_rig(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
+    high = default_frames(source.fps, LONGEST_S) if longest is None else longest
+    if not 1 <= low <= high:
+        raise TransitionError(f"Expected 1 <= shortest <= longest blend length in frames, got {low} and {high}.")
+    weight = joint_weights(source.skeleton, weights)
+    frames = (start_frame, end_frame)
+    if method == "geodesic":
+        return _geodesic(source, destination, frames, low, high, weight, specification, restrict)
+    if method == "velocity":
+        found = _velocity(source, destination, frames, low, high)
+    elif method == "fixed":
+        length = default_frames(source.fps, FIXED_S) if fixed_frames is None else fixed_frames
+        found = BlendLength("fixed", length, length / source.fps, np.nan)
+    else:
+        raise TransitionError(f"Expected a method of {', '.join(METHODS)}, got {method!r}.")
+    return _supplied(found, source, destination, frames, weight, specification, restrict)
+
+
+def geodesic_costs(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    longest: int,
+    weights: FloatArray,
+    specification: str = "start-end",
+) -> FloatArray:
+    """The cost of each blend length 1 to `longest` frames (2004 Eqs. 1 and 2), `(longest,)`.
+
+    See `joint_costs`, of which this is the weighted sum.
+    """
+    used = np.flatnonzero(weights)
+    return np.asarray(
+        weights[used] @ joint_costs(source, destination, start_frame, end_frame, longest, used, specification)
+    )
+
+
+def joint_costs(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    longest: int,
+    joints: IntArray,
+    specification: str = "start-end",
+) -> FloatArray:
+    """The unweighted geodesic cost of each joint for each blend length (2004 Figure 5).
+
+    Parameters
+    ----------
+    source, destination, start_frame, end_frame, specification
+        As in `blend_length`; both clips supply `longest` frames, or `TransitionError`.
+    longest
+        The longest blend in frames.
+    joints : (n,)
+        Indices of the joints.
+
+    Returns
+    -------
+    (n, longest) mean squared half angles over the blend window; column `b - 1` for length `b`.
+
+    Notes
+    -----
+    Eq. 2 prints the source index as `i-t-1`; `i+t-1` is meant, as Eqs. 5 and 6 show. With start and end frames the
+    window of length b pairs source frame `i+s` with destination frame `j-e` wherever `s+e = b-1`: the pairs of
+    each length are one anti-diagonal of a square table, so one matrix product gives the dot products of all
+    lengths at once. Good to about 1e-15 absolute.
+    """
+    frames = window(start_frame, end_frame, longest, specification)
+    if lacking := shortfall(source, destination, frames):
+        raise TransitionError(
+            f"Expected clips with frames for blends of up to {longest} frames at source frame {start_frame} and "
+            f"destination frame {end_frame}, but {lacking}. Choose other frames, extend the clip, lower the longest "
+            "blend, or restrict the candidates to what there is."
+        )
+    a = source.rotations[frames.source_start : frames.source_stop, joints]
+    b = destination.rotations[frames.destination_start : frames.destination_stop, joints]
+    if specification == "start-end":
+        dots = np.matmul(a.transpose(1, 0, 2), b[::-1].transpose(1, 2, 0)).reshape(len(joints), -1)
+        order, starts = _anti_diagonals(longest)
+        sums = np.add.reduceat(half_angle_squares(dots.take(order, axis=1)), starts, axis=1)
+        return np.asarray(sums / np.arange(1, longest + 1))
+    running = np.zeros((len(joints), longest + 1))
+    np.cumsum(half_angle_squares(np.sum(a * b, axis=-1).T), axis=1, out=running[:, 1:])
+    lengths = np.arange(1, longest + 1)
+    # Shorter windows lie within the longest one, each around the frame where the clips meet.
+    first = longest // 2 - lengths // 2 if specification == "centre" else np.zeros(longest, dtype=np.int64)
+    return np.asarray((running[:, first + lengths] - running[:, first]) / lengths)
+
+
+@lru_cache(maxsize=32)
+def _anti_diagonals(size: int) -> tuple[IntArray, IntArray]:
+    """Flat indices of the upper-left triangle of a square table by anti-diagonal, and where each one starts."""
+    sums = np.add.outer(np.arange(size), np.arange(size)).ravel()
+    order = np.argsort(sums, kind="stable")
+    return order[: size * (size + 1) // 2], np.arange(size) * (np.arange(size) + 1) // 2
+
+
+def _geodesic(
+    source: Clip,
+    destination: Clip,
+    frames: tuple[int, int],
+    low: int,
+    high: int,
+    weights: FloatArray,
+    specification: str,
+    restrict: bool,
+) -> BlendLength:
+    note = ""
+    available = longest_available(source, destination, *frames, specification) if restrict else high
+    if low <= available < high:
+        note = f"the clips supply blends of up to {available} frames; {high} were asked for"
+        high = available
+    costs = geodesic_costs(source, destination, *frames, high, weights, specification)[low - 1 :]
+    best = low + int(np.argmin(costs))
+    return BlendLength(
+        "geodesic", best, best / source.fps, float(costs[best - low]), np.arange(low, high + 1), costs, note=note
+    )
+
+
+def major_joint_differences(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> dict[str, float]:
+    """Half angle between start and end frame for each major joint, by role (2004 Eq. 3 and Table 1)."""
+    joints = [source.skeleton.role(role) for role in MAJOR_ROLES]
+    differences = joint_differences(source.rotations[start_frame, joints], destination.rotations[end_frame, joints])
+    return {role: float(value) for role, value in zip(MAJOR_ROLES, differences, strict=True)}
+
+
+def joint_speed(clip: Clip, frame: int, joint: int) -> float:
+    """Half-angle speed of a joint at a frame, radians a second: over the frames on either side, where there are both.
+
+    Half angles, so that Eq. 4 divides a half angle by a half-angle speed and gives seconds.
+    """
+    first, last = max(frame - 1, 0), min(frame + 1, clip.frames - 1)
+    if first == last:
+        return 0.0
+    turned = quat.half_angle_between(clip.rotations[first, joint], clip.rotations[last, joint])
+    return float(turned) * clip.fps / (last - first)
+
+
+def _velocity(source: Clip, destination: Clip, frames: tuple[int, int], low: int, high: int) -> BlendLength:
+    """2004 Eq. 4; `|v|` is the mean of the two speeds, since opposite velocities would cancel in a mean of vectors."""
+    differences = major_joint_differences(source, destination, *frames)
+    role = max(differences, key=differences.__getitem__)
+    joint = source.skeleton.role(role)
+    speed = 0.5 * (joint_speed(source, frames[0], joint) + joint_speed(destination, frames[1], joint))
+    # A joint that differs but doesn't move would take for ever; poses that are equal need no time.
+    seconds = differences[role] / speed if speed > 0 else (np.inf if differences[role] > 0 else 0.0)
+    length = round(min(max(seconds * source.fps, low), high))
+    note = ""
+    if not low - 0.5 <= seconds * source.fps <= high + 0.5:
+        note = (
+            f"the velocity method gave {seconds:.3f} s ({seconds * source.fps:.1f} frames), outside {low} to {high} "
+            f"frames; clipped to {length}"
+        )
+    return BlendLength(
+        "velocity",
+        length,
+        length / source.fps,
+        np.nan,
+        joint=role,
+        differences=differences,
+        joint_speed=speed,
+        unclipped_s=float(seconds),
+        note=note,
+    )
+
+
+def _supplied(
+    found: BlendLength,
+    source: Clip,
+    destination: Clip,
+    frames: tuple[int, int],
+    weights: FloatArray,
+    specification: str,
+    restrict: bool,
+) -> BlendLength:
+    """The length with its cost, held to what the clips supply or refused."""
+    length, note = found.blend_frames, found.note
+    span = window(*frames, length, specification)
+    if lacking := shortfall(source, destination, span):
+        available = longest_available(source, destination, *frames, specification)
+        if not restrict or available < 1:
+            raise TransitionError(
+                f"Expected clips with frames for the {found.method} blend of {length} frames at source frame "
+                f"{frames[0]} and destination frame {frames[1]}, but {lacking}. Choose other frames or extend the clip."
+            )
+        length = available
+        note = "; ".join(filter(None, (note, f"shortened to the {available} frames that the clips supply")))
+        span = window(*frames, length, specification)
+    a = source.rotations[span.source_start : span.source_stop]
+    b = destination.rotations[span.destination_start : span.destination_stop]
+    return BlendLength(
+        found.method,
+        length,
+        length / source.fps,
+        float(np.mean(frame_distance(a, b, weights))),
+        joint=found.joint,
+        differences=found.differences,
+        joint_speed=found.joint_speed,
+        unclipped_s=found.unclipped_s,
+        note=note,
+    )

@@ -1,0 +1,332 @@
+"""One clip out of two: aligned in facing and floor position, then cut or blended.
+
+In: a source and a destination clip of one rig at one frame rate, a start frame, an end frame and a blend length.
+Out: a `Transition`. Wang & Bodenheimer 2004, section 3: slerp of every joint under a linear or sigmoid weight, with
+facing and floor position aligned during the blend; 2003, section 4.2: the hard cut.
+
+How the root is blended. Placing the destination once and mixing the two root positions would add the distance
+between them, times the slope of the weight, to the velocity: two walkers at different speeds would hop at both
+ends of the blend and slide between. So the global degrees of freedom are blended as rates (after Rose et al. 1998):
+each clip's step from frame to frame, seen in its own facing, and its turn from frame to frame are mixed and added
+up. The velocity runs over from one clip's to the other's without a jump, straight ahead stays straight ahead, and
+turning or moving either clip on the floor changes nothing. The height above the floor is mixed directly, since the
+floor is the same for both, and so is the lean that is left of the root's rotation when its facing is taken away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import TransitionError
+from study.motion import quaternions as quat
+from study.motion.clip import Clip, joint_positions, moved, retarget
+from study.transitions.distances import check_same_rig
+from study.transitions.windows import Window, check_frames, shortfall, window
+
+FloatArray = NDArray[np.float64]
+
+WEIGHTS = ("linear", "sigmoid")
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How the destination was placed: turned about the vertical through the origin, then shifted on the floor.
+
+    `study.motion.clip.moved(destination, yaw, translation)` repeats it.
+    """
+
+    yaw: float
+    translation: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """A clip that goes from one motion into another.
+
+    Parameters
+    ----------
+    clip
+        The result, on the source's skeleton. Frames before the blend are the source's own; frames after it are
+        the destination's, moved by `alignment`.
+    blend_start, blend_stop
+        The blended frames of the result, as a slice counts them; equal for a cut.
+    source_frames, destination_frames
+        The stretch of each clip that went into the blend, as a slice counts it. Frame `f < blend_start` of the
+        result is frame `f` of the source; frame `f >= blend_stop` is frame `f - blend_stop + destination_frames[1]`
+        of the destination.
+    blend_frames
+        The blend length, `blend_stop - blend_start`; 0 for a cut.
+    alignment
+        How the destination (on the source's skeleton) was placed.
+    note
+        How it was made, in words.
+    """
+
+    clip: Clip
+    blend_start: int
+    blend_stop: int
+    source_frames: tuple[int, int]
+    destination_frames: tuple[int, int]
+    blend_frames: int
+    alignment: Alignment
+    note: str = ""
+
+
+def blend_weights(blend_frames: int, weight: str = "linear") -> FloatArray:
+    """The destination's share in each blended frame, `(blend_frames,)`, rising within 0 and 1.
+
+    Linear: `n / (b + 1)` for n from 1 to b, so that the last frame before the blend (0) and the first one after it (1)
+    continue the ramp: no frame is a mere copy and no step is skipped, down to a blend of one frame, which is half
+    of each. Sigmoid: the same ramp through `x * x * (3 - 2 * x)`. Both are symmetric: reversing the roles of the clips
+    reverses the shares.
+    """
+    ramp = np.arange(1, blend_frames + 1) / (blend_frames + 1.0)
+    if weight == "linear":
+        return ramp
+    if weight == "sigmoid":
+        return np.asarray(ramp * ramp * (3.0 - 2.0 * ramp))
+    raise TransitionError(f"Expected a weight of {' or '.join(map(repr, WEIGHTS))}, got {weight!r}.")
+
+
+def facing(clip: Clip) -> FloatArray:
+    """Where the figure faces, `(frames,)`, radians about the vertical, 0 along +Z, continuous over the frames.
+
+    Square to the mean of the hip line and the shoulder line, which turn against each other in walking. Geometry
+    rather than the root's rotation, so that it means the same on any rig.
+    """
+    positions = joint_positions(clip)
+    across = np.zeros((clip.frames, 3))
+    for part in ("hip", "shoulder"):
+        line = positions[:, clip.skeleton.role(f"{part}.L")] - positions[:, clip.skeleton.role(f"{part}.R")]
+        across += line / np.linalg.norm(line, axis=1, keepdims=True)
+    return np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))
+
+
+def blend(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    blend_frames: int,
+    *,
+    weight: str = "linear",
+    specification: str = "start-end",
+) -> Transition:
+    """Source, then a blend, then destination (2004 section 3).
+
+    Parameters
+    ----------
+    source, destination
+        Clips of one rig at one frame rate; the destination is put on the source's skeleton.
+    start_frame, end_frame
+        With the specification `"start-end"`: the first source frame in the blend and the last destination frame in
+        it. See `study.transitions.windows` for `"centre"` and `"left"`.
+    blend_frames
+        Blended frames, at least 1.
+    weight
+        `"linear"` or `"sigmoid"`; see `blend_weights`.
+
+    Returns
+    -------
+    Transition
+        With `source_frames[0] + blend_frames + (destination.frames - destination_frames[1])` frames.
+
+    Raises
+    ------
+    TransitionError
+        Where the clips don't supply the frames (the message counts them), or differ in rig or frame rate.
+    """
+    check_same_rig(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    frames = window(start_frame, end_frame, blend_frames, specification)
+    if lacking := shortfall(source, destination, frames):
+        raise TransitionError(
+            f"Expected clips with frames for a blend of {blend_frames} frames at source frame {start_frame} and "
+            f"destination frame {end_frame}, but {lacking}. Choose other frames, extend the clip or blend shorter."
+        )
+    destination = retarget(destination, source.skeleton)
+    share = blend_weights(blend_frames, weight)
+    return _joined(
+        source,
+        destination,
+        frames,
+        _margins(source, frames.source_start, blend_frames),
+        _margins(destination, frames.destination_start, blend_frames),
+        share,
+        f"{weight} blend of {blend_frames} frames, {specification}",
+    )
+
+
+def cut(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Transition:
+    """Source up to the frame before `start_frame`, then destination from `end_frame`, with no blend (2003 section 4.2).
+
+    The destination's frame `end_frame` stands where the source's frame `start_frame`, whose place it takes, stood,
+    and faces as it faced. Cutting a clip to itself at one frame gives the clip.
+    """
+    check_same_rig(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    destination = retarget(destination, source.skeleton)
+    turn = float(facing(_pick(source, [start_frame]))[0] - facing(_pick(destination, [end_frame]))[0])
+    alignment = _alignment(turn, source.root_positions[start_frame], destination.root_positions[end_frame])
+    clip = _assemble(source, start_frame, None, destination, end_frame, alignment, f"cut at frame {start_frame}")
+    return Transition(
+        clip, start_frame, start_frame, (start_frame, start_frame), (end_frame, end_frame), 0, alignment, "cut"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """A blend window of one clip with the frame before and the frame after it, and whether these exist."""
+
+    clip: Clip
+    has_before: bool
+    has_after: bool
+
+
+def _margins(clip: Clip, start: int, blend_frames: int) -> _Stretch:
+    wanted = np.arange(start - 1, start + blend_frames + 1)
+    inside = np.clip(wanted, 0, clip.frames - 1)
+    return _Stretch(_pick(clip, inside), bool(wanted[0] >= 0), bool(wanted[-1] < clip.frames))
+
+
+def _pick(clip: Clip, frames: NDArray[np.int64] | list[int]) -> Clip:
+    return replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
+
+
+def _joined(
+    source: Clip,
+    destination: Clip,
+    frames: Window,
+    source_part: _Stretch,
+    destination_part: _Stretch,
+    share: FloatArray,
+    note: str,
+) -> Transition:
+    """The transition whose blended frames mix two stretches of equally many frames."""
+    count = len(share)
+    rotations = slerp_one_way(source_part.clip.rotations[1:-1], destination_part.clip.rotations[1:-1], share)
+    positions, rotations[:, 0], end_facing, end_position = _blend_root(source_part, destination_part, share)
+    last = count + (1 if destination_part.has_after else 0)
+    alignment = _alignment(
+        end_facing - float(facing(destination_part.clip)[last]),
+        end_position,
+        destination_part.clip.root_positions[last],
+    )
+    blended = replace(source, root_positions=positions, rotations=rotations)
+    note = f"{note}, from source frame {frames.source_start} to destination frame {frames.destination_stop - 1}"
+    clip = _assemble(source, frames.source_start, blended, destination, frames.destination_stop, alignment, note)
+    return Transition(
+        clip,
+        frames.source_start,
+        frames.source_start + count,
+        (frames.source_start, frames.source_stop),
+        (frames.destination_start, frames.destination_stop),
+        count,
+        alignment,
+        note,
+    )
+
+
+def slerp_one_way(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray:
+    """Slerp of two stretches of motion `(frames, joints, 4)` under `share (frames,)`, each joint the same way round.
+
+    Each joint takes the way that is shorter over the whole stretch. Choosing anew at each frame, two rotations
+    about half a turn apart would swap sides from one frame to the next, and the limb would jump. Both stretches have
+    signs continuous over the frames, as `Clip` stores them.
+    """
+    dots = np.sum(a * b, axis=-1)
+    sign = np.where(np.sum(dots, axis=0) < 0.0, -1.0, 1.0)
+    angle = np.arctan2(np.linalg.norm(a - b * sign[:, None], axis=-1), np.linalg.norm(a + b * sign[:, None], axis=-1))
+    angle = 2.0 * angle[..., None]
+    weight = share[:, None, None]
+    near = np.sin(angle) < 1e-6
+    safe = np.where(near, 1.0, np.sin(angle))
+    share_a = np.where(near, 1.0 - weight, np.sin((1.0 - weight) * angle) / safe)
+    share_b = np.where(near, weight, np.sin(weight * angle) / safe)
+    # Opposite quaternions are one rotation, with no way round to prefer: that rotation it is.
+    opposite = near & (angle > 1.0)
+    mixed = np.where(opposite, a, share_a * a + share_b * (b * sign[:, None]))
+    return quat.normalise(mixed)
+
+
+def _blend_root(
+    source: _Stretch, destination: _Stretch, share: FloatArray
+) -> tuple[FloatArray, FloatArray, float, FloatArray]:
+    """Root positions and rotations of the blended frames, and facing and position to go on from (see the module).
+
+    The last two belong to the first frame after the blend, or to the last blended one where the destination ends.
+    """
+    count = len(share)
+    headings = [facing(part.clip) for part in (source, destination)]
+    step_share = np.convolve(np.concatenate([[0.0], share, [1.0]]), [0.5, 0.5], mode="valid")
+    # Where a clip has no frame on the far side of a step, the other clip's step serves alone.
+    step_share[0] *= destination.has_before
+    step_share[-1] = step_share[-1] if source.has_after else 1.0
+    steps = [_steps(part.clip, heading) for part, heading in zip((source, destination), headings, strict=True)]
+    turns = (1.0 - step_share) * steps[0][0] + step_share * steps[1][0]
+    strides = (1.0 - step_share)[:, None] * steps[0][1] + step_share[:, None] * steps[1][1]
+    first = 0 if source.has_before else 1
+    heading = np.concatenate([[0.0], np.cumsum(turns)])
+    heading += headings[0][first] - heading[first]
+    strides = quat.rotate(quat.yaw(0.5 * (heading[1:] + heading[:-1])), strides)
+    path = np.concatenate([np.zeros((1, 3)), np.cumsum(strides, axis=0)])
+    path += source.clip.root_positions[first] - path[first]
+    height = [part.clip.root_positions[1:-1, 1] for part in (source, destination)]
+    path[1:-1, 1] = (1.0 - share) * height[0] + share * height[1]
+    leans = [
+        quat.continuous(quat.multiply(quat.yaw(-own[1:-1]), part.clip.rotations[1:-1, 0]))[:, None]
+        for part, own in zip((source, destination), headings, strict=True)
+    ]
+    rotations = quat.multiply(quat.yaw(heading[1:-1]), slerp_one_way(leans[0], leans[1], share)[:, 0])
+    last = count + (1 if destination.has_after else 0)
+    return path[1:-1], rotations, float(heading[last]), path[last]
+
+
+def _steps(clip: Clip, heading: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """From frame to frame: the turn, radians, and the step on the floor as seen in the facing halfway, metres."""
+    strides = np.diff(clip.root_positions, axis=0) * np.array([1.0, 0.0, 1.0])
+    return np.diff(heading), quat.rotate(quat.yaw(-0.5 * (heading[1:] + heading[:-1])), strides)
+
+
+def _alignment(turn: float, place: FloatArray, position: FloatArray) -> Alignment:
+    """The move on the floor that turns by `turn` and takes `position` above or below `place`."""
+    turn = float(np.arctan2(np.sin(turn), np.cos(turn)))
+    shift = place - quat.rotate(quat.yaw(turn), position)
+    return Alignment(turn, (float(shift[0]), 0.0, float(shift[2])))
+
+
+def _assemble(
+    source: Clip,
+    source_stop: int,
+    blended: Clip | None,
+    destination: Clip,
+    destination_start: int,
+    alignment: Alignment,
+    note: str,
+) -> Clip:
+    """The source's frames before a frame, the blended ones, and the destination's from a frame on, moved."""
+    tail = moved(destination, alignment.yaw, np.array(alignment.translation))
+    middle = [] if blended is None else [blended]
+    names = [clip.name or kind for clip, kind in ((source, "source"), (destination, "destination"))]
+    stretches = [
+        (source.root_positions[:source_stop], source.rotations[:source_stop]),
+        *((part.root_positions, part.rotations) for part in middle),
+        (tail.root_positions[destination_start:], tail.rotations[destination_start:]),
+    ]
+    positions, rotations = (np.concatenate(arrays) for arrays in zip(*stretches, strict=True))
+    return Clip(
+        source.skeleton,
+        positions,
+        rotations,
+        source.fps,
+        name=f"{names[0]} to {names[1]}",
+        history=(
+            *(f"{names[0]}: {line}" for line in source.history),
+            *(f"{names[1]}: {line}" for line in destination.history),
+            note,
+        ),
+        synthetic=source.synthetic or destination.synthetic,
+    )
