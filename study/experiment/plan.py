@@ -1,0 +1,224 @@
+"""Plan: the trials of one participant, drawn once and stored with its seed.
+
+Pairs of stimuli come in (`stimuli.prepare`, or the manifest of a results folder); a `Plan` goes out: the trial table
+that window, browser and simulated observer all follow. Showing a plan draws nothing. 2004 section 4.2: each pair in
+both orders, the order of pairs and the order within a pair both at random.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from study.errors import SessionError
+from study.experiment.protocol import Protocol, StudySpec
+
+PLAN_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two stimuli to compare, or one to rate.
+
+    Parameters
+    ----------
+    name
+        Unique in the protocol: `jnd/walking/+5`.
+    study, task, motion, category
+        The study, its task, the transition's name and its type of motion.
+    a, b
+        Stimulus ids: reference and comparison (same-different), methods a and b (preference); `b` is empty where
+        one stimulus is rated.
+    method_a, method_b
+        How the blend lengths were found.
+    difference_frames
+        Comparison minus reference, signed; None outside same-different studies.
+    """
+
+    name: str
+    study: str
+    task: str
+    motion: str
+    category: str
+    a: str
+    b: str
+    method_a: str
+    method_b: str
+    difference_frames: int | None = None
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial: what is shown first and second, and what the answer will mean.
+
+    `trial` counts from 1 over the whole sitting, `repeat` from 1. `reference_first` is None outside same-different
+    studies, `a_first` outside preference studies, and `second` is empty where one stimulus is rated.
+    """
+
+    trial: int
+    study: str
+    task: str
+    repeat: int
+    pair: str
+    motion: str
+    category: str
+    first: str
+    second: str
+    difference_frames: int | None
+    reference_first: bool | None
+    method_a: str
+    method_b: str
+    a_first: bool | None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All trials of one participant, in order."""
+
+    protocol: str
+    protocol_sha256: str
+    participant: str
+    seed: int
+    group: int
+    trials: tuple[Trial, ...]
+
+    def trial(self, number: int) -> Trial:
+        """A trial by its number, counted from 1."""
+        if not 1 <= number <= len(self.trials):
+            raise SessionError(f"Expected a trial from 1 to {len(self.trials)}, found {number}.")
+        return self.trials[number - 1]
+
+    def to_json(self) -> str:
+        """The plan as JSON; `plan_from_json` gives it back."""
+        return json.dumps({"version": PLAN_VERSION, **asdict(self)}, separators=(",", ":"))
+
+
+def plan_from_json(text: str) -> Plan:
+    """A stored plan."""
+    try:
+        data: dict[str, Any] = json.loads(text)
+        version = data.pop("version")
+        if version != PLAN_VERSION:
+            raise SessionError(
+                f"Expected a plan of version {PLAN_VERSION}, found {version}; use the Segue that wrote it."
+            )
+        return Plan(**{**data, "trials": tuple(Trial(**trial) for trial in data["trials"])})
+    except (ValueError, KeyError, TypeError) as error:
+        raise SessionError(f"Expected a stored plan, found JSON that is none: {error}.") from error
+
+
+def generator(seed: int, *names: str | int) -> np.random.Generator:
+    """A generator that depends on a seed and on names alone, so that nothing depends on the order of drawing."""
+    digest = hashlib.sha256("\x1f".join(map(str, names)).encode()).digest()
+    words = np.frombuffer(digest, dtype="<u4")
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *map(int, words)])))
+
+
+def draw_plan(
+    protocol: Protocol, pairs: Sequence[Pair], participant: str, seed: int | None = None, *, group: int = 0
+) -> Plan:
+    """Draw a participant's trials.
+
+    Parameters
+    ----------
+    protocol
+        Orders, repeats and the order of studies.
+    pairs
+        In the protocol's order, which matters: the draw counts on it.
+    participant
+        A name; with the seed it decides the whole plan.
+    seed
+        Instead of the protocol's own.
+    group
+        For studies whose order is `by-group`.
+    """
+    if not participant.strip():
+        raise SessionError("Expected a participant's name, found none; write one, such as p01.")
+    seed = protocol.seed if seed is None else seed
+    rng = generator(seed, "plan", protocol.name, participant)
+    studies = list(protocol.studies)
+    if protocol.study_order == "random":
+        studies = [studies[i] for i in rng.permutation(len(studies))]
+    trials: list[Trial] = []
+    for study in studies:
+        own = [pair for pair in pairs if pair.study == study.name]
+        if not own:
+            raise SessionError(
+                f"Expected pairs for the study {study.name!r}, found none; prepare this protocol's stimuli."
+            )
+        for repeat in range(1, study.repeats + 1):
+            trials += _draw_set(study, own, repeat, rng, group)
+    numbered = tuple(replace(trial, trial=number) for number, trial in enumerate(trials, start=1))
+    return Plan(protocol.name, protocol.sha256, participant, seed, group, numbered)
+
+
+def _draw_set(
+    study: StudySpec, pairs: Sequence[Pair], repeat: int, rng: np.random.Generator, group: int
+) -> list[Trial]:
+    """One repeat of a study: each pair in its order or orders, shuffled."""
+    count = len(pairs)
+    if study.task == "rating":
+        if study.order == "by-group":
+            turn = group % count
+            return [_rating(pair, repeat) for pair in [*pairs[turn:], *pairs[:turn]]]
+        return [_rating(pairs[i], repeat) for i in rng.permutation(count)]
+    if study.order == "both":
+        shown = [(pair, a_first) for pair in pairs for a_first in (True, False)]
+    elif study.order == "random":
+        shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.integers(0, 2, count), strict=True)]
+    elif study.order == "balanced":
+        # An odd count leaves one pair over; which way it goes is drawn too.
+        halves = (np.arange(count) + int(rng.integers(0, 2))) % 2 == 0
+        shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.permutation(halves), strict=True)]
+    else:
+        shown = [(pair, group % 2 == 0) for pair in pairs]
+    return [_comparison(shown[i][0], shown[i][1], repeat) for i in rng.permutation(len(shown))]
+
+
+def _comparison(pair: Pair, a_first: bool, repeat: int) -> Trial:
+    first, second = (pair.a, pair.b) if a_first else (pair.b, pair.a)
+    same_different = pair.task == "same-different"
+    return replace(
+        _rating(pair, repeat),
+        first=first,
+        second=second,
+        reference_first=a_first if same_different else None,
+        a_first=None if same_different else a_first,
+    )
+
+
+def _rating(pair: Pair, repeat: int) -> Trial:
+    return Trial(
+        trial=0,
+        study=pair.study,
+        task=pair.task,
+        repeat=repeat,
+        pair=pair.name,
+        motion=pair.motion,
+        category=pair.category,
+        first=pair.a,
+        second=pair.b,
+        difference_frames=pair.difference_frames,
+        reference_first=None,
+        method_a=pair.method_a,
+        method_b=pair.method_b,
+        a_first=None,
+    )
+
+
+def trial_table(plan: Plan) -> list[dict[str, Any]]:
+    """The trial table, one mapping a trial, keys in `Trial`'s order."""
+    return [asdict(trial) for trial in plan.trials]
+
+
+TRIAL_COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Trial))
+
+
+def pair_from_json(data: Mapping[str, Any]) -> Pair:
+    """A pair as a manifest stores it."""
+    return Pair(**{field.name: data[field.name] for field in fields(Pair)})

@@ -1,0 +1,200 @@
+"""What is wrong with a protocol, in words: pydantic's findings with the key path, the line and what to do.
+
+A finding (`pydantic` error details) and the model come in; one sentence that says what was expected, what was found,
+where and what to do goes out.
+"""
+
+from __future__ import annotations
+
+import re
+import types
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel
+
+Location = Sequence[int | str]
+
+
+class KeyMismatchError(ValueError):
+    """What doesn't fit together in a protocol, and the key (a location within the part) where it shows."""
+
+    def __init__(self, message: str, *location: int | str) -> None:
+        self.location = location
+        super().__init__(message)
+
+
+def full_location(detail: Mapping[str, Any]) -> Location:
+    """Where a finding is: pydantic's location, and within it the one that a `KeyMismatchError` names."""
+    error = detail.get("ctx", {}).get("error")
+    return (*detail["loc"], *(error.location if isinstance(error, KeyMismatchError) else ()))
+
+
+_EXPECTED = {
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "string_type": "text in quotes",
+    "bool_type": "true or false",
+    "tuple_type": "a list in brackets",
+    "model_type": "a table of keys",
+    "model_attributes_type": "a table of keys",
+    "finite_number": "a finite number",
+}
+_BOUNDS = {
+    "greater_than": ("gt", "above"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "below"),
+    "less_than_equal": ("le", "at most"),
+    "multiple_of": ("multiple_of", "a multiple of"),
+}
+
+
+def explain(model: type[BaseModel], detail: Mapping[str, Any]) -> str:
+    """One finding as a sentence: key path, expected, found, what to do."""
+    location, kind, found = full_location(detail), detail["type"], detail.get("input")
+    context = detail.get("ctx", {})
+    path = key_path(location) or "the protocol"
+    if kind == "extra_forbidden":
+        return _unknown_key(model, location)
+    if kind == "missing":
+        return f"{path}: expected this key, found none; add it."
+    if kind == "value_error":
+        return f"{path}: {str(context['error']).removesuffix('?')}{'?' if str(context['error']).endswith('?') else '.'}"
+    unit = _unit(model, location)
+    if kind in _BOUNDS:
+        bound, words = _BOUNDS[kind]
+        return f"{path}: expected {words} {context[bound]:g}{unit}, found {found!r}; change it."
+    if kind == "literal_error":
+        return f"{path}: expected {context['expected']}, found {found!r}{_nearest_choice(context['expected'], found)}."
+    if kind in ("string_pattern_mismatch", "string_too_short"):
+        return f"{path}: expected {_text_rule(kind, context)}, found {found!r}; change it."
+    if kind in ("too_short", "too_long"):
+        return f"{path}: {detail['msg'].split(' after')[0]}; found {found!r}."
+    expected = _EXPECTED.get(kind, detail["msg"])
+    return f"{path}: expected {expected}{unit}, found {_shown(found)}; change it."
+
+
+def _shown(value: object) -> str:
+    kinds = {
+        bool: "true or false",
+        int: "a whole number",
+        float: "a number",
+        str: "text",
+        list: "a list",
+        dict: "a table",
+    }
+    return f"{value!r} ({kinds.get(type(value), type(value).__name__)})"
+
+
+def _text_rule(kind: str, context: Mapping[str, Any]) -> str:
+    if kind == "string_too_short":
+        return "some text"
+    if "#" in context["pattern"]:
+        return "a colour such as #20305a"
+    return "a name of small letters, digits, - and _"
+
+
+def _nearest_choice(expected: str, found: object) -> str:
+    near = get_close_matches(str(found), re.findall(r"'([^']+)'", expected), n=1)
+    return f"; did you mean {near[0]!r}?" if near else "; choose one of these"
+
+
+def _unknown_key(model: type[BaseModel], location: Location) -> str:
+    parent = model_at(model, location[:-1])
+    keys = list(parent.model_fields) if parent else []
+    key = str(location[-1])
+    elsewhere = [f"{p}.{key}" if p else key for p, part in parts(model) if key in part.model_fields]
+    # Half words are common slips (answer for answer_s), so the bar is low.
+    near = get_close_matches(key, keys, n=1, cutoff=0.5)
+    if elsewhere:
+        hint = f"it belongs at {elsewhere[0]}."
+    elif near:
+        hint = f"did you mean {near[0]!r}?"
+    else:
+        hint = f"valid keys here: {', '.join(keys)}."
+    return f"{key_path(location)}: unknown key; {hint}"
+
+
+def key_path(location: Location) -> str:
+    """A pydantic location as people write it: `studies[0].task`."""
+    path = ""
+    for step in location:
+        path += f"[{step}]" if isinstance(step, int) else (f".{step}" if path else step)
+    return path
+
+
+def _unwrap(annotation: Any) -> Any:
+    """The part model within `Annotated`, `X | None` and `tuple[X, ...]`; anything else as it is."""
+    while True:
+        origin = get_origin(annotation)
+        if origin is typing.Annotated or origin is tuple:
+            annotation = get_args(annotation)[0]
+        elif origin in (typing.Union, types.UnionType):
+            annotation = next(a for a in get_args(annotation) if a is not type(None))
+        else:
+            return annotation
+
+
+def model_at(model: type[BaseModel], location: Location) -> type[BaseModel] | None:
+    """The model of the part at a location; None where there is none."""
+    for step in location:
+        if isinstance(step, int):
+            continue
+        if step not in model.model_fields:
+            return None
+        inner = _unwrap(model.model_fields[step].annotation)
+        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            return None
+        model = inner
+    return model
+
+
+def parts(model: type[BaseModel], path: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
+    """Every part of a protocol with its path, the protocol first."""
+    yield path, model
+    for name, field in model.model_fields.items():
+        inner = _unwrap(field.annotation)
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            yield from parts(inner, f"{path}.{name}" if path else name)
+
+
+def _unit(model: type[BaseModel], location: Location) -> str:
+    """The unit of the key at a location, from its description, with a leading space."""
+    names = [step for step in location if isinstance(step, str)]
+    parent = model_at(model, names[:-1]) if names else None
+    field = parent.model_fields.get(names[-1]) if parent else None
+    found = re.search(r"\[([a-z ]+)\]$", field.description or "") if field else None
+    return f" in {found[1]}" if found else ""
+
+
+def line_of(text: str, location: Location) -> int:
+    """The line (from 1) at which the key of a location, or else its nearest parent, stands; 0 where none does."""
+    lines = dict(_key_lines(text))
+    steps = tuple(location)
+    while steps:
+        if steps in lines:
+            return lines[steps]
+        steps = steps[:-1]
+    return 0
+
+
+def _key_lines(text: str) -> Iterator[tuple[tuple[int | str, ...], int]]:
+    """Each table header and key of a TOML text with its location and line; inline tables count as one key."""
+    table: tuple[int | str, ...] = ()
+    counts: dict[tuple[int | str, ...], int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := re.match(r"\s*\[(\[?)\s*([\w.\-\"' ]+?)\s*\]", line):
+            table = ()
+            names = [name.strip(" \"'") for name in header[2].split(".")]
+            for depth, name in enumerate(names):
+                table = (*table, name)
+                if header[1] and depth == len(names) - 1:
+                    counts[table] = counts.get(table, -1) + 1
+                if table in counts:
+                    table = (*table, counts[table])
+            yield table, number
+        elif key := re.match(r"\s*([\w\-.\"']+)\s*=", line):
+            yield (*table, *(name.strip("\"'") for name in key[1].split("."))), number
