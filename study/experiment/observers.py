@@ -1,0 +1,247 @@
+"""Observers: simulated participants whose sensitivity, criterion, lapses and preferences are known.
+
+A protocol's pairs and a database come in; sessions that are marked as simulated for ever go out, with the truth that
+an analysis should find (`observer_models.truth`). They go through the same `session` as real front ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+from typing import Protocol as Shape
+
+import numpy as np
+
+from study.errors import SessionError
+from study.experiment import session as sitting
+from study.experiment.observer_models import (
+    LEAST_CRITERION,
+    ObserverSettings,
+    PreferenceObserver,
+    RatingObserver,
+    SameDifferentObserver,
+    default_observer,
+    lean,
+    logistic,
+    probability_different,
+    truth,
+)
+from study.experiment.plan import Pair, Plan, Trial, draw_plan, generator
+from study.experiment.protocol import Protocol
+from study.experiment.responses import (
+    Responses,
+    SessionRecord,
+    begin_session,
+    find_session,
+    has_event,
+    record_answer,
+    record_event,
+    stored_answers,
+)
+
+__all__ = [
+    "ObserverSettings",
+    "PreferenceObserver",
+    "RatingObserver",
+    "SameDifferentObserver",
+    "SimulationSummary",
+    "StimulusSource",
+    "default_observer",
+    "person",
+    "respond",
+    "simulate",
+    "truth",
+]
+
+
+@dataclass(frozen=True)
+class Person:
+    """One simulated participant: the settings with this person's deviations, and where their chance comes from."""
+
+    name: str
+    seed: int
+    settings: ObserverSettings
+    lean: float
+    leniency: float
+
+
+def person(settings: ObserverSettings, name: str, seed: int) -> Person:
+    """Draw a participant's deviations; they depend on the seed and the name alone."""
+    rng = generator(seed, "person", name)
+    sensitivity, criterion, leaning, leniency = rng.standard_normal(4)
+    typical = settings.same_different
+    factor = float(np.exp(typical.log_sensitivity_sd * sensitivity))
+    own = replace(
+        typical,
+        d_prime_shorter=typical.d_prime_shorter * factor,
+        d_prime_longer=typical.d_prime_longer * factor,
+        criterion=max(typical.criterion + typical.criterion_sd * float(criterion), LEAST_CRITERION),
+    )
+    return Person(
+        name,
+        seed,
+        replace(settings, same_different=own),
+        settings.preference.participant_sd * float(leaning),
+        settings.rating.participant_sd * float(leniency),
+    )
+
+
+def respond(who: Person, trial: Trial, step: sitting.Step) -> tuple[str | None, float | None]:
+    """A participant's answer and response time in seconds; None twice where the answer is missed.
+
+    Chance depends on person, trial, item and attempt alone, so a session that was interrupted goes on as it would
+    have gone.
+    """
+    rng = generator(who.seed, "answer", who.name, trial.trial, step.item, step.attempt)
+    value, ease = _judge(who, trial, step, rng)
+    # Near the threshold people take longer: up to half as long again.
+    median = who.settings.response_median_s * (1.5 - 0.5 * ease)
+    response_s = float(median * np.exp(who.settings.response_log_sd * rng.standard_normal()))
+    inattentive = rng.random() < who.settings.missed
+    if step.duration_s is not None and (inattentive or response_s > step.duration_s):
+        return None, None
+    return value, round(response_s, 4)
+
+
+def _judge(who: Person, trial: Trial, step: sitting.Step, rng: np.random.Generator) -> tuple[str, float]:
+    """The answer, and how easy it was from 0 to 1."""
+    if trial.task == "same-different":
+        different = float(probability_different(who.settings.same_different, float(trial.difference_frames or 0)))
+        return ("different" if rng.random() < different else "same"), abs(2 * different - 1)
+    if trial.task == "preference":
+        preference = who.settings.preference
+        leaning = lean(preference, trial.method_a, trial.method_b) + who.lean
+        towards_first = (leaning if trial.a_first else -leaning) + preference.order_bias
+        chance = preference.lapse / 2 + (1 - preference.lapse) * float(logistic(towards_first))
+        return ("first" if rng.random() < chance else "second"), abs(2 * chance - 1)
+    rating = who.settings.rating
+    utility = who.settings.preference.utility.get(trial.method_a, 0.0)
+    middle = (len(step.legal) - 1) / 2 + rating.utility_weight * utility + who.leniency
+    point = int(np.clip(round(middle + rating.noise_sd * float(rng.standard_normal())), 0, len(step.legal) - 1))
+    return step.legal[point], 0.5
+
+
+class StimulusSource(Shape):
+    """What a simulation needs to know of the stimuli: a `StimulusSet` or the manifest of a results folder."""
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """All pairs, in the protocol's order."""
+
+    @property
+    def library(self) -> str:
+        """Name of the motion library."""
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether its motions are synthetic."""
+
+
+@dataclass(frozen=True)
+class SimulationSummary:
+    """What a simulation did: participants in all, answers made now, answers that were there already."""
+
+    participants: int
+    answers: int
+    found: int
+    truth: dict[str, Any]
+
+
+def simulate(
+    protocol: Protocol,
+    stimuli: StimulusSource,
+    responses: Responses,
+    participants: int,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    settings: ObserverSettings | None = None,
+) -> SimulationSummary:
+    """Run simulated participants `sim-001`, `sim-002`, ... through their whole sessions.
+
+    Run again after an interruption it finishes the work: sessions that are there are taken up where they stopped, and
+    the answers are those of an uninterrupted run.
+
+    Parameters
+    ----------
+    participants
+        How many there should be in the end.
+    seed
+        Where chance comes from, besides the protocol's own seed for the plans.
+    progress
+        Called with the answers there are and the number of them in all, after each answer.
+    settings
+        The observer; that of 2004 section 5 where it is left out.
+
+    Raises
+    ------
+    SessionError
+        Where sessions of the same names were begun by another observer, seed, protocol or plan.
+    """
+    if participants < 1:
+        raise SessionError(f"Expected one participant or more to simulate, found {participants}.")
+    settings = settings or default_observer()
+    known = {**truth(protocol, settings), "seed": seed}
+    names = [f"sim-{number:03d}" for number in range(1, participants + 1)]
+    plans = [draw_plan(protocol, stimuli.pairs, name, group=group) for group, name in enumerate(names)]
+    total = sum(questions(protocol, plan) for plan in plans)
+    made = found = 0
+    for plan in plans:
+        record = _open(protocol, stimuli, responses, plan, known)
+        if record is None:
+            found += questions(protocol, plan)
+            continue
+        before = stored_answers(responses, record.id)
+        found += len(before)
+        who = person(settings, plan.participant, seed)
+        state = sitting.open_session(protocol, plan, before)
+        while (step := sitting.current(state)).kind != "done":
+            if step.kind != "answer":
+                state = sitting.advanced(state)
+                continue
+            state, answer = _answer(state, who, plan.trial(step.trial), step)
+            record_answer(responses, record, answer)
+            made += 1
+            if progress:
+                progress(found + made, total)
+        record_event(responses, record, "finished")
+    return SimulationSummary(participants, made, found, known)
+
+
+def _open(
+    protocol: Protocol, stimuli: StimulusSource, responses: Responses, plan: Plan, known: Mapping[str, Any]
+) -> SessionRecord | None:
+    """A simulated participant's session, begun or taken up; None where it is finished."""
+    stored = find_session(responses, plan.participant)
+    if stored is not None and stored.simulated and stored.truth != dict(known):
+        # Half a session by one observer and half by another would have no truth.
+        raise SessionError(
+            f"Expected the observer and seed under which {plan.participant!r} was begun, found others; "
+            "use the same ones, or another results folder."
+        )
+    if stored is not None and stored.plan == plan and stored.simulated and has_event(responses, stored, "finished"):
+        return None
+    return begin_session(
+        responses,
+        protocol,
+        plan,
+        simulated=True,
+        library=stimuli.library,
+        library_synthetic=stimuli.synthetic,
+        truth=known,
+    )
+
+
+def _answer(
+    state: sitting.Session, who: Person, trial: Trial, step: sitting.Step
+) -> tuple[sitting.Session, sitting.Answer]:
+    value, response_s = respond(who, trial, step)
+    if value is None or response_s is None:
+        return sitting.missed(state)
+    return sitting.answered(state, value, response_s)
+
+
+def questions(protocol: Protocol, plan: Plan) -> int:
+    """How many answers a plan asks for."""
+    return sum(max(1, len(protocol.study(trial.study).items)) for trial in plan.trials)

@@ -1,0 +1,366 @@
+"""Responses: every answer in a database, on disk before the next trial shows.
+
+A database path or URL comes in; sessions, answers and a table for the analysis go out. Tables are typed and
+versioned; answers and events are only ever appended. SQLite runs with a write-ahead log and `synchronous=FULL`, so
+that an answer that was acknowledged survives a killed program and a power cut alike.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import sqlalchemy as sa
+
+from study.errors import SessionError
+from study.experiment.plan import Plan, Trial, plan_from_json
+from study.experiment.protocol import Protocol
+from study.experiment.response_tables import answers, events, migrate, sessions
+from study.experiment.session import Answer
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Clock = Callable[[], datetime]
+
+# The seam with the analysis: one row an answer.
+ANSWER_COLUMNS = (
+    "participant", "simulated", "study", "task", "trial", "attempt", "item", "repeat", "pair", "motion", "category",
+    "first", "second", "difference_frames", "reference_first", "method_a", "method_b", "a_first", "answer", "missed",
+    "correct", "chose_a", "response_s", "shown_well", "answered_at",
+)  # fmt: skip
+
+
+def _utc_now() -> datetime:
+    return datetime.now(UTC)
+
+
+@dataclass(frozen=True)
+class SessionRecord:
+    """A stored session: who, under which protocol, with which plan."""
+
+    id: int
+    participant: str
+    simulated: bool
+    plan: Plan
+    protocol_sha256: str
+    truth: Mapping[str, Any] | None
+
+
+class Responses:
+    """An open database of sessions and answers; made by `open_responses`, closed by `close` or `with`."""
+
+    def __init__(self, engine: sa.Engine, place: str) -> None:
+        self.engine, self.place = engine, place
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close all connections; SQLite then folds its write-ahead log into the file."""
+        self.engine.dispose()
+
+
+def open_responses(url_or_path: str | Path) -> Responses:
+    """Open a database, make its tables where there are none, and bring older tables up to date.
+
+    Parameters
+    ----------
+    url_or_path
+        A file for SQLite, a results folder (its `responses.sqlite`), or a database URL that SQLAlchemy knows.
+
+    Raises
+    ------
+    SessionError
+        For a database that can't be opened, or was written by a newer Segue.
+    """
+    text = str(url_or_path)
+    if "://" not in text:
+        path = Path(text)
+        path = path / "responses.sqlite" if path.is_dir() or not path.suffix else path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = f"sqlite:///{path}"
+    engine = sa.create_engine(text)
+    if engine.dialect.name == "sqlite":
+        sa.event.listen(engine, "connect", _set_up_sqlite)
+    place = engine.url.render_as_string(hide_password=True)
+    try:
+        migrate(engine, place)
+    except sa.exc.DatabaseError as error:
+        engine.dispose()
+        raise SessionError(
+            f"{place}: expected a database of responses, found one that can't be opened ({error.orig}); "
+            "check the path, or keep that file and name another."
+        ) from error
+    except BaseException:
+        engine.dispose()
+        raise
+    return Responses(engine, place)
+
+
+def _set_up_sqlite(connection: Any, _: object) -> None:
+    cursor = connection.cursor()
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=10000"):
+        cursor.execute(f"PRAGMA {pragma}")
+    cursor.close()
+
+
+def begin_session(
+    responses: Responses,
+    protocol: Protocol,
+    plan: Plan,
+    *,
+    simulated: bool = False,
+    library: str = "",
+    library_synthetic: bool = False,
+    truth: Mapping[str, Any] | None = None,
+    clock: Clock = _utc_now,
+) -> SessionRecord:
+    """Start a participant's session, or take up the one that there is.
+
+    Raises
+    ------
+    SessionError
+        Where the database holds another protocol's sessions (another hash), where the participant's plan, or whether
+        the participant is simulated, differs from what is stored.
+    """
+    with responses.engine.begin() as connection:
+        _refuse_other_protocol(connection, responses.place, protocol)
+        found = connection.execute(sa.select(sessions).where(sessions.c.participant == plan.participant)).one_or_none()
+        if found is not None:
+            record = _session_record(found._mapping)
+            _refuse_other_plan(record, plan, simulated)
+            connection.execute(sa.insert(events).values(session_id=record.id, kind="resumed", at=clock()))
+            return record
+        key = connection.execute(
+            sa.insert(sessions)
+            .values(
+                participant=plan.participant,
+                simulated=simulated,
+                protocol_name=protocol.name,
+                protocol_text=protocol.text,
+                protocol_sha256=protocol.sha256,
+                plan_json=plan.to_json(),
+                seed=plan.seed,
+                library=library,
+                library_synthetic=library_synthetic,
+                truth_json=None if truth is None else json.dumps(truth, sort_keys=True),
+                started_at=clock(),
+                **_versions(),
+            )
+            .returning(sessions.c.id)
+        ).scalar_one()
+        connection.execute(sa.insert(events).values(session_id=key, kind="started", at=clock()))
+    return SessionRecord(key, plan.participant, simulated, plan, protocol.sha256, truth)
+
+
+def _versions() -> dict[str, str]:
+    import numpy as np
+
+    import study
+
+    return {
+        "segue_version": study.__version__,
+        "python_version": platform.python_version(),
+        "numpy_version": np.__version__,
+    }
+
+
+def _refuse_other_protocol(connection: sa.Connection, place: str, protocol: Protocol) -> None:
+    query = sa.select(sessions.c.protocol_name, sessions.c.protocol_sha256).distinct()
+    for name, sha256 in connection.execute(query):
+        if sha256 != protocol.sha256:
+            raise SessionError(
+                f"{place}: expected sessions of {protocol.name!r} with sha256 {protocol.sha256[:12]}, found "
+                f"some of {name!r} with {sha256[:12]}. Answers under different protocols are not mixed: use another "
+                "results folder, or the protocol.toml that stands in this one."
+            )
+
+
+def _refuse_other_plan(record: SessionRecord, plan: Plan, simulated: bool) -> None:
+    if record.simulated != simulated:
+        kinds = {True: "a simulated", False: "a real"}
+        raise SessionError(
+            f"Expected {kinds[simulated]} participant {plan.participant!r}, found {kinds[record.simulated]} one "
+            "of that name; choose another name."
+        )
+    if record.plan != plan:
+        raise SessionError(
+            f"Expected the stored plan of participant {plan.participant!r} (seed {record.plan.seed}), found another "
+            f"(seed {plan.seed}); continue with the stored plan, or choose another name."
+        )
+
+
+def find_session(responses: Responses, participant: str) -> SessionRecord | None:
+    """A participant's session, or None; resuming starts from its stored plan."""
+    with responses.engine.connect() as connection:
+        found = connection.execute(sa.select(sessions).where(sessions.c.participant == participant)).one_or_none()
+    return None if found is None else _session_record(found._mapping)
+
+
+def all_sessions(responses: Responses) -> tuple[SessionRecord, ...]:
+    """Every session, in the order in which they were started."""
+    with responses.engine.connect() as connection:
+        rows = connection.execute(sa.select(sessions).order_by(sessions.c.id)).all()
+    return tuple(_session_record(row._mapping) for row in rows)
+
+
+def _session_record(row: sa.RowMapping) -> SessionRecord:
+    truth = None if row["truth_json"] is None else json.loads(row["truth_json"])
+    return SessionRecord(
+        row["id"], row["participant"], row["simulated"], plan_from_json(row["plan_json"]), row["protocol_sha256"], truth
+    )
+
+
+def session_table(responses: Responses) -> pd.DataFrame:
+    """One row a session: participant, simulated, protocol, seed, versions, library, truth, start, answers."""
+    import pandas as pd
+
+    count = sa.func.count(answers.c.id).label("answers")
+    columns = [column for column in sessions.c if column.name not in ("protocol_text", "plan_json")]
+    query = sa.select(*columns, count).outerjoin(answers, answers.c.session_id == sessions.c.id)
+    with responses.engine.connect() as connection:
+        rows = connection.execute(query.group_by(sessions.c.id).order_by(sessions.c.id)).mappings().all()
+    return pd.DataFrame([dict(row) for row in rows], columns=[*(c.name for c in columns), "answers"])
+
+
+def stored_answers(responses: Responses, session_id: int) -> tuple[Answer, ...]:
+    """A session's answers so far, for `session.open_session`."""
+    query = sa.select(answers).where(answers.c.session_id == session_id).order_by(answers.c.id)
+    with responses.engine.connect() as connection:
+        rows = connection.execute(query).mappings().all()
+    return tuple(
+        Answer(row["trial"], row["item"], row["attempt"], row["answer"], row["response_s"], row["shown_well"])
+        for row in rows
+    )
+
+
+def record_answer(responses: Responses, record: SessionRecord, answer: Answer, *, clock: Clock = _utc_now) -> bool:
+    """Commit one answer; it is on disk when this returns.
+
+    Returns
+    -------
+    bool
+        True where it is new; False where the very same answer was there already (sent twice, counted once).
+
+    Raises
+    ------
+    SessionError
+        Where another answer to the same showing of the same trial is there: answers are never overwritten.
+    """
+    values = {**_trial_values(record.plan.trial(answer.trial)), **_answer_values(record.plan, answer)}
+    try:
+        with responses.engine.begin() as connection:
+            connection.execute(sa.insert(answers).values(session_id=record.id, answered_at=clock(), **values))
+    except sa.exc.IntegrityError as error:
+        if answer in stored_answers(responses, record.id):
+            return False
+        raise SessionError(
+            f"Expected the first answer of {record.participant!r} to trial {answer.trial} (showing {answer.attempt}), "
+            f"found that one is stored already; {answer.value!r} was not. Open the session again to see what is due."
+        ) from error
+    return True
+
+
+def record_event(
+    responses: Responses, record: SessionRecord, kind: str, detail: Mapping[str, Any] | None = None, *,
+    clock: Clock = _utc_now,
+) -> None:  # fmt: skip
+    """Append what happened in a session besides answers (finished, faults, focus lost)."""
+    text = None if detail is None else json.dumps(detail, sort_keys=True)
+    with responses.engine.begin() as connection:
+        connection.execute(sa.insert(events).values(session_id=record.id, kind=kind, at=clock(), detail_json=text))
+
+
+def has_event(responses: Responses, record: SessionRecord, kind: str) -> bool:
+    """Whether something happened in a session, such as `finished`."""
+    query = sa.select(sa.func.count()).where(events.c.session_id == record.id, events.c.kind == kind)
+    with responses.engine.connect() as connection:
+        return bool(connection.execute(query).scalar_one())
+
+
+def _trial_values(trial: Trial) -> dict[str, Any]:
+    return {column.name: getattr(trial, column.name) for column in answers.c if hasattr(trial, column.name)}
+
+
+def _answer_values(plan: Plan, answer: Answer) -> dict[str, Any]:
+    """The answer's own columns, with what it means: correct (same-different), method a chosen (preference)."""
+    trial = plan.trial(answer.trial)
+    correct = chose_a = None
+    if answer.value is not None and trial.task == "same-different":
+        correct = (answer.value == "different") == (trial.difference_frames != 0)
+    if answer.value is not None and trial.task == "preference":
+        chose_a = (answer.value == "first") == trial.a_first
+    return {
+        "item": answer.item,
+        "attempt": answer.attempt,
+        "answer": answer.value,
+        "missed": answer.missed,
+        "correct": correct,
+        "chose_a": chose_a,
+        "response_s": answer.response_s,
+        "shown_well": answer.shown_well,
+    }
+
+
+def answers_frame(
+    responses: Responses, *, all_attempts: bool = False, protocol_sha256: str | None = None
+) -> pd.DataFrame:
+    """All answers as one table, one row an answer, in `ANSWER_COLUMNS`.
+
+    Parameters
+    ----------
+    all_attempts
+        With it every showing of a trial; without, the last one of each.
+    protocol_sha256
+        Which protocol's answers, where a database was merged from several.
+
+    Raises
+    ------
+    SessionError
+        Where answers under different protocols would be mixed.
+    """
+    import pandas as pd
+
+    query = sa.select(answers, sessions.c.participant, sessions.c.simulated, sessions.c.protocol_sha256).join(
+        sessions, answers.c.session_id == sessions.c.id
+    )
+    if protocol_sha256 is not None:
+        query = query.where(sessions.c.protocol_sha256 == protocol_sha256)
+    with responses.engine.connect() as connection:
+        rows = connection.execute(query.order_by(answers.c.session_id, answers.c.id)).mappings().all()
+    hashes = sorted({row["protocol_sha256"] for row in rows})
+    if len(hashes) > 1:
+        raise SessionError(
+            f"{responses.place}: expected answers under one protocol, found {len(hashes)}: "
+            f"{', '.join(sha256[:12] for sha256 in hashes)}. Say which one by its sha256."
+        )
+    table = pd.DataFrame([dict(row) for row in rows], columns=[*ANSWER_COLUMNS, "session_id"])
+    if not all_attempts:
+        table = table.drop_duplicates(["session_id", "trial", "item"], keep="last")
+    table["answered_at"] = [at.isoformat() for at in table["answered_at"]]
+    # Answers without a meaning (missed, another task) stay empty rather than false.
+    for column in ("reference_first", "a_first", "correct", "chose_a"):
+        table[column] = table[column].astype("boolean")
+    for column in ("simulated", "missed", "shown_well"):
+        table[column] = table[column].astype(bool)
+    table["difference_frames"] = table["difference_frames"].astype("Int64")
+    table["response_s"] = table["response_s"].astype(float)
+    return table[list(ANSWER_COLUMNS)].reset_index(drop=True)
+
+
+def export_csv(responses: Responses, path: str | Path) -> Path:
+    """Write all answers, every showing, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
+    path = Path(path)
+    whole = path.with_name(path.name + ".part")
+    answers_frame(responses, all_attempts=True).to_csv(whole, index=False)
+    whole.replace(path)
+    return path
