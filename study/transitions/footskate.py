@@ -1,0 +1,246 @@
+"""Foot contacts, and feet that stay where they are planted.
+
+In: a clip, as a rule a blended one, since blending makes planted feet slide. Out: the clip with its support legs
+corrected by inverse kinematics, as Wang & Bodenheimer 2004 (section 3) correct theirs, and the slide before and
+after. The method is in the manner of Kovar et al. 2002, "Footskate cleanup for motion capture editing": find when a
+foot is planted, hold it in one place for as long, and ease the correction in and out over the frames around.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import MotionError, TransitionError
+from study.motion import quaternions as quat
+from study.motion.clip import Clip, joint_positions
+from study.transitions.blending import Transition
+from study.transitions.legs import reach
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+SIDES = ("L", "R")
+
+# Captured walks and runs at 30 fps: a planted toe goes at 0.02-0.3 m/s within 3 cm of its lowest, a swinging one at
+# 1-6 m/s. A contact begins below the first of each pair and lasts while both stay below the second.
+PLANTED_SPEED, HELD_SPEED = 0.3, 0.6
+PLANTED_HEIGHT, HELD_HEIGHT = 0.03, 0.05
+SHORTEST_CONTACT_S = 0.08
+RELEASE_S = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class FootslideResult:
+    """A clip without foot slide, and how much there was.
+
+    Parameters
+    ----------
+    clip
+        The corrected clip.
+    slide_before_m, slide_after_m
+        How far both feet together travel on the floor while planted, within the region, metres.
+    contact_s
+        How long they are planted there, both feet added, seconds.
+    contacts : (frames, 2)
+        Where the left and the right foot are planted.
+    largest_change
+        The largest turn of any joint that the correction made, radians.
+    """
+
+    clip: Clip
+    slide_before_m: float
+    slide_after_m: float
+    contact_s: float
+    contacts: BoolArray
+    largest_change: float
+
+    @property
+    def slide_before_m_per_s(self) -> float:
+        """Mean slide speed of a planted foot before the correction."""
+        return self.slide_before_m / self.contact_s if self.contact_s else 0.0
+
+    @property
+    def slide_after_m_per_s(self) -> float:
+        """Mean slide speed of a planted foot after the correction."""
+        return self.slide_after_m / self.contact_s if self.contact_s else 0.0
+
+
+def planted_points(clip: Clip) -> FloatArray:
+    """The point of each foot to plant, `(frames, 2, 3)`, left then right: the toe, or the ankle where none is."""
+    positions = joint_positions(clip)
+    roles = clip.skeleton.roles
+    return positions[:, [roles.get(f"toe.{side}", clip.skeleton.role(f"ankle.{side}")) for side in SIDES]]
+
+
+def find_contacts(clip: Clip) -> BoolArray:
+    """When each foot is planted, `(frames, 2)`, by height and speed with hysteresis.
+
+    A contact starts where the point is low and slow, and reaches, both ways, as far as it is fairly low and
+    fairly slow; shorter ones than 0.08 s are dropped. Height counts from the point's own lowest (its 5% quantile).
+    """
+    points = planted_points(clip)
+    height = points[..., 1] - np.quantile(points[..., 1], 0.05, axis=0)
+    velocity = np.gradient(points, axis=0) * clip.fps if clip.frames > 1 else np.zeros_like(points)
+    speed = np.linalg.norm(velocity, axis=-1)
+    sure = (height < PLANTED_HEIGHT) & (speed < PLANTED_SPEED)
+    held = (height < HELD_HEIGHT) & (speed < HELD_SPEED)
+    contacts = np.zeros((clip.frames, 2), dtype=bool)
+    for foot in range(2):
+        for start, stop in _runs(held[:, foot]):
+            if sure[start:stop, foot].any() and stop - start >= max(2, SHORTEST_CONTACT_S * clip.fps):
+                contacts[start:stop, foot] = True
+    return contacts
+
+
+def transition_contacts(transition: Transition, source: Clip, destination: Clip) -> BoolArray:
+    """When each foot of a transition is planted, `(frames, 2)`, with what the two clips know.
+
+    A sliding foot may be too fast to be found in the blend itself. So a foot counts as planted there if it is found
+    planted, or planted in both clips at once, or planted in the clip that has the larger share while the blended foot
+    is still low. Outside the blend the clips' own contacts hold.
+    """
+    first, last = transition.blend_start, transition.blend_stop
+    frames = transition.clip.frames
+    from_source, from_destination = np.zeros((2, frames, 2), dtype=bool)
+    before = find_contacts(source)[: transition.source_frames[1]]
+    after = find_contacts(destination)[transition.destination_frames[0] :]
+    from_source[: len(before)] = before
+    from_destination[frames - len(after) :] = after
+    half = (first + last) // 2
+    larger = np.where(np.arange(frames)[:, None] < half, from_source, from_destination)
+    height = planted_points(transition.clip)[..., 1]
+    low = height - np.quantile(height, 0.05, axis=0) < HELD_HEIGHT
+    blended = find_contacts(transition.clip) | (from_source & from_destination) | (larger & low)
+    inside = (np.arange(frames) >= first) & (np.arange(frames) < last)
+    return np.where(inside[:, None], blended, larger)
+
+
+def plant_feet(transition: Transition, source: Clip, destination: Clip) -> tuple[Transition, FootslideResult]:
+    """A transition whose feet stand still in its blend while they are planted, and what that took.
+
+    `remove_foot_slide` with `transition_contacts` over the blended frames; frames before the blend are unchanged, and
+    so are those after it but for a foot that stays planted from before the blend until it lifts, and the easing out.
+    """
+    if transition.blend_frames == 0:
+        raise TransitionError("Expected a blended transition to plant the feet in; a cut has no blended frames.")
+    contacts = transition_contacts(transition, source, destination)
+    result = remove_foot_slide(transition.clip, contacts, (transition.blend_start, transition.blend_stop))
+    return replace(transition, clip=result.clip, note=f"{transition.note}; {result.clip.history[-1]}"), result
+
+
+def foot_slide(clip: Clip, contacts: BoolArray, region: tuple[int, int] | None = None) -> tuple[float, float]:
+    """How far planted feet travel on the floor, metres, and for how long they are planted, seconds.
+
+    Steps between two planted frames within the region (all frames by default) count, both feet added.
+    """
+    start, stop = region or (0, clip.frames)
+    floor = planted_points(clip)[start:stop][..., [0, 2]]
+    steps = np.linalg.norm(np.diff(floor, axis=0), axis=-1)
+    both = contacts[start : stop - 1] & contacts[start + 1 : stop]
+    return float(np.sum(steps[both])), float(np.count_nonzero(both)) / clip.fps
+
+
+def remove_foot_slide(
+    clip: Clip, contacts: BoolArray | None = None, region: tuple[int, int] | None = None
+) -> FootslideResult:
+    """Hold planted feet in place by two-bone inverse kinematics of the support legs.
+
+    Parameters
+    ----------
+    clip
+        A clip on a rig with hips, knees and ankles; toes where there are any.
+    contacts : (frames, 2)
+        When the left and the right foot are planted; `find_contacts` by default.
+    region
+        Frames `(start, stop)` within which feet are held, as a slice counts them; all by default. For a transition,
+        its blend: a foot that was planted before the blend stays where it stood, one that stays planted after it
+        comes to stand where it will, and one that is planted throughout stays where it stood until it lifts.
+
+    Returns
+    -------
+    FootslideResult
+
+    Notes
+    -----
+    A planted point is held on the floor, not in height, and the foot keeps its rotation in the world. Corrections
+    ease in and out over 0.2 s beside a contact, so the lock releases without a pop. A leg is never stretched beyond
+    its length nor beyond where it was already; where the place is out of reach, the pelvis comes down, at most 3 cm.
+    """
+    contacts = find_contacts(clip) if contacts is None else np.asarray(contacts, dtype=bool)
+    if contacts.shape != (clip.frames, 2):
+        raise MotionError(f"Expected foot contacts of shape {(clip.frames, 2)}, got {contacts.shape}.")
+    start, stop = region or (0, clip.frames)
+    if not 0 <= start < stop <= clip.frames:
+        raise MotionError(f"Expected a region within frames 0 to {clip.frames}, got {start} to {stop}.")
+    points = planted_points(clip)
+    shifts = np.stack([_shifts(points[:, foot], contacts[:, foot], start, stop, clip.fps) for foot in range(2)], axis=1)
+    corrected = reach(clip, shifts) if shifts.any() else clip
+    # A margin of one frame, so that the steps into and out of the region count.
+    margin = (max(0, start - 1), min(clip.frames, stop + 1))
+    before, seconds = foot_slide(clip, contacts, margin)
+    after, _ = foot_slide(corrected, contacts, margin)
+    change = float(np.max(2.0 * quat.half_angle_between(clip.rotations, corrected.rotations)))
+    corrected = replace(
+        corrected,
+        history=(*clip.history, f"foot slide reduced from {100 * before:.1f} to {100 * after:.1f} cm"),
+    )
+    return FootslideResult(corrected, before, after, seconds, contacts, change)
+
+
+def _runs(flags: BoolArray) -> list[tuple[int, int]]:
+    """Stretches of true, as slices count them."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Hold:
+    """Frames `first .. last - 1` in which a foot is held, and by how much it is moved in each, `(last - first, 3)`."""
+
+    first: int
+    last: int
+    shift: FloatArray
+    ease_in: bool
+    ease_out: bool
+
+
+def _hold(point: FloatArray, first: int, last: int, start: int, stop: int) -> _Hold:
+    """How a contact is held: where the frames outside the region have the foot, or else at the contact's mean."""
+    ease_in = ease_out = True
+    if first < start:
+        place, first, ease_in = point[start - 1], start, False
+    elif last > stop:
+        place, last, ease_out = point[stop], stop, False
+    else:
+        place = np.mean(point[first:last], axis=0)
+    return _Hold(first, last, (place - point[first:last]) * np.array([1.0, 0.0, 1.0]), ease_in, ease_out)
+
+
+def _shifts(point: FloatArray, contacts: BoolArray, start: int, stop: int, fps: float) -> FloatArray:
+    """How far to move one foot in each frame, `(frames, 3)`, metres: to its place while planted, eased around."""
+    holds = [_hold(point, a, b, start, stop) for a, b in _runs(contacts) if b > start and a < stop]
+    shifts = np.zeros_like(point)
+    release = max(1, round(RELEASE_S * fps))
+    for k, hold in enumerate(holds):
+        shifts[hold.first : hold.last] = hold.shift
+        # A contact that is nearer than the release takes over that much sooner.
+        room_before = min(release, hold.first - holds[k - 1].last) if k else release
+        room_after = min(release, holds[k + 1].first - hold.last) if k + 1 < len(holds) else release
+        if hold.ease_in:
+            ramp = hold.shift[0] * _ease_out(room_before)[::-1, None]
+            frames = np.arange(hold.first - room_before, hold.first)
+            shifts[frames[frames >= 0]] += ramp[frames >= 0]
+        if hold.ease_out:
+            frames = np.arange(hold.last, hold.last + room_after)
+            ramp = hold.shift[-1] * _ease_out(room_after)[:, None]
+            shifts[frames[frames < len(point)]] += ramp[frames < len(point)]
+    return shifts
+
+
+def _ease_out(count: int) -> FloatArray:
+    """Shares `(count,)` that fall smoothly from 1 (the frame before them) to 0 (the frame after them)."""
+    x = 1.0 - np.arange(1, count + 1) / (count + 1.0)
+    return x * x * (3.0 - 2.0 * x)
