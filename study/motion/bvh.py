@@ -345,17 +345,16 @@ def _assemble(
 
 def _rotations(joints: list[_Joint], values: FloatArray) -> FloatArray:
     """Local rotations `(frames, joints, 4)`; joints with the same order of axes are turned at once."""
-    rotations = np.empty((len(values), len(joints), 4))
+    by_channel = np.ascontiguousarray(values.T)
+    rotations = np.empty((4, len(joints), len(values)))
     groups: dict[str, list[int]] = {}
     for j, joint in enumerate(joints):
         groups.setdefault("".join(axis for _, axis in joint.columns("rotation")), []).append(j)
     for order, members in groups.items():
-        if not order:
-            rotations[:, members] = quat.IDENTITY
-            continue
-        columns = np.array([[c for c, _ in joints[j].columns("rotation")] for j in members])
-        rotations[:, members] = quat.from_euler(order, np.radians(values[:, columns]))
-    return rotations
+        columns = np.array([[c for c, _ in joints[j].columns("rotation")] for j in members], dtype=np.int64)
+        angles = np.radians(by_channel[columns.T])
+        rotations[:, members] = quat.from_euler_parts(order, angles) if order else quat.IDENTITY[:, None, None]
+    return rotations.transpose(2, 1, 0)
 
 
 def _path(joint: _Joint, values: FloatArray) -> FloatArray:

@@ -60,7 +60,7 @@ class Clip:
 
     def __post_init__(self) -> None:
         positions = np.array(self.root_positions, dtype=np.float64)
-        rotations = np.array(self.rotations, dtype=np.float64)
+        rotations = np.asarray(self.rotations, dtype=np.float64)
         who = f"clip {self.name!r}" if self.name else "the clip"
         if positions.ndim != 2 or positions.shape[1] != 3 or len(positions) == 0:
             raise MotionError(
@@ -72,14 +72,16 @@ class Clip:
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"Expected a frame rate above 0 in {who}, got {self.fps}.")
         for label, array in (("root positions", positions), ("rotations", rotations)):
-            if not np.isfinite(array).all():
+            # A sum is finite where all of its terms are (they are small), and quicker than looking at each.
+            if not np.isfinite(array.sum()) and not np.isfinite(array).all():
                 frame = int(np.argwhere(~np.isfinite(array))[0][0])
                 raise MotionError(
                     f"Expected finite {label} in {who}, found {array[frame].ravel()[:4]} in frame {frame}."
                 )
-        if np.max(np.abs(np.sum(rotations * rotations, axis=-1) - 1.0)) > 2 * _UNIT_TOLERANCE:
+        rotations = _by_part(rotations)
+        if np.max(np.abs(np.einsum("kjf,kjf->jf", rotations, rotations) - 1.0)) > 2 * _UNIT_TOLERANCE:
             raise MotionError(f"Expected unit quaternions in {who}; normalise them first.")
-        rotations = quat.continuous(np.concatenate([quat.positive(rotations[:1]), rotations[1:]]))
+        rotations = _with_continuous_signs(rotations).transpose(2, 1, 0)
         for array in (positions, rotations):
             array.setflags(write=False)
         object.__setattr__(self, "root_positions", positions)
@@ -101,12 +103,34 @@ class Clip:
         return replace(self, history=(*self.history, what))
 
 
+def _by_part(rotations: FloatArray) -> FloatArray:
+    """A new array `(4, joints, frames)`: whole rows of one part of one joint, which products run through quickly.
+
+    A clip stores its rotations so, and shows them as `(frames, joints, 4)`.
+    """
+    return np.array(rotations.transpose(2, 1, 0), order="C")
+
+
+def _with_continuous_signs(rotations: FloatArray) -> FloatArray:
+    """`(4, joints, frames)` with `w >= 0` in the first frame and each sign nearest to the frame before; in place."""
+    turns = np.einsum("kjf,kjf->jf", rotations[..., 1:], rotations[..., :-1]) < 0.0
+    negative = rotations[0, :, :1] < 0.0
+    if turns.any() or negative.any():
+        flips = np.logical_xor.accumulate(np.concatenate([negative, turns], axis=1), axis=1)
+        np.negative(rotations, out=rotations, where=np.broadcast_to(flips, rotations.shape))
+    return rotations
+
+
 def global_rotations(clip: Clip) -> FloatArray:
     """Each joint's rotation in the world, `(frames, joints, 4)`."""
-    world = np.empty_like(clip.rotations)
-    world[:, 0] = clip.rotations[:, 0]
-    for joint in range(1, clip.skeleton.joints):
-        world[:, joint] = quat.multiply(world[:, clip.skeleton.parents[joint]], clip.rotations[:, joint])
+    return np.ascontiguousarray(_global_parts(clip).transpose(2, 1, 0))
+
+
+def _global_parts(clip: Clip) -> FloatArray:
+    """Each joint's rotation in the world, `(4, joints, frames)`, one level of the tree after the other."""
+    world: FloatArray = clip.rotations.transpose(2, 1, 0).copy(order="C")
+    for joints, parents in clip.skeleton.levels:
+        world[:, joints] = quat.multiply_parts(world[:, parents], world[:, joints])
     return world
 
 
@@ -116,17 +140,17 @@ def joint_positions(clip: Clip, *, ends: bool = False) -> FloatArray:
     With `ends`, the end sites follow the joints: `(frames, joints + ends, 3)`, as `Skeleton.bones` counts them.
     """
     skeleton = clip.skeleton
-    world = global_rotations(clip)
+    world = _global_parts(clip)
     count = skeleton.joints + (len(skeleton.end_parents) if ends else 0)
-    positions = np.empty((clip.frames, count, 3))
-    positions[:, 0] = clip.root_positions
-    for joint in range(1, skeleton.joints):
-        parent = skeleton.parents[joint]
-        positions[:, joint] = positions[:, parent] + quat.rotate(world[:, parent], skeleton.offsets[joint])
+    positions = np.empty((3, count, clip.frames))
+    positions[:, 0] = clip.root_positions.T
+    for joints, parents in skeleton.levels:
+        arms = quat.rotate_parts(world[:, parents], skeleton.offsets[joints].T[..., None])
+        positions[:, joints] = positions[:, parents] + arms
     if ends:
-        arms = quat.rotate(world[:, skeleton.end_parents], skeleton.end_offsets)
+        arms = quat.rotate_parts(world[:, skeleton.end_parents], skeleton.end_offsets.T[..., None])
         positions[:, skeleton.joints :] = positions[:, skeleton.end_parents] + arms
-    return positions
+    return np.ascontiguousarray(positions.transpose(2, 1, 0))
 
 
 def resample(clip: Clip, fps: float) -> Clip:

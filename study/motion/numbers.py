@@ -106,10 +106,10 @@ def parse_words(data: ByteArray, starts: IntArray, stops: IntArray) -> FloatArra
         if len(odd):
             values[odd] = _with_exponent(data, eights, begins[odd], stops[odd], digits)
     np.negative(values, out=values, where=negative)
-    for odd in np.flatnonzero(np.isnan(values)):
-        word = data[starts[odd] : stops[odd]].tobytes()
+    for k in np.flatnonzero(np.isnan(values)):
+        word = data[starts[k] : stops[k]].tobytes()
         if NUMBER.fullmatch(word) and np.isfinite(value := float(word)):
-            values[odd] = value
+            values[k] = value
     return values
 
 

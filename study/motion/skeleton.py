@@ -92,6 +92,15 @@ class Skeleton:
         return len(self.names)
 
     @cached_property
+    def levels(self) -> tuple[tuple[IntArray, IntArray], ...]:
+        """Joints by depth below the root, each level with its joints' parents: what can be computed at once."""
+        depths = np.zeros(self.joints, dtype=np.int64)
+        for joint in range(1, self.joints):
+            depths[joint] = depths[self.parents[joint]] + 1
+        levels = [np.flatnonzero(depths == depth) for depth in range(1, int(depths.max()) + 1)]
+        return tuple((joints, self.parents[joints]) for joints in levels)
+
+    @cached_property
     def roles(self) -> Mapping[str, int]:
         """Joint index by role, for the roles that this rig has; see `find_roles`."""
         return MappingProxyType(find_roles(self.names, self.parents))
