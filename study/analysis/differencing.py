@@ -1,0 +1,306 @@
+"""The differencing model of a same-different task: counts of "different" in, sensitivity, criterion and thresholds out.
+
+A participant sees two transitions, takes the difference of two noisy impressions, and answers "different" where it
+exceeds a criterion (Noreen 1981; Macmillan & Creelman 2005, chapter 9). With impressions of unit variance, `delta` of
+them between the two means and the criterion `tau`,
+
+    q(delta) = Phi((delta - tau) / sqrt 2) + Phi((-delta - tau) / sqrt 2)
+    P("different") = lapse / 2 + (1 - lapse) q(delta),
+
+where lapses are answers given by tossing a coin. `delta` is `slope x frames`, with one slope a side (shorter, longer)
+and one criterion, which the pairs with no difference pin down. The threshold that 2004 section 5.1 reads off the raw
+percentages follows from the curve, and so does one that does not depend on the criterion.
+
+Fits are maximum likelihood by damped Fisher scoring, many data sets at once: bootstrap samples, left-out participants.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+Kind = Literal["different_75", "guess_corrected_75", "criterion_free_75"]
+KINDS: tuple[Kind, ...] = ("different_75", "guess_corrected_75", "criterion_free_75")
+
+ROOT_TWO = float(np.sqrt(2.0))
+LARGEST_LAPSE = 0.1
+SMALLEST_PROBABILITY = 1e-9
+WIDEST_DELTA = 60.0
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Maximum-likelihood fits of many data sets, first axis `fits`.
+
+    Attributes
+    ----------
+    criterion : ndarray, shape (fits,)
+        Size of the felt difference above which the answer is "different", in standard deviations of one impression.
+    lapse : ndarray, shape (fits,)
+        Share of answers given blindly, half of them "different".
+    slopes : ndarray, shape (fits, slopes)
+        d-prime a frame.
+    log_likelihood : ndarray, shape (fits,)
+        Without the binomial coefficients.
+    held : ndarray of bool, shape (fits, 2 + slopes)
+        True where a parameter (criterion, lapse, slopes) stands at the bound of its range.
+    settled : ndarray of bool, shape (fits,)
+        Whether the search came to rest.
+    """
+
+    criterion: FloatArray
+    lapse: FloatArray
+    slopes: FloatArray
+    log_likelihood: FloatArray
+    held: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
+
+
+def detected(delta: FloatArray, criterion: FloatArray) -> FloatArray:
+    """Return q(delta): the probability of "different" of an observer who never lapses."""
+    from scipy.special import ndtr
+
+    share: FloatArray = ndtr((delta - criterion) / ROOT_TWO) + ndtr((-delta - criterion) / ROOT_TWO)
+    return share
+
+
+def probability_different(
+    frames: FloatArray, criterion: FloatArray, lapse: FloatArray, slopes: FloatArray
+) -> FloatArray:
+    """Return P("different"), shape (fits, levels).
+
+    Parameters
+    ----------
+    frames : ndarray, shape (levels, slopes)
+        Size of the difference in the column of the slope that it belongs to, 0 in the other columns.
+    criterion, lapse : ndarray, shape (fits,)
+    slopes : ndarray, shape (fits, slopes)
+    """
+    share = detected(slopes @ frames.T, criterion[:, None])
+    return lapse[:, None] / 2 + (1 - lapse[:, None]) * share
+
+
+def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, largest_lapse: float = LARGEST_LAPSE) -> Fits:
+    """Fit many data sets by maximum likelihood.
+
+    Parameters
+    ----------
+    frames : ndarray, shape (levels, slopes)
+        As in `probability_different`, at least 0.
+    different, shown : ndarray, shape (fits, levels)
+        Counts of answers "different", and of all answers.
+    largest_lapse
+        The lapse rate is sought from 0 to here; 0 leaves it out.
+
+    Notes
+    -----
+    Criterion and slopes are searched as logarithms within wide bounds, so that "can't tell at all" and "never wrong"
+    end at a bound, which `Fits.held` tells, and are no failure.
+    """
+    low, high = _bounds(frames, largest_lapse)
+    point = np.clip(_start(frames, different, shown), low, high)
+    value = _log_likelihood(point, frames, different, shown)
+    damping = np.full(len(point), 1e-3)
+    settled = np.zeros(len(point), dtype=bool)
+    for _ in range(200):
+        now = np.flatnonzero(~settled)
+        if not len(now):
+            break
+        step = _step(point[now], damping[now], low, high, frames, different[now], shown[now])
+        proposal = np.clip(point[now] + step, low, high)
+        moved = np.abs(proposal - point[now]).max(axis=1)
+        proposed = _log_likelihood(proposal, frames, different[now], shown[now])
+        gain = proposed - value[now]
+        better = gain >= 0
+        point[now[better]], value[now[better]] = proposal[better], proposed[better]
+        damping[now] = np.where(better, damping[now] / 10, damping[now] * 10)
+        settled[now] = (moved < 1e-8) | (better & (gain < 1e-10) & (moved < 1e-4)) | (damping[now] > 1e12)
+        damping = np.maximum(damping, 1e-9)
+    held = (point <= low + 1e-9) | (point >= high - 1e-9)
+    return Fits(np.exp(point[:, 0]), point[:, 1].copy(), np.exp(point[:, 2:]), value, held, settled)
+
+
+def _bounds(frames: FloatArray, largest_lapse: float) -> tuple[FloatArray, FloatArray]:
+    """Bounds of log criterion, lapse and log slopes: d-prime at the largest difference from 0.02 to 40."""
+    largest = np.maximum(frames.max(axis=0), 1e-9)
+    low = np.concatenate([[np.log(1e-3), 0.0], np.log(0.02 / largest)])
+    high = np.concatenate([[np.log(9.0), largest_lapse], np.log(40.0 / largest)])
+    return low, high
+
+
+def _start(frames: FloatArray, different: FloatArray, shown: FloatArray) -> FloatArray:
+    """First guesses: the criterion from the pairs with no difference, slopes from percentages turned into d-prime."""
+    from scipy.special import ndtri
+
+    share = (different + 0.5) / (shown + 1)
+    nothing = frames.sum(axis=1) == 0
+    alarms = (different[:, nothing].sum(axis=1) + 0.5) / (shown[:, nothing].sum(axis=1) + 1)
+    criterion = np.maximum(-ROOT_TWO * ndtri(alarms / 2), 0.1)
+    delta = np.maximum(criterion[:, None] + ROOT_TWO * ndtri(share), 0.05)
+    weighted = shown[:, :, None] * frames[None]
+    slopes = (weighted * delta[:, :, None]).sum(axis=1) / np.maximum((weighted * frames[None]).sum(axis=1), 1e-9)
+    return np.column_stack([np.log(criterion), np.full(len(share), 0.02), np.log(np.maximum(slopes, 1e-9))])
+
+
+def _probability_at(point: FloatArray, frames: FloatArray) -> FloatArray:
+    share = probability_different(frames, np.exp(point[:, 0]), point[:, 1], np.exp(point[:, 2:]))
+    return np.clip(share, SMALLEST_PROBABILITY, 1 - SMALLEST_PROBABILITY)
+
+
+def _log_likelihood(point: FloatArray, frames: FloatArray, different: FloatArray, shown: FloatArray) -> FloatArray:
+    share = _probability_at(point, frames)
+    total: FloatArray = (different * np.log(share) + (shown - different) * np.log1p(-share)).sum(axis=1)
+    return total
+
+
+def _slopes_of_probability(point: FloatArray, frames: FloatArray) -> FloatArray:
+    """Derivatives of P("different") by log criterion, lapse and log slopes, shape (fits, levels, 2 + slopes)."""
+    criterion, lapse, slopes = np.exp(point[:, :1]), point[:, 1:2], np.exp(point[:, 2:])
+    delta = slopes @ frames.T
+    above, below = _density((delta - criterion) / ROOT_TWO), _density((delta + criterion) / ROOT_TWO)
+    by_criterion = -(1 - lapse) * (above + below) / ROOT_TWO * criterion
+    by_lapse = 0.5 - detected(delta, criterion)
+    by_delta = (1 - lapse) * (above - below) / ROOT_TWO
+    by_slopes = by_delta[:, :, None] * frames[None] * slopes[:, None, :]
+    return np.concatenate([by_criterion[:, :, None], by_lapse[:, :, None], by_slopes], axis=2)
+
+
+def _density(value: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * value * value) / np.sqrt(2 * np.pi), dtype=np.float64)
+
+
+def _scores(
+    point: FloatArray, frames: FloatArray, different: FloatArray, shown: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gradient of the log likelihood and expected information, shapes (fits, p) and (fits, p, p)."""
+    share = _probability_at(point, frames)
+    variance = share * (1 - share)
+    slopes = _slopes_of_probability(point, frames)
+    gradient = np.einsum("bl,blp->bp", (different - shown * share) / variance, slopes)
+    information = np.einsum("bl,blp,blq->bpq", shown / variance, slopes, slopes)
+    return gradient, information
+
+
+def _step(
+    point: FloatArray,
+    damping: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    frames: FloatArray,
+    different: FloatArray,
+    shown: FloatArray,
+) -> FloatArray:
+    """One damped scoring step; parameters that would leave their range from its bound are held."""
+    gradient, information = _scores(point, frames, different, shown)
+    held = ((point <= low) & (gradient < 0)) | ((point >= high) & (gradient > 0))
+    free = (~held).astype(np.float64)
+    information = information * free[:, :, None] * free[:, None, :]
+    diagonal = np.einsum("bpp->bp", information)
+    size = point.shape[1]
+    information = information + np.eye(size) * (damping[:, None] * (diagonal + 1e-6) + (1 - free) + 1e-12)[:, None, :]
+    step = np.linalg.solve(information, (gradient * free)[:, :, None])[:, :, 0]
+    return np.asarray(np.clip(step, -1.0, 1.0), dtype=np.float64)
+
+
+# Thresholds
+
+
+@cache
+def criterion_free_delta(correct: float = 0.75) -> float:
+    """Return the d-prime at which an observer with the best criterion is right in this share of the pairs.
+
+    Half of the pairs have no difference, half have this one (Macmillan & Creelman 2005, p. 222: the greatest share of
+    correct answers under the differencing rule). Sensitivity alone decides it: no observer's own criterion enters.
+    """
+    from scipy.optimize import brentq
+
+    criteria = np.linspace(0.0, 8.0, 4001)
+
+    def best(delta: float) -> float:
+        gained = detected(np.full(1, delta), criteria) - detected(np.zeros(1), criteria)
+        return float(0.5 + 0.5 * gained.max())
+
+    return float(brentq(lambda delta: best(delta) - correct, 0.1, 10.0, xtol=1e-10))
+
+
+def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind) -> FloatArray:
+    """Return the d-prime at threshold, shape (fits,).
+
+    `different_75`: 75% of the answers are "different". `guess_corrected_75`: 75% after Abbott's correction,
+    (p - f) / (1 - f), for the share f of "different" at no difference. `criterion_free_75`: `criterion_free_delta`.
+    0 where the pairs with no difference are above it already, infinite where the lapses keep the curve below it.
+    """
+    if kind == "criterion_free_75":
+        return np.full(len(criterion), criterion_free_delta())
+    alarms = lapse / 2 + (1 - lapse) * detected(np.zeros(1), criterion)
+    target = np.full(len(criterion), 0.75) if kind == "different_75" else alarms + 0.75 * (1 - alarms)
+    low, high = np.zeros(len(criterion)), np.full(len(criterion), WIDEST_DELTA)
+    for _ in range(60):
+        middle = (low + high) / 2
+        below = lapse / 2 + (1 - lapse) * detected(middle, criterion) < target
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    found = np.where(alarms >= target, 0.0, (low + high) / 2)
+    return np.asarray(np.where(target >= 1 - lapse / 2, np.inf, found), dtype=np.float64)
+
+
+def threshold_frames(fits: Fits, kind: Kind = "different_75") -> FloatArray:
+    """Return the threshold of every slope in frames, shape (fits, slopes); infinite where it is never reached."""
+    delta = threshold_delta(fits.criterion, fits.lapse, kind)[:, None]
+    return np.asarray(np.where(np.isfinite(delta), delta / fits.slopes, np.inf), dtype=np.float64)
+
+
+# Covariance
+
+
+def covariance(
+    fits: Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, *, by_participant: bool
+) -> FloatArray:
+    """Return the covariance of log criterion, lapse and log slopes of one fit, shape (p, p).
+
+    Parameters
+    ----------
+    fits
+        One fit (the first is used).
+    frames : ndarray, shape (levels, slopes)
+    different, shown : ndarray, shape (participants, levels)
+        Counts a participant.
+    by_participant
+        False: the answers are taken as independent (inverse expected information). True: the participants are
+        (the sandwich of Huber 1967 with the small-sample factor n / (n - 1)).
+
+    Notes
+    -----
+    A parameter at its bound has neither variance nor covariance: what is given holds with that parameter fixed.
+    """
+    point = np.concatenate([np.log(fits.criterion[:1]), fits.lapse[:1], np.log(fits.slopes[0])])[None]
+    free = np.flatnonzero(~fits.held[0])
+    _, information = _scores(point, frames, different.sum(axis=0)[None], shown.sum(axis=0)[None])
+    result = np.zeros(information.shape[1:])
+    inverse = np.linalg.pinv(information[0][np.ix_(free, free)])
+    if by_participant:
+        count = len(different)
+        everyone = np.repeat(point, count, axis=0)
+        gradient = _scores(everyone, frames, different, shown)[0][:, free]
+        gradient = gradient - gradient.mean(axis=0)
+        inverse = inverse @ (gradient.T @ gradient) @ inverse * count / max(count - 1, 1)
+    result[np.ix_(free, free)] = inverse
+    return result
+
+
+def log_threshold_gradient(fits: Fits, kind: Kind) -> FloatArray:
+    """Return derivatives of the log threshold by log criterion, lapse and log slopes, shape (slopes, 2 + slopes)."""
+    step = 1e-5
+    criterion = fits.criterion[0] * np.exp(np.array([step, -step, 0, 0]))
+    lapse = fits.lapse[0] + np.array([0, 0, step, -step])
+    log_delta = np.log(threshold_delta(criterion, lapse, kind))
+    slopes = fits.slopes.shape[1]
+    gradient = np.zeros((slopes, 2 + slopes))
+    gradient[:, 0] = (log_delta[0] - log_delta[1]) / (2 * step)
+    gradient[:, 1] = (log_delta[2] - log_delta[3]) / (2 * step)
+    gradient[:, 2:] = -np.eye(slopes)
+    return gradient

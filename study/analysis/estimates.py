@@ -1,0 +1,277 @@
+"""What every analysis shares: intervals for proportions, tests of participants, clustering, and plain JSON.
+
+Arrays of counts come in, estimates with their uncertainty go out. Answers of one participant are not independent of
+each other, so whatever pools answers also says how alike the answers of a participant were (intraclass correlation)
+and how much that costs (design effect).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A confidence interval; an end that the data leave open is None."""
+
+    low: float | None
+    high: float | None
+    confidence: float = 0.95
+
+
+@dataclass(frozen=True)
+class MeanTest:
+    """The mean over participants against an expected value.
+
+    Attributes
+    ----------
+    participants
+        How many participants the mean rests on.
+    mean, standard_error
+        Over participants; None where there are too few.
+    interval
+        Of the mean, by Student's t.
+    statistic, degrees_of_freedom, p_value
+        Student's t; None where the participants are all alike and t can't be formed.
+    note
+        What could not be estimated, and why; empty where all could.
+    """
+
+    participants: int
+    mean: float | None
+    standard_error: float | None
+    interval: Interval
+    statistic: float | None
+    degrees_of_freedom: int | None
+    p_value: float | None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Clustering:
+    """How alike the answers of one participant are.
+
+    Attributes
+    ----------
+    intraclass_correlation
+        One-way analysis of variance estimator; below zero where participants are more alike than chance would have it.
+    answers_per_participant
+        The mean number of answers, adjusted for unequal numbers.
+    design_effect
+        1 + (answers - 1) x correlation: by how much the variance of a pooled percentage exceeds the one of as many
+        independent answers.
+    effective_answers
+        The answers divided by the design effect.
+    """
+
+    intraclass_correlation: float | None
+    answers_per_participant: float | None
+    design_effect: float | None
+    effective_answers: float | None
+
+
+def normal_quantile(confidence: float) -> float:
+    """Return z such that a standard normal lies within +-z with this probability."""
+    from scipy.special import ndtri
+
+    return float(ndtri(0.5 + confidence / 2))
+
+
+def t_quantile(confidence: float, degrees_of_freedom: float) -> float:
+    """Return t such that Student's t lies within +-t with this probability."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(degrees_of_freedom, 0.5 + confidence / 2))
+
+
+def t_probability(statistic: float, degrees_of_freedom: float) -> float:
+    """Return the two-sided p-value of Student's t."""
+    from scipy.special import stdtr
+
+    return float(2 * stdtr(degrees_of_freedom, -abs(statistic)))
+
+
+def chi_square_probability(statistic: float, degrees_of_freedom: int) -> float:
+    """Return the upper tail of the chi-square distribution."""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(degrees_of_freedom, max(statistic, 0.0)))
+
+
+def f_probability(statistic: float, numerator: float, denominator: float) -> float:
+    """Return the upper tail of the F distribution."""
+    from scipy.special import fdtrc
+
+    return float(fdtrc(numerator, denominator, max(statistic, 0.0)))
+
+
+def wilson_interval(successes: float, trials: float, confidence: float = 0.95) -> Interval:
+    """Return Wilson's score interval of a proportion (E. B. Wilson 1927), each answer taken as independent.
+
+    Open at both ends where there were no trials.
+    """
+    if trials <= 0:
+        return Interval(None, None, confidence)
+    z = normal_quantile(confidence)
+    share = successes / trials
+    centre = (share + z * z / (2 * trials)) / (1 + z * z / trials)
+    half = z / (1 + z * z / trials) * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials * trials))
+    return Interval(max(0.0, centre - half), min(1.0, centre + half), confidence)
+
+
+def binomial_probability(successes: int, trials: int, expected: float = 0.5) -> float | None:
+    """Return the exact two-sided binomial p-value; None without trials."""
+    if trials <= 0:
+        return None
+    from scipy.stats import binomtest
+
+    return float(binomtest(successes, trials, expected).pvalue)
+
+
+def mean_test(values: ArrayLike, expected: float = 0.5, confidence: float = 0.95) -> MeanTest:
+    """Test the mean of one value a participant against `expected`, by Student's t.
+
+    Parameters
+    ----------
+    values : array_like, shape (participants,)
+        One number a participant; NaN is left out.
+    expected
+        The mean where there is no effect.
+    confidence
+        Of the interval.
+
+    Notes
+    -----
+    Where all participants give the same value, the spread is not known to be zero, it was only not seen: the interval
+    stays open and no t is given.
+    """
+    data = np.asarray(values, dtype=np.float64)
+    data = data[np.isfinite(data)]
+    count = len(data)
+    if count == 0:
+        return MeanTest(0, None, None, Interval(None, None, confidence), None, None, None, "no answers")
+    mean = float(data.mean())
+    open_interval = Interval(None, None, confidence)
+    if count == 1:
+        return MeanTest(1, mean, None, open_interval, None, None, None, "one participant: no spread to judge by")
+    spread = float(data.std(ddof=1))
+    if spread <= 1e-12:
+        note = f"all {count} participants gave the same value: the spread between participants can't be estimated"
+        return MeanTest(count, mean, 0.0, open_interval, None, count - 1, None, note)
+    error = spread / math.sqrt(count)
+    half = t_quantile(confidence, count - 1) * error
+    statistic = (mean - expected) / error
+    probability = t_probability(statistic, count - 1)
+    return MeanTest(
+        count, mean, error, Interval(mean - half, mean + half, confidence), statistic, count - 1, probability
+    )
+
+
+def clustering(successes: ArrayLike, trials: ArrayLike) -> Clustering:
+    """Estimate how alike the answers of one participant are, from a one-way analysis of variance of yes-no answers.
+
+    Parameters
+    ----------
+    successes, trials : array_like, shape (participants,)
+        Counts a participant.
+
+    Notes
+    -----
+    Fleiss, Levin & Paik 2003, chapter 15.2; the answers per participant are `n0` there. The design effect is not
+    taken below what the estimate says: a value under 1 means that answers pooled are a little better than independent.
+    """
+    yes, shown = np.asarray(successes, dtype=np.float64), np.asarray(trials, dtype=np.float64)
+    yes, shown = yes[shown > 0], shown[shown > 0]
+    groups, total = len(shown), float(shown.sum())
+    if groups < 2 or total <= groups:
+        return Clustering(None, None, None, None)
+    share, pooled = yes / shown, float(yes.sum()) / total
+    between = float((shown * (share - pooled) ** 2).sum()) / (groups - 1)
+    within = float((shown * share * (1 - share)).sum()) / (total - groups)
+    size = (total - float((shown**2).sum()) / total) / (groups - 1)
+    spread = between + (size - 1) * within
+    if spread <= 1e-12:
+        return Clustering(None, size, None, None)
+    correlation = (between - within) / spread
+    effect = max(1 + (size - 1) * correlation, 0.0)
+    return Clustering(correlation, size, effect, total / effect if effect > 0 else None)
+
+
+def holm(p_values: ArrayLike) -> FloatArray:
+    """Return p-values adjusted by Holm's step-down method (1979), in the order given; NaN stays NaN."""
+    raw = np.asarray(p_values, dtype=np.float64)
+    adjusted = np.full_like(raw, np.nan)
+    known = np.flatnonzero(np.isfinite(raw))
+    order = known[np.argsort(raw[known], kind="stable")]
+    largest = 0.0
+    for rank, index in enumerate(order):
+        largest = max(largest, min(1.0, float(raw[index]) * (len(order) - rank)))
+        adjusted[index] = largest
+    return adjusted
+
+
+def resampled_weights(participants: int, resamples: int, rng: np.random.Generator) -> FloatArray:
+    """Return how often each participant is drawn in each bootstrap sample, shape (resamples, participants)."""
+    return rng.multinomial(participants, np.full(participants, 1 / participants), size=resamples).astype(np.float64)
+
+
+def bca_interval(
+    estimate: float, resampled: FloatArray, left_out: FloatArray, confidence: float = 0.95
+) -> tuple[float, float]:
+    """Return the bias-corrected accelerated bootstrap interval (Efron 1987).
+
+    Parameters
+    ----------
+    estimate
+        From all participants.
+    resampled : ndarray, shape (resamples,)
+        From the bootstrap samples; infinite where a sample never reached the threshold.
+    left_out : ndarray, shape (participants,)
+        From all participants but one; where one of these is infinite the acceleration is taken as 0.
+    """
+    from scipy.special import ndtr, ndtri
+
+    below = np.mean(resampled < estimate) + 0.5 * np.mean(resampled == estimate)
+    bias = float(ndtri(np.clip(below, 0.5 / len(resampled), 1 - 0.5 / len(resampled))))
+    acceleration = 0.0
+    if np.isfinite(left_out).all():
+        pull = left_out.mean() - left_out
+        scale = float((pull**2).sum())
+        acceleration = float((pull**3).sum()) / (6 * scale**1.5) if scale > 1e-18 else 0.0
+    ends = np.array([0.5 - confidence / 2, 0.5 + confidence / 2])
+    shifted = bias + ndtri(ends)
+    levels = np.clip(ndtr(bias + shifted / np.maximum(1 - acceleration * shifted, 1e-3)), 0.0, 1.0)
+    ordered = np.sort(resampled)
+    places = np.clip(np.round(levels * (len(ordered) - 1)).astype(int), 0, len(ordered) - 1)
+    return float(ordered[places[0]]), float(ordered[places[1]])
+
+
+def finite(value: float | np.floating[Any] | None) -> float | None:
+    """Return a plain float, or None for None, NaN and infinities (which JSON does not know)."""
+    if value is None or not math.isfinite(float(value)):
+        return None
+    return float(value)
+
+
+def plain(value: Any) -> Any:
+    """Return `value` as what JSON knows: dataclasses, arrays, mappings and sequences are unpacked, NaN becomes None."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return finite(value)
+    return value

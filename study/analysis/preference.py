@@ -1,0 +1,313 @@
+"""Which of two methods participants find more natural: answers of a preference task in, percentages and tests out.
+
+As published (2004 section 5.2, Table 2): percent favouring and chi-square with one degree of freedom over all answers.
+The answers of a participant are not independent, so the test to believe takes one number a participant; the
+intraclass correlation and the design effect say how far the two can differ.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.analysis import estimates
+from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+
+NEEDED_COLUMNS = ("participant", "chose_a", "method_a", "method_b")
+
+
+@dataclass(frozen=True)
+class Published:
+    """The pooled test of 2004 Table 2.
+
+    Attributes
+    ----------
+    favouring, answers, percent
+        How many of how many answers favoured the first method.
+    chi_square, degrees_of_freedom, p_value
+        Against an even split, every answer taken as independent.
+    exact_p_value
+        Two-sided binomial test of the same.
+    interval
+        Wilson's interval of the share (0 to 1).
+    """
+
+    favouring: int
+    answers: int
+    percent: float | None
+    chi_square: float | None
+    degrees_of_freedom: int
+    p_value: float | None
+    exact_p_value: float | None
+    interval: estimates.Interval
+
+
+def published_test(favouring: int, answers: int, confidence: float = 0.95) -> Published:
+    """Test a count against an even split, as 2004 section 5.2 does.
+
+    Parameters
+    ----------
+    favouring, answers
+        How many of how many answers favoured the first method.
+    confidence
+        Of Wilson's interval.
+
+    Raises
+    ------
+    AnalysisError
+        When the counts are impossible.
+
+    Examples
+    --------
+    >>> round(published_test(270, 280).chi_square, 1)
+    241.4
+    """
+    if not 0 <= favouring <= answers:
+        raise AnalysisError(f"expected 0 <= favouring <= answers, found {favouring} of {answers}; check the counts")
+    interval = estimates.wilson_interval(favouring, answers, confidence)
+    if answers == 0:
+        return Published(0, 0, None, None, 1, None, None, interval)
+    chi_square = (2 * favouring - answers) ** 2 / answers
+    return Published(
+        favouring=favouring,
+        answers=answers,
+        percent=100 * favouring / answers,
+        chi_square=chi_square,
+        degrees_of_freedom=1,
+        p_value=estimates.chi_square_probability(chi_square, 1),
+        exact_p_value=estimates.binomial_probability(favouring, answers),
+        interval=interval,
+    )
+
+
+def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers given in preference tasks, missed ones left out, `chose_a` as 0 or 1.
+
+    Raises
+    ------
+    AnalysisError
+        When a column is missing.
+    """
+    missing = [name for name in NEEDED_COLUMNS if name not in answers.columns]
+    if missing:
+        raise AnalysisError(
+            f"expected columns {', '.join(NEEDED_COLUMNS)} for a preference analysis, found none named "
+            f"{', '.join(missing)}; name them in the table of answers"
+        )
+    chosen = answers[answers["task"] == "preference"] if "task" in answers.columns else answers
+    given = chosen[chosen["chose_a"].notna()].copy()
+    given["chose_a"] = given["chose_a"].astype(bool).astype(float)
+    return given
+
+
+def compare(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[str, Any]]:
+    """Analyse every pair of methods that was compared.
+
+    Returns
+    -------
+    list of dict
+        One entry a pair of methods, in the order of first appearance: `method_a`, `method_b`, `published` (pooled
+        test), `participants` (one share a participant against one half; Wilcoxon's test; robust chi-square),
+        `clustering`, `motions` (the pooled test a motion pair, p-values adjusted by Holm), `order` (effect of
+        the order of presentation), `answer` (a sentence).
+    """
+    given = preference_answers(answers)
+    results = []
+    for (method_a, method_b), part in given.groupby(["method_a", "method_b"], sort=False):
+        results.append(_compare_two(str(method_a), str(method_b), part, confidence))
+    return results
+
+
+def _compare_two(method_a: str, method_b: str, part: pd.DataFrame, confidence: float) -> dict[str, Any]:
+    by_participant = part.groupby(part["participant"].astype(str))["chose_a"].agg(["sum", "count"])
+    chosen, shown = by_participant["sum"].to_numpy(dtype=np.float64), by_participant["count"].to_numpy(dtype=np.float64)
+    published = published_test(int(chosen.sum()), int(shown.sum()), confidence)
+    participants = participant_tests(chosen, shown, confidence)
+    return {
+        "method_a": method_a,
+        "method_b": method_b,
+        "published": estimates.plain(published),
+        "participants": participants,
+        "clustering": estimates.plain(estimates.clustering(chosen, shown)),
+        "motions": motion_table(part, confidence).to_dict("records"),
+        "order": order_effect(part, confidence),
+        "answer": _in_words(method_a, method_b, published, participants),
+    }
+
+
+def participant_tests(chosen: FloatArray, shown: FloatArray, confidence: float = 0.95) -> dict[str, Any]:
+    """Test the preference with one number a participant.
+
+    Parameters
+    ----------
+    chosen, shown : ndarray, shape (participants,)
+        How often each favoured the first method, of how many answers.
+    confidence
+        Of the interval.
+
+    Returns
+    -------
+    dict
+        `participants`, `mean_percent`, `standard_error` (percent), `low`, `high` (percent), `t`, `degrees_of_freedom`,
+        `p_value` (Student's t; where all participants agree exactly, the exact sign test), `test` (which of the two),
+        `wilcoxon_p_value`, `robust_chi_square`, `robust_p_value` (pooled difference over its variance between
+        participants, referred to F(1, participants - 1)), `for_a`, `for_b`, `undecided` (participants), `note`.
+    """
+    share = chosen[shown > 0] / shown[shown > 0]
+    test = estimates.mean_test(share, 0.5, confidence)
+    for_a, for_b = int((share > 0.5).sum()), int((share < 0.5).sum())
+    p_value, name = test.p_value, "Student's t over participants"
+    if p_value is None and test.participants > 1:
+        p_value, name = estimates.binomial_probability(for_a, for_a + for_b) or 1.0, "exact sign test over participants"
+    robust = _robust_chi_square(chosen, shown)
+    low, high = test.interval.low, test.interval.high
+    return {
+        "participants": test.participants,
+        "mean_percent": None if test.mean is None else 100 * test.mean,
+        "standard_error": None if test.standard_error is None else 100 * test.standard_error,
+        "low": None if low is None else 100 * max(low, 0.0),
+        "high": None if high is None else 100 * min(high, 1.0),
+        "t": test.statistic,
+        "degrees_of_freedom": test.degrees_of_freedom,
+        "p_value": p_value,
+        "test": name if p_value is not None else "none",
+        "wilcoxon_p_value": _wilcoxon(share),
+        "robust_chi_square": robust,
+        "robust_p_value": None if robust is None else estimates.f_probability(robust, 1, test.participants - 1),
+        "for_a": for_a,
+        "for_b": for_b,
+        "undecided": int((share == 0.5).sum()),
+        "note": test.note,
+    }
+
+
+def _wilcoxon(share: FloatArray) -> float | None:
+    """Wilcoxon's signed-rank test of the shares against one half; None where nobody leans either way."""
+    lean = share[share != 0.5] - 0.5
+    if len(lean) < 2:
+        return None
+    from scipy.stats import rankdata
+
+    ranks = rankdata(np.round(np.abs(lean), 12))
+    positive, mean = float(ranks[lean > 0].sum()), float(ranks.sum()) / 2
+    if len(lean) <= 50:
+        return _exact_signed_rank(ranks, positive)
+    deviation = math.sqrt(float((ranks**2).sum()) / 4)
+    return estimates.chi_square_probability(((positive - mean) / deviation) ** 2, 1)
+
+
+def _exact_signed_rank(ranks: FloatArray, positive: float) -> float:
+    """Two-sided probability over all assignments of signs, ties included (ranks are multiples of one half)."""
+    doubled = np.round(2 * ranks).astype(int)
+    ways = np.zeros(int(doubled.sum()) + 1)
+    ways[0] = 1.0
+    for rank in doubled:
+        shifted = np.zeros_like(ways)
+        shifted[rank:] = ways[: len(ways) - rank]
+        ways = (ways + shifted) / 2
+    distance = np.abs(np.arange(len(ways)) - doubled.sum() / 2)
+    return float(min(1.0, ways[distance >= abs(2 * positive - doubled.sum() / 2) - 1e-9].sum()))
+
+
+def _robust_chi_square(chosen: FloatArray, shown: FloatArray) -> float | None:
+    """Squared pooled difference from an even split over its variance between participants."""
+    count = int((shown > 0).sum())
+    if count < 2:
+        return None
+    pooled = chosen.sum() / shown.sum()
+    variance = float(((chosen - shown * pooled) ** 2).sum()) * count / (count - 1)
+    if variance <= 1e-12:
+        return None
+    return float((chosen.sum() - shown.sum() / 2) ** 2) / variance
+
+
+def motion_table(part: pd.DataFrame, confidence: float = 0.95) -> pd.DataFrame:
+    """Return the pooled test for every motion.
+
+    Where every participant saw a motion pair once, its answers are independent and these tests hold as they stand.
+
+    Returns
+    -------
+    DataFrame
+        `motion`, `favouring`, `answers`, `percent`, `low`, `high` (percent, Wilson), `chi_square`, `p_value`,
+        `exact_p_value`, `holm_p_value` (the exact one, adjusted over the motions).
+    """
+    import pandas as pd
+
+    column = "motion" if "motion" in part.columns else "pair" if "pair" in part.columns else None
+    rows = []
+    for motion, answers in part.groupby(part[column].astype(str) if column else np.full(len(part), "all"), sort=False):
+        test = published_test(int(answers["chose_a"].sum()), len(answers), confidence)
+        rows.append(
+            {
+                "motion": str(motion),
+                "favouring": test.favouring,
+                "answers": test.answers,
+                "percent": test.percent,
+                "low": 100 * (test.interval.low or 0.0),
+                "high": 100 * (test.interval.high or 0.0),
+                "chi_square": test.chi_square,
+                "p_value": test.p_value,
+                "exact_p_value": test.exact_p_value,
+            }
+        )
+    table = pd.DataFrame(rows)
+    if len(table):
+        table["holm_p_value"] = estimates.holm(table["exact_p_value"].to_numpy(dtype=np.float64))
+    return table
+
+
+def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]:
+    """Return how far the order of presentation decided the answer.
+
+    Returns
+    -------
+    dict
+        `first_percent` (how often the one shown first was favoured), `answers`, `p_value` (Student's t of one share a
+        participant against one half), `percent_a_first`, `percent_a_second` (favouring the first method, by place),
+        `balanced_percent` (the mean of these two: free of the order effect), `note`.
+    """
+    if "a_first" not in part.columns or part["a_first"].isna().all():
+        return {"first_percent": None, "answers": 0, "p_value": None, "note": "the order of presentation is not known"}
+    known = part[part["a_first"].notna()]
+    a_first = known["a_first"].astype(bool)
+    chose_first = (known["chose_a"] == a_first.astype(float)).astype(float)
+    shares = chose_first.groupby(known["participant"].astype(str)).mean().to_numpy(dtype=np.float64)
+    test = estimates.mean_test(shares, 0.5, confidence)
+    first = 100 * float(known.loc[a_first, "chose_a"].mean()) if a_first.any() else None
+    second = 100 * float(known.loc[~a_first, "chose_a"].mean()) if (~a_first).any() else None
+    return {
+        "first_percent": 100 * float(chose_first.mean()),
+        "answers": len(known),
+        "p_value": test.p_value,
+        "percent_a_first": first,
+        "percent_a_second": second,
+        "balanced_percent": None if first is None or second is None else (first + second) / 2,
+        "note": test.note,
+    }
+
+
+def _in_words(method_a: str, method_b: str, published: Published, participants: dict[str, Any]) -> str:
+    """One sentence: who was favoured, how often, and whether it can be told from chance."""
+    if published.percent is None:
+        return f"There are no answers that compare {method_a} with {method_b}."
+    p_value = participants["p_value"]
+    share = f"{published.percent:.1f}% of {published.answers} answers favoured {method_a} over {method_b}"
+    if p_value is None:
+        return f"{share}; with one participant nothing can be said about others."
+    if p_value < 0.05:
+        return f"{share}; across participants this is not chance (p {_p_in_words(p_value)})."
+    return f"{share}; across participants this can't be told from chance (p {_p_in_words(p_value)})."
+
+
+def _p_in_words(p_value: float) -> str:
+    return "< .001" if p_value < 0.001 else f"= {p_value:.3f}".replace("0.", ".", 1) if p_value < 1 else "= 1"

@@ -1,0 +1,145 @@
+"""Data quality: a table of answers in, what is missing, too quick or too uniform out. Nothing is left out silently.
+
+The rules are few and said in words; they flag participants, they exclude nobody.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from study.analysis import estimates
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FASTEST_S = 0.2
+MANY_MISSED = 0.1
+MANY_FAST = 0.1
+LONG_RUN = 12
+
+
+def _longest_run(answers: list[str]) -> int:
+    longest = run = 0
+    previous: str | None = None
+    for answer in answers:
+        run = run + 1 if answer == previous else 1
+        previous, longest = answer, max(longest, run)
+    return longest
+
+
+def participant_table(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> pd.DataFrame:
+    """Return one row a participant.
+
+    Parameters
+    ----------
+    answers
+        The table of answers.
+    fastest_s
+        An answer sooner than this after the question can't be an answer to it. [seconds]
+
+    Returns
+    -------
+    DataFrame
+        `participant`, `simulated`, `trials`, `answered`, `missed`, `missed_percent`, `median_response_s`, `too_fast`,
+        `longest_run` (of one and the same answer), `false_alarms`, `same_pairs` (same-different pairs with no
+        difference), `flags` (in words, empty where there is nothing to say).
+    """
+    import pandas as pd
+
+    rows = []
+    for name, part in answers.groupby(answers["participant"].astype(str), sort=True):
+        given = part[part["answer"].notna()]
+        times = pd.to_numeric(given["response_s"], errors="coerce").dropna() if "response_s" in part else pd.Series([])
+        row: dict[str, Any] = {
+            "participant": str(name),
+            "simulated": bool(part["simulated"].astype(bool).any()) if "simulated" in part else False,
+            "trials": len(part),
+            "answered": len(given),
+            "missed": len(part) - len(given),
+            "missed_percent": 100 * (len(part) - len(given)) / len(part),
+            "median_response_s": float(times.median()) if len(times) else None,
+            "too_fast": int((times < fastest_s).sum()),
+            "longest_run": _longest_run([str(answer) for answer in given["answer"]]),
+        }
+        row |= _false_alarms(given)
+        row["flags"] = "; ".join(_flags(row, given, fastest_s))
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _false_alarms(given: pd.DataFrame) -> dict[str, Any]:
+    if "difference_frames" not in given:
+        return {"false_alarms": None, "same_pairs": None}
+    chosen = given["task"] == "same-different" if "task" in given else np.full(len(given), True)
+    same = given[chosen & (given["difference_frames"] == 0)]
+    return {"false_alarms": int((same["answer"] == "different").sum()), "same_pairs": len(same)}
+
+
+def _flags(row: dict[str, Any], given: pd.DataFrame, fastest_s: float) -> list[str]:
+    flags = []
+    if row["missed"] > MANY_MISSED * row["trials"]:
+        flags.append(f"missed {row['missed']} of {row['trials']}")
+    if row["too_fast"] > MANY_FAST * max(row["answered"], 1):
+        flags.append(f"{row['too_fast']} answers sooner than {fastest_s:g} s")
+    if row["longest_run"] >= LONG_RUN:
+        flags.append(f"{row['longest_run']} times the same answer in a row")
+    tasks = given["task"] if "task" in given else ["answers"] * len(given)
+    for task, part in given.groupby(tasks):
+        if len(part) >= LONG_RUN / 2 and part["answer"].nunique() == 1:
+            flags.append(f'always "{part["answer"].iloc[0]}" ({task})')
+    return flags
+
+
+def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> dict[str, Any]:
+    """Return how complete and how plausible the answers are.
+
+    Returns
+    -------
+    dict
+        `participants`, `simulated_participants`, `trials`, `answered`, `missed`, `missed_percent`, `too_fast`,
+        `fastest_s`, `response_s` (quantiles 5, 25, 50, 75, 95), `flagged` (participants), `rules` (in words), `table`
+        (one entry a participant, as `participant_table`).
+    """
+    import pandas as pd
+
+    if answers.empty:
+        counts = dict.fromkeys(("participants", "simulated_participants", "trials", "answered", "missed"), 0)
+        rest: dict[str, Any] = {
+            "missed_percent": None,
+            "too_fast": 0,
+            "fastest_s": fastest_s,
+            "response_s": {},
+            "flagged": 0,
+        }
+        return {**counts, **rest, "rules": _rules(fastest_s), "table": []}
+    table = participant_table(answers, fastest_s)
+    given = answers[answers["answer"].notna()]
+    times = pd.to_numeric(given["response_s"], errors="coerce").dropna() if "response_s" in given else pd.Series([])
+    levels = (5, 25, 50, 75, 95)
+    quantiles = np.percentile(times.to_numpy(dtype=np.float64), levels) if len(times) else []
+    summary = {
+        "participants": len(table),
+        "simulated_participants": int(table["simulated"].sum()),
+        "trials": len(answers),
+        "answered": len(given),
+        "missed": len(answers) - len(given),
+        "missed_percent": 100 * (len(answers) - len(given)) / len(answers),
+        "too_fast": int(table["too_fast"].sum()),
+        "fastest_s": fastest_s,
+        "response_s": {str(level): float(value) for level, value in zip(levels, quantiles, strict=False)},
+        "flagged": int((table["flags"] != "").sum()),
+        "rules": _rules(fastest_s),
+        "table": table.to_dict("records"),
+    }
+    return dict(estimates.plain(summary))
+
+
+def _rules(fastest_s: float) -> list[str]:
+    return [
+        f"more than {100 * MANY_MISSED:g}% of the trials missed",
+        f"more than {100 * MANY_FAST:g}% of the answers sooner than {fastest_s:g} s",
+        f"the same answer {LONG_RUN} times in a row or more",
+        "one and the same answer throughout a task",
+    ]

@@ -1,0 +1,61 @@
+"""Ratings of naturalness on a scale: answers of a rating task in, a table by method out."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from study.analysis import estimates
+from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[str, Any]]:
+    """Return one entry a method: how it was rated.
+
+    Returns
+    -------
+    list of dict
+        `method`, `answers`, `participants`, `mean` (over participants of their means), `standard_error`, `low`, `high`
+        (Student's t over participants), `standard_deviation` (of all answers), `median`, `distribution` (answers a
+        value).
+
+    Raises
+    ------
+    AnalysisError
+        When an answer is not a number.
+    """
+    import pandas as pd
+
+    part = answers[answers["task"] == "rating"] if "task" in answers.columns else answers
+    part = part[part["answer"].notna()]
+    rating = pd.to_numeric(part["answer"], errors="coerce")
+    if rating.isna().any():
+        strange = part.loc[rating.isna(), "answer"].iloc[0]
+        raise AnalysisError(f"expected ratings as numbers, found {strange!r}; recode the column `answer`")
+    method = part["method_a"].astype(str) if "method_a" in part.columns else pd.Series("all", index=part.index)
+    rows = []
+    for name, values in rating.groupby(method, sort=True):
+        means = values.groupby(part.loc[values.index, "participant"].astype(str)).mean().to_numpy(dtype=np.float64)
+        test = estimates.mean_test(means, 0.0, confidence)
+        rows.append(
+            {
+                "method": str(name),
+                "answers": len(values),
+                "participants": test.participants,
+                "mean": test.mean,
+                "standard_error": test.standard_error,
+                "low": test.interval.low,
+                "high": test.interval.high,
+                "standard_deviation": float(values.std(ddof=1)) if len(values) > 1 else math.nan,
+                "median": float(values.median()),
+                "distribution": {
+                    f"{value:g}": int(count) for value, count in values.value_counts().sort_index().items()
+                },
+            }
+        )
+    return [dict(estimates.plain(row)) for row in rows]

@@ -1,0 +1,307 @@
+"""The just noticeable difference in blend length: answers of a same-different task in, thresholds out.
+
+As published (2004 section 5.1, Figure 6): percent "different" by signed difference in blend length, with standard
+errors of the mean over participants, and where straight lines between these points cross 75%, shorter and longer.
+Beside it the differencing model (`differencing`), whose criterion comes from the pairs with no difference: straight
+lines cut the corners of a bent curve, and the crossing moves with the rate of false alarms.
+
+Intervals take the participant as the unit. A threshold outside the levels shown is said to be outside, never computed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.analysis import estimates
+from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+Side = Literal["shorter", "longer"]
+SIDES: tuple[Side, Side] = ("shorter", "longer")
+Status = Literal["reached", "not reached", "above", "not estimable"]
+
+FEWEST_FOR_INTERVAL = 2
+NEEDED_COLUMNS = ("participant", "difference_frames", "answer")
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Answers counted by participant and level.
+
+    Attributes
+    ----------
+    participants
+        In the order of the rows below.
+    differences : ndarray, shape (levels,)
+        Signed difference in blend length, frames, rising: comparison minus reference.
+    different, shown : ndarray, shape (participants, levels)
+        Answers "different", and all answers given; missed answers are in neither.
+    """
+
+    participants: tuple[str, ...]
+    differences: FloatArray
+    different: FloatArray
+    shown: FloatArray
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """A threshold on one side.
+
+    Attributes
+    ----------
+    side
+        "shorter" or "longer" than the reference.
+    frames
+        Size of the difference, always positive; None unless `status` is "reached".
+    standard_error
+        Frames.
+    interval
+        Frames; an open end lies outside the levels shown, or can't be told.
+    status
+        "reached"; "not reached" within the levels shown; "above": the curve is above the level at the smallest
+        difference shown; "not estimable".
+    method
+        How it was found, and what its interval rests on.
+    note
+        In words, where the status is not "reached" or the estimate needs a caution.
+    """
+
+    side: Side
+    frames: float | None
+    standard_error: float | None
+    interval: estimates.Interval
+    status: Status
+    method: str
+    note: str = ""
+
+
+def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers given in same-different tasks, missed ones left out.
+
+    Raises
+    ------
+    AnalysisError
+        When a column is missing, or an answer is neither "same" nor "different".
+    """
+    missing = [name for name in NEEDED_COLUMNS if name not in answers.columns]
+    if missing:
+        raise AnalysisError(
+            f"expected columns {', '.join(NEEDED_COLUMNS)} for a same-different analysis, found none named "
+            f"{', '.join(missing)}; name them in the table of answers"
+        )
+    chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
+    given = chosen[chosen["answer"].notna() & chosen["difference_frames"].notna()]
+    strange = sorted(set(given["answer"].astype(str)) - {"same", "different"})
+    if strange:
+        raise AnalysisError(f'expected the answers "same" and "different", found {strange[0]!r}; recode the column')
+    return given
+
+
+def count_answers(answers: pd.DataFrame) -> Counts:
+    """Count answers by participant and signed difference in blend length."""
+    given = same_different_answers(answers)
+    if given.empty:
+        nothing = np.zeros((0, 0))
+        return Counts((), np.zeros(0), nothing, nothing)
+    yes = (given["answer"] == "different").astype(float)
+    groups = yes.groupby([given["participant"].astype(str), given["difference_frames"].astype(float)])
+    shown, different = groups.size().unstack(fill_value=0), groups.sum().unstack(fill_value=0)
+    return Counts(
+        tuple(str(name) for name in shown.index),
+        shown.columns.to_numpy(dtype=np.float64),
+        different.to_numpy(dtype=np.float64),
+        shown.to_numpy(dtype=np.float64),
+    )
+
+
+def percentages(counts: Counts) -> FloatArray:
+    """Return the share of "different" of every participant and level; NaN where a participant gave no answer."""
+    share = np.full(counts.shown.shape, np.nan)
+    np.divide(counts.different, counts.shown, out=share, where=counts.shown > 0)
+    return share
+
+
+def percent_different(answers: pd.DataFrame, confidence: float = 0.95) -> pd.DataFrame:
+    """Return percent "different" by signed difference in blend length (2004 Figure 6).
+
+    Returns
+    -------
+    DataFrame
+        One row a level: `difference_frames`, `participants`, `answers`, `different`, `percent` (mean over participants
+        of their percentages), `standard_error` (of that mean; missing for one participant), `low` and `high` (Wilson's
+        interval of the answers as if independent, in percent: it says something even where all answers agree).
+    """
+    import pandas as pd
+
+    counts = count_answers(answers)
+    rows: list[dict[str, Any]] = []
+    for level, difference in enumerate(counts.differences):
+        share = percentages(counts)[:, level]
+        share = share[np.isfinite(share)]
+        different, shown = counts.different[:, level].sum(), counts.shown[:, level].sum()
+        interval = estimates.wilson_interval(different, shown, confidence)
+        rows.append(
+            {
+                "difference_frames": difference,
+                "participants": len(share),
+                "answers": int(shown),
+                "different": int(different),
+                "percent": 100 * float(share.mean()),
+                "standard_error": 100 * float(share.std(ddof=1)) / math.sqrt(len(share)) if len(share) > 1 else None,
+                "low": 100 * interval.low if interval.low is not None else None,
+                "high": 100 * interval.high if interval.high is not None else None,
+            }
+        )
+    names = ["difference_frames", "participants", "answers", "different", "percent", "standard_error", "low", "high"]
+    return pd.DataFrame(rows, columns=names)
+
+
+# Crossings of straight lines, as published
+
+
+def crossing_of_lines(sizes: FloatArray, shares: FloatArray, level: float = 0.75) -> FloatArray:
+    """Return where straight lines between points first reach `level`, going away from no difference.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (levels,)
+        Size of the difference, rising from 0 or from the smallest shown.
+    shares : ndarray, shape (..., levels)
+        Share of "different".
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Infinite where the level is never reached, 0 where the first point is at or above it already.
+    """
+    reached = shares >= level
+    first = np.argmax(reached, axis=-1)
+    after, before = first[..., None], np.maximum(first - 1, 0)[..., None]
+    low, high = np.take_along_axis(shares, before, -1)[..., 0], np.take_along_axis(shares, after, -1)[..., 0]
+    rise = np.where(high > low, high - low, 1.0)
+    place = sizes[before[..., 0]] + (level - low) / rise * (sizes[first] - sizes[before[..., 0]])
+    found = np.where(first == 0, 0.0, place)
+    return np.asarray(np.where(reached.any(axis=-1), found, np.inf), dtype=np.float64)
+
+
+def _levels_of(counts: Counts, side: Side) -> NDArray[np.intp]:
+    """Indices of the levels on one side with answers, from no difference outwards."""
+    sign = -1.0 if side == "shorter" else 1.0
+    sizes = sign * counts.differences
+    wanted = np.flatnonzero((sizes >= 0) & (counts.shown.sum(axis=0) > 0))
+    return wanted[np.argsort(sizes[wanted], kind="stable")]
+
+
+def _weighted_means(shares: FloatArray, weights: FloatArray) -> FloatArray:
+    """Means over participants of shares (participants, levels), weights (samples, participants); NaN left out."""
+    known = np.isfinite(shares)
+    total = weights @ known.astype(np.float64)
+    return np.asarray((weights @ np.where(known, shares, 0.0)) / np.where(total > 0, total, np.nan), dtype=np.float64)
+
+
+def crossings(
+    counts: Counts,
+    *,
+    level: float = 0.75,
+    confidence: float = 0.95,
+    resamples: int = 2000,
+    rng: np.random.Generator | None = None,
+) -> dict[str, Threshold]:
+    """Return the 75% crossings of straight lines on both sides (2004 Figure 6).
+
+    Parameters
+    ----------
+    counts
+        Answers.
+    level
+        Share of "different" at threshold.
+    confidence, resamples
+        Of the bootstrap over participants.
+    rng
+        Source of the bootstrap samples; seeded with 0 by default, so that a report repeats.
+
+    Notes
+    -----
+    The interval holds every difference whose interpolated percentage can't be told from `level` (Student's t over
+    participants; Fieller's method); the standard error is the bootstrap's. Both describe the crossing of straight lines
+    through the true percentages, which is not quite where a smooth curve crosses.
+    """
+    rng = rng or np.random.default_rng(0)
+    count = len(counts.participants)
+    weights = estimates.resampled_weights(count, resamples, rng) if count else np.zeros((0, 0))
+    return {side: _line_threshold(counts, side, level, confidence, weights) for side in SIDES}
+
+
+def _line_threshold(counts: Counts, side: Side, level: float, confidence: float, weights: FloatArray) -> Threshold:
+    method = "straight lines between levels; interval over participants (Fieller)"
+    unknown = estimates.Interval(None, None, confidence)
+    wanted = _levels_of(counts, side)
+    sizes = np.abs(counts.differences[wanted])
+    if not (sizes > 0).any():
+        return Threshold(side, None, None, unknown, "not estimable", method, f"no pair was {side}")
+    shares = percentages(counts)[:, wanted]
+    means = _weighted_means(shares, np.ones((1, len(shares))))[0]
+    found = float(crossing_of_lines(sizes, means, level))
+    interval, caution = _fieller(sizes, shares, level, confidence)
+    if not math.isfinite(found):
+        note = f"not reached within the levels shown (largest {sizes[-1]:g} frames: {100 * means[-1]:.0f}%)"
+        return Threshold(side, None, None, interval, "not reached", method, note)
+    if found <= 0.0 and means[0] >= level:
+        note = f"{100 * means[0]:.0f}% at the smallest difference shown ({sizes[0]:g} frames): no crossing to find"
+        return Threshold(side, None, None, unknown, "above", method, note)
+    error = None
+    if len(shares) >= FEWEST_FOR_INTERVAL:
+        resampled = crossing_of_lines(sizes, np.nan_to_num(_weighted_means(shares, weights)), level)
+        error = bootstrap_error(resampled)
+    if (np.diff(means) < 0).any():
+        caution = "; ".join(filter(None, [caution, "percentages do not rise throughout: the first crossing is given"]))
+    return Threshold(side, found, error, interval, "reached", method, caution)
+
+
+def bootstrap_error(resampled: FloatArray) -> float | None:
+    """Bootstrap standard error; None where more than one sample in twenty has no threshold."""
+    known = resampled[np.isfinite(resampled)]
+    if len(known) < 0.95 * len(resampled) or len(known) < 2:
+        return None
+    return float(known.std(ddof=1))
+
+
+def _fieller(sizes: FloatArray, shares: FloatArray, level: float, confidence: float) -> tuple[estimates.Interval, str]:
+    """Differences at which the interpolated mean can't be told from `level`, and a caution.
+
+    Where all participants agree the spread can't be seen; it is then taken from two answers more, one of each kind.
+    """
+    count = len(shares)
+    if count < FEWEST_FOR_INTERVAL:
+        return estimates.Interval(None, None, confidence), "one participant: no interval over participants"
+    grid = np.unique(np.concatenate([sizes, np.linspace(sizes[0], sizes[-1], 2001)]))
+    right = np.clip(np.searchsorted(sizes, grid, side="left"), 1, len(sizes) - 1) if len(sizes) > 1 else None
+    if right is None:
+        return estimates.Interval(None, None, confidence), "one level only"
+    share = (grid - sizes[right - 1]) / (sizes[right] - sizes[right - 1])
+    mixed = shares[:, right - 1] * (1 - share) + shares[:, right] * share
+    known = np.isfinite(mixed)
+    number = known.sum(axis=0)
+    mean = np.where(known, mixed, 0.0).sum(axis=0) / np.maximum(number, 1)
+    variance = (np.where(known, mixed - mean, 0.0) ** 2).sum(axis=0) / np.maximum(number - 1, 1) / np.maximum(number, 1)
+    guarded = (mean * number + 1) / (number + 2)
+    variance = np.where(variance < 1e-12, guarded * (1 - guarded) / (number + 2), variance)
+    numbers, where = np.unique(number, return_inverse=True)
+    times = np.array([estimates.t_quantile(confidence, max(int(n) - 1, 1)) for n in numbers])[where]
+    half = times * np.sqrt(variance)
+    surely_below, surely_above = mean + half < level, mean - half > level
+    # From outside in: below the low end all is surely under the level, above the high end all is surely over it.
+    low_place = int(np.argmax(~surely_below))
+    high_place = len(grid) - 1 - int(np.argmax(~surely_above[::-1]))
+    low = None if not surely_below[0] else float(grid[low_place]) if not surely_below.all() else float(grid[-1])
+    high = None if not surely_above[-1] else float(grid[high_place])
+    return estimates.Interval(low, high, confidence), ""

@@ -1,0 +1,86 @@
+"""All analyses of all answers: one table in, one JSON-able dictionary out, for the command line and the report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from study.analysis import estimates
+from study.analysis.jnd import analyse_jnd
+from study.analysis.preference import compare
+from study.analysis.quality import quality
+from study.analysis.ratings import rating_table
+from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TASKS = ("same-different", "preference", "rating")
+
+
+def analyse(
+    answers: pd.DataFrame,
+    *,
+    threshold: float = 0.75,
+    confidence: float = 0.95,
+    resamples: int = 1000,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Analyse every study in a table of answers.
+
+    Parameters
+    ----------
+    answers
+        One row an answer: `participant`, `task`, `study`, `answer`, and the columns that the tasks need (see
+        `docs/analysis.md`). Missed answers have no `answer`.
+    threshold
+        Share of "different" that defines the just noticeable difference read off the percentages.
+    confidence
+        Of all intervals.
+    resamples, seed
+        Of the bootstrap over participants behind the standard errors; the same seed gives the same numbers.
+
+    Returns
+    -------
+    dict
+        `jnd` (by name of a same-different study), `preference` (by name of a preference study, a list of compared
+        pairs of methods), `ratings` (by name of a rating study), each empty where there is no such study; `quality`,
+        `data` ("collected", "simulated", "mixed" or "none"), `confidence`.
+
+    Raises
+    ------
+    AnalysisError
+        When a column is missing or holds what can't be understood.
+    """
+    missing = [name for name in ("participant", "task", "answer") if name not in answers.columns]
+    if missing:
+        raise AnalysisError(f"expected the columns participant, task and answer, found none named {', '.join(missing)}")
+    strange = sorted(set(answers["task"].astype(str)) - set(TASKS))
+    if strange:
+        raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {strange[0]!r}")
+    result: dict[str, Any] = {"jnd": {}, "preference": {}, "ratings": {}}
+    for (task, study), part in answers.groupby([answers["task"].astype(str), _studies(answers)], sort=False):
+        if task == "same-different":
+            result["jnd"][study] = analyse_jnd(
+                part, level=threshold, confidence=confidence, resamples=resamples, seed=seed
+            )
+        elif task == "preference":
+            result["preference"][study] = compare(part, confidence)
+        else:
+            result["ratings"][study] = rating_table(part, confidence)
+    result |= {"quality": quality(answers), "data": kind_of_data(answers), "confidence": confidence}
+    return dict(estimates.plain(result))
+
+
+def _studies(answers: pd.DataFrame) -> pd.Series[str]:
+    column = "study" if "study" in answers.columns else "task"
+    return answers[column].astype(str)
+
+
+def kind_of_data(answers: pd.DataFrame) -> str:
+    """Return who answered: "collected" (people), "simulated", "mixed", or "none"."""
+    if answers.empty:
+        return "none"
+    if "simulated" not in answers.columns:
+        return "collected"
+    simulated = answers["simulated"].astype(bool)
+    return "simulated" if simulated.all() else "mixed" if simulated.any() else "collected"

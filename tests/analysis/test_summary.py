@@ -1,0 +1,111 @@
+"""The whole analysis as one JSON-able dictionary, on usual and on hopeless data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study.analysis.jnd import across_motions
+from study.analysis.quality import quality
+from study.analysis.summary import analyse, kind_of_data
+from study.errors import AnalysisError
+
+Simulate = Callable[..., pd.DataFrame]
+COLUMNS = ["participant", "simulated", "study", "task", "motion", "difference_frames", "answer", "response_s"]
+
+
+def test_all_tasks_in_one_table(same_different_study: Simulate, preference_study: Simulate) -> None:
+    rng = np.random.default_rng(0)
+    rating = pd.DataFrame(
+        {"participant": ["p00", "p01"] * 3, "simulated": True, "study": "rate", "task": "rating",
+         "method_a": ["geodesic"] * 4 + ["fixed"] * 2, "answer": ["4", "5", "3", "4", "1", "2"]}
+    )  # fmt: skip
+    answers = pd.concat([same_different_study(rng, participants=6), preference_study(rng, participants=6), rating])
+    result = analyse(answers, resamples=100)
+    text = json.dumps(result, allow_nan=False)
+    assert json.loads(text) == result
+    assert set(result) >= {"jnd", "preference", "ratings", "quality", "data"}
+    assert result["jnd"]["jnd"]["published"]["longer"]["frames"] > 0
+    assert result["jnd"]["jnd"]["participants"] == 6
+    assert len(result["jnd"]["jnd"]["motions"]) == 3
+    assert result["preference"]["geodesic"][0]["published"]["answers"] == 48
+    assert [(row["method"], row["mean"]) for row in result["ratings"]["rate"]] == [("fixed", 1.5), ("geodesic", 4.0)]
+    assert result["data"] == "simulated"
+
+
+def test_the_same_seed_gives_the_same_result(same_different_study: Simulate) -> None:
+    answers = same_different_study(np.random.default_rng(0), participants=5)
+    assert analyse(answers, resamples=50) == analyse(answers, resamples=50)
+
+
+@pytest.mark.parametrize("answer", ["same", "different", None])
+@pytest.mark.parametrize("participants", [1, 3])
+def test_hopeless_answers_give_a_statement(
+    same_different_study: Simulate, answer: str | None, participants: int
+) -> None:
+    answers = same_different_study(np.random.default_rng(0), participants=participants)
+    answers["answer"] = answer
+    result = analyse(answers, resamples=50)["jnd"]["jnd"]
+    assert result["model"] is None
+    assert result["model_note"]
+    for threshold in result["published"].values():
+        assert threshold["frames"] is None
+        assert threshold["note"]
+    json.dumps(result, allow_nan=False)
+
+
+def test_no_rows() -> None:
+    result = analyse(pd.DataFrame({name: [] for name in COLUMNS}))
+    assert (result["jnd"], result["preference"], result["ratings"]) == ({}, {}, {})
+    assert result["data"] == "none"
+    assert result["quality"]["trials"] == 0
+
+
+def test_refusals() -> None:
+    with pytest.raises(AnalysisError, match="none named task"):
+        analyse(pd.DataFrame({"participant": [], "answer": []}))
+    with pytest.raises(AnalysisError, match="found 'guessing'"):
+        analyse(pd.DataFrame({"participant": ["a"], "answer": ["same"], "task": ["guessing"]}))
+
+
+@pytest.mark.parametrize(
+    ("simulated", "kind"), [([True, True], "simulated"), ([False, True], "mixed"), ([False, False], "collected")]
+)
+def test_who_answered(simulated: list[bool], kind: str) -> None:
+    assert kind_of_data(pd.DataFrame({"simulated": simulated})) == kind
+
+
+def test_motions_that_differ_are_told_from_motions_that_do_not(same_different_study: Simulate) -> None:
+    rng = np.random.default_rng(5)
+    alike = [across_motions(same_different_study(rng, participants=12, spread=0.2))["f_p_value"] for _ in range(40)]
+    easier = same_different_study(rng, participants=12, motions={"walking": 1.0, "running": 2.0, "turning": 0.6})
+    assert np.mean(np.array(alike) < 0.05) < 0.2
+    assert across_motions(easier)["f_p_value"] < 0.001
+    assert across_motions(easier)["chi_square_p_value"] < 0.001
+
+
+def test_too_few_participants_for_a_test_across_motions(same_different_study: Simulate) -> None:
+    result = across_motions(same_different_study(np.random.default_rng(5), participants=2))
+    assert result["f"] is None
+    assert "too few" in result["note"]
+
+
+def test_quality_counts_what_is_missing_and_implausible(same_different_study: Simulate) -> None:
+    answers = same_different_study(np.random.default_rng(5), participants=3)
+    answers.loc[answers.index[:10], "answer"] = None
+    quick = answers["participant"] == "p01"
+    answers.loc[quick, "response_s"] = 0.05
+    answers.loc[answers["participant"] == "p02", "answer"] = "same"
+    result = quality(answers)
+    first, second, third = result["table"]
+    assert first["missed"] == 10
+    assert "missed 10 of 42" in first["flags"]
+    assert second["too_fast"] == 42
+    assert "answers sooner than 0.2 s" in second["flags"]
+    assert 'always "same"' in third["flags"]
+    assert result["missed"] == 10
+    assert result["flagged"] == 3
