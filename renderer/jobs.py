@@ -1,0 +1,213 @@
+"""Many videos: a list of jobs in, finished videos out, one process a core.
+
+Jobs are plain data, so they may be sent to another process or machine (`run_job`). Each process has its own GL
+context and encoder with a single thread each, which is the fastest way to use few cores and keeps the bytes the same
+however many workers there are.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import Camera
+from renderer.context import os_environ_defaults
+from renderer.errors import RendererError
+from renderer.figure import Figure
+from renderer.files import discard_unfinished
+from renderer.video import VideoInfo, render_video
+
+
+@dataclass(frozen=True, eq=False)
+class RenderJob:
+    """One video to be made.
+
+    Parameters
+    ----------
+    path
+        The mp4 to write.
+    positions : (frames, points, 3)
+        Metres; float32 or float64.
+    figure, camera, fps, preset, crf
+        As for `render_video`.
+    """
+
+    path: Path
+    positions: NDArray[np.floating[Any]]
+    figure: Figure
+    camera: Camera
+    fps: float | Fraction = 30
+    preset: str = "veryfast"
+    crf: int = 16
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the work is.
+
+    Parameters
+    ----------
+    videos, videos_total, frames, frames_total
+        Done, and to do in all.
+    seconds
+        Since the start.
+    last
+        The video just finished.
+    """
+
+    videos: int
+    videos_total: int
+    frames: int
+    frames_total: int
+    seconds: float
+    last: VideoInfo | None = None
+
+    @property
+    def frames_per_second(self) -> float:
+        """Mean speed so far; 0.0 before the first video is done."""
+        return self.frames / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def seconds_left(self) -> float | None:
+        """By the speed so far; None before there is one."""
+        speed = self.frames_per_second
+        return (self.frames_total - self.frames) / speed if speed > 0 else None
+
+    def __str__(self) -> str:
+        left = self.seconds_left
+        eta = "" if left is None else f", {left:.0f} s left"
+        return f"{self.videos}/{self.videos_total} videos, {self.frames_per_second:.0f} frames/s{eta}"
+
+
+def run_job(job: RenderJob) -> VideoInfo:
+    """Make one video in this process."""
+    return render_video(job.path, job.positions, job.figure, job.camera, fps=job.fps, preset=job.preset, crf=job.crf)
+
+
+def default_workers() -> int:
+    """One for each core that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def render_many(
+    jobs: Iterable[RenderJob],
+    workers: int | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> list[VideoInfo]:
+    """Make all videos; the results stand in the order of the jobs.
+
+    Parameters
+    ----------
+    jobs
+        No two with the same path.
+    workers
+        Processes; one a core where None. With 1 (or one job) the work is done in this process.
+    progress
+        Called after every video, in this process.
+
+    Raises
+    ------
+    RendererError
+        The first failure; videos that are finished stay, unfinished ones leave nothing under their names. The same
+        holds for an interruption (`KeyboardInterrupt`).
+    """
+    todo = list(jobs)
+    paths = [Path(job.path) for job in todo]
+    if len({path.absolute() for path in paths}) != len(paths):
+        twice = next(path for path in paths if paths.count(path) > 1)
+        raise RendererError(f"Expected every job to write a file of its own; {twice} is there twice.")
+    count = default_workers() if workers is None else workers
+    if count < 1:
+        raise RendererError(f"Expected at least one worker, got {workers}.")
+    tell = _Teller(todo, progress)
+    if min(count, len(todo)) <= 1:
+        return [tell(run_job(job)) for job in todo]
+    return _in_processes(todo, min(count, len(todo)), tell)
+
+
+class _Teller:
+    def __init__(self, jobs: Sequence[RenderJob], progress: Callable[[Progress], object] | None) -> None:
+        self._total = (len(jobs), sum(len(job.positions) for job in jobs))
+        self._progress = progress
+        self._start = time.perf_counter()
+        self._videos = self._frames = 0
+
+    def __call__(self, video: VideoInfo) -> VideoInfo:
+        self._videos += 1
+        self._frames += video.frames
+        if self._progress is not None:
+            seconds = time.perf_counter() - self._start
+            self._progress(Progress(self._videos, self._total[0], self._frames, self._total[1], seconds, video))
+        return video
+
+
+def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[VideoInfo]:
+    # Spawned, not forked: a GL library that has run in this process does not survive a fork.
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
+    done: dict[int, VideoInfo] = {}
+    # The longest first, so that no worker is left with a long one at the end.
+    order = sorted(range(len(jobs)), key=lambda i: -len(jobs[i].positions))
+    finished = False
+    try:
+        waiting: dict[Future[VideoInfo], int] = {pool.submit(run_job, jobs[i]): i for i in order}
+        while waiting:
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                done[waiting.pop(future)] = tell(future.result())
+        finished = True
+    except BrokenProcessPool as error:
+        raise RendererError(
+            "A rendering process ended before its time: killed for memory, or started from a script without "
+            "`if __name__ == '__main__':` around its work. Try fewer workers, or workers=1."
+        ) from error
+    finally:
+        _stop(pool, finished)
+        if not finished:
+            for job in jobs:
+                with suppress(OSError):
+                    discard_unfinished(Path(job.path))
+    return [done[i] for i in range(len(jobs))]
+
+
+def _stop(pool: ProcessPoolExecutor, finished: bool) -> None:
+    """End the pool; when the work was cut short, without waiting for what runs."""
+    processes = list((getattr(pool, "_processes", None) or {}).values())
+    pool.shutdown(wait=finished, cancel_futures=True)
+    if not finished:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.join(timeout=5.0)
+
+
+def _start_worker() -> None:
+    """The parent decides when to stop: Ctrl-C reaches all processes of a terminal at once."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name, value in os_environ_defaults.items():
+        os.environ.setdefault(name, value)
+    if sys.platform.startswith("linux"):
+        _die_with_parent()
+
+
+def _die_with_parent() -> None:
+    """Ask Linux to end this process when its parent is gone, even by a kill."""
+    import ctypes
+
+    set_death_signal = 1
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(set_death_signal, signal.SIGTERM)

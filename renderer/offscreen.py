@@ -1,0 +1,264 @@
+"""Offscreen frames: positions in, NV12 or RGB pictures out.
+
+NV12 is what the H.264 encoder takes: a plane of luma, and below it one of half the size with both chromas in turn,
+in one array `(height * 3 / 2, width)`. Drawing it directly spares a conversion that costs more than the drawing.
+
+Only the box that the figure takes is drawn and read back; several frames share one picture (an atlas), so that calls
+to GL are few. A capsule's pixels are computed from its own numbers and the pixel's place in the frame, both
+exact whatever the place in the atlas, so the frames do not depend on the batch.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.camera import Camera, check_positions, check_size
+from renderer.colour import to_ycbcr
+from renderer.context import Context, shared_context
+from renderer.errors import RendererError
+from renderer.figure import Figure
+from renderer.painter import Painter
+from renderer.shapes import Shapes, lay_out
+
+Bytes = NDArray[np.uint8]
+BATCH = 16
+
+
+def plain_frame(size: tuple[int, int], background: tuple[int, int, int]) -> Bytes:
+    """An NV12 frame of one colour, `(height * 3 / 2, width)`."""
+    width, height = check_size(size)
+    frame = np.empty((height * 3 // 2, width), dtype=np.uint8)
+    luma, blue, red = (round(value) for value in to_ycbcr(background))
+    frame[:height] = luma
+    frame[height:, 0::2] = blue
+    frame[height:, 1::2] = red
+    return frame
+
+
+def render_frames(
+    positions: ArrayLike,
+    figure: Figure,
+    camera: Camera,
+    *,
+    size: tuple[int, int] | None = None,
+    batch: int = BATCH,
+    context: Context | None = None,
+    fps: float = 30.0,
+) -> Iterator[Bytes]:
+    """Frames of NV12, `(height * 3 / 2, width)` each, one for each frame of `positions (frames, points, 3)`.
+
+    Parameters
+    ----------
+    positions : (frames, points, 3)
+        Metres, Y up.
+    figure, camera
+        What to draw, and from where.
+    size
+        Only to check: must be the camera's.
+    batch
+        Frames drawn at a time; has no influence on the pixels.
+    context
+        By default the process's own.
+    fps
+        Frames per second of the positions; matters to a camera that tracks.
+
+    Raises
+    ------
+    RendererError
+        For positions that are not finite, no frames, or another size than the camera's.
+    """
+    for canvas_frame in paste_frames(positions, figure, camera, size, batch, context, fps):
+        yield canvas_frame.copy()
+
+
+def render_rgb(
+    positions: ArrayLike, figure: Figure, camera: Camera, *, context: Context | None = None, fps: float = 30.0
+) -> Iterator[Bytes]:
+    """Frames of RGB, `(height, width, 3)` each, drawn without the half-size chroma of video; for stills."""
+    shapes = lay_out(check_positions(positions), figure, camera, fps)
+    with _rgb_target(camera.size, context) as (target, painter):
+        for data in shapes.data:
+            target.clear(*(value / 255.0 for value in figure.background))
+            yield _painted_rgb(target, painter, data, camera.size)
+
+
+def render_layers(layers: Sequence[tuple[ArrayLike, Figure]], camera: Camera, context: Context | None = None) -> Bytes:
+    """One RGB picture `(height, width, 3)` of several poses `(points, 3)`, each over those before it."""
+    if not layers:
+        raise RendererError("Expected at least one pose to draw, got none.")
+    with _rgb_target(camera.size, context) as (target, painter):
+        target.clear(*(value / 255.0 for value in layers[0][1].background))
+        for pose, figure in layers:
+            shapes = lay_out(check_positions(np.asarray(pose)[None], "a pose"), figure, camera)
+            picture = _painted_rgb(target, painter, shapes.data[0], camera.size)
+    return picture
+
+
+@contextmanager
+def _rgb_target(size: tuple[int, int], context: Context | None) -> Iterator[tuple[Any, Painter]]:
+    gl = (context or shared_context()).gl
+    target = gl.framebuffer([gl.texture(size, 3)])
+    try:
+        yield target, painter_of(gl)
+    finally:
+        for attachment in target.color_attachments:
+            attachment.release()
+        target.release()
+
+
+def _painted_rgb(target: Any, painter: Painter, data: NDArray[np.float32], size: tuple[int, int]) -> Bytes:
+    target.use()
+    painter.paint("rgb", painter.load(data), size)
+    width, height = size
+    return np.frombuffer(target.read(components=3, alignment=1), dtype=np.uint8).reshape(height, width, 3)
+
+
+def paste_frames(
+    positions: ArrayLike,
+    figure: Figure,
+    camera: Camera,
+    size: tuple[int, int] | None,
+    batch: int,
+    context: Context | None,
+    fps: float = 30.0,
+) -> Iterator[Bytes]:
+    """The frames of `render_frames`, each in the *same* array: to be used up before the next one is asked for."""
+    points = check_positions(positions)
+    if size is not None and check_size(size) != camera.size:
+        raise RendererError(f"Expected the size that the camera was made for, {camera.size}, got {tuple(size)}.")
+    if batch < 1:
+        raise RendererError(f"Expected a batch of at least one frame, got {batch}.")
+    shapes = lay_out(points, figure, camera, fps)
+    background = plain_frame(camera.size, figure.background)
+    gl = (context or shared_context()).gl
+    canvas = background.copy()
+    atlas = Atlas(gl, painter_of(gl), shapes, camera.size, background, batch)
+    try:
+        for first in range(0, len(points), batch):
+            tiles = atlas.draw(first, min(first + batch, len(points)))
+            for tile in tiles:
+                _put(canvas, camera.size[1], tile)
+                yield canvas
+                _put_back(canvas, background, camera.size[1], tile)
+    finally:
+        atlas.release()
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """The pixels of one frame's box: left and top edge in the frame, luma, and chroma as bytes in turn."""
+
+    left: int
+    top: int
+    luma: Bytes
+    chroma: Bytes
+
+
+def _put(canvas: Bytes, height: int, tile: Tile) -> None:
+    rows, columns = tile.luma.shape
+    canvas[tile.top : tile.top + rows, tile.left : tile.left + columns] = tile.luma
+    top = height + tile.top // 2
+    canvas[top : top + rows // 2, tile.left : tile.left + columns] = tile.chroma
+
+
+def _put_back(canvas: Bytes, background: Bytes, height: int, tile: Tile) -> None:
+    rows, columns = tile.luma.shape
+    top = height + tile.top // 2
+    for first, count in ((tile.top, rows), (top, rows // 2)):
+        where = np.s_[first : first + count, tile.left : tile.left + columns]
+        canvas[where] = background[where]
+
+
+class Atlas:
+    """A picture that holds the boxes of several frames side by side."""
+
+    def __init__(
+        self, gl: Any, painter: Painter, shapes: Shapes, size: tuple[int, int], background: Bytes, batch: int
+    ) -> None:
+        self._gl, self._painter, self._shapes, self._size = gl, painter, shapes, size
+        self._boxes = _cut(shapes.boxes, size)
+        self._loose = (self._boxes != shapes.boxes).any(axis=1)
+        extent = self._boxes[:, 2:] - self._boxes[:, :2]
+        self._tile = (max(2, int(extent[:, 0].max())), max(2, int(extent[:, 1].max())))
+        limit = min(int(gl.info["GL_MAX_TEXTURE_SIZE"]), 8192)
+        self._across = max(1, min(batch, limit // self._tile[0]))
+        rows = max(1, min(-(-batch // self._across), limit // self._tile[1]))
+        self._held = self._across * rows
+        width, height = self._tile[0] * self._across, self._tile[1] * rows
+        self._extent = (width, height)
+        self._luma = gl.framebuffer([gl.texture((width, height), 1)])
+        self._chroma = gl.framebuffer([gl.texture((width // 2, height // 2), 2)])
+        self._luma_bytes = np.empty((height, width), dtype=np.uint8)
+        self._chroma_bytes = np.empty((height // 2, width), dtype=np.uint8)
+        self._clear_luma = float(background[0, 0]) / 255.0
+        self._clear_chroma = tuple(float(v) / 255.0 for v in background[size[1], :2])
+
+    def draw(self, first: int, stop: int) -> Iterator[Tile]:
+        """The tiles of frames `first .. stop - 1`, each to be used up before the next is asked for."""
+        frame = first
+        while frame < stop:
+            # A figure that leaves the frame would paint over its neighbours: it gets the picture for itself.
+            last = frame + 1
+            while not self._loose[frame] and last < stop and last - frame < self._held and not self._loose[last]:
+                last += 1
+            yield from self._draw(frame, last)
+            frame = last
+
+    def _draw(self, first: int, stop: int) -> Iterator[Tile]:
+        count = stop - first
+        width, height = self._tile
+        place = np.stack([np.arange(count) % self._across * width, np.arange(count) // self._across * height], axis=1)
+        data = self._shapes.data[first:stop].copy()
+        data[..., 12:14] = (place - self._boxes[first:stop, :2])[:, None]
+        capsules = self._painter.load(data)
+        scissor = (0, 0, *self._tile) if self._loose[first] else None
+        self._luma.scissor = scissor
+        self._luma.use()
+        self._luma.clear(self._clear_luma)
+        self._painter.paint("luma", capsules, self._extent)
+        self._chroma.scissor = scissor and (0, 0, width // 2, height // 2)
+        self._chroma.use()
+        self._chroma.clear(*self._clear_chroma)
+        self._painter.paint("chroma", capsules, self._extent)
+        rows = (-(-count // self._across)) * height
+        self._luma.read_into(self._luma_bytes, (0, 0, self._extent[0], rows), components=1, alignment=1)
+        self._chroma.read_into(self._chroma_bytes, (0, 0, self._extent[0] // 2, rows // 2), components=2, alignment=1)
+        for i in range(count):
+            left, top, right, bottom = self._boxes[first + i].tolist()
+            x, y = place[i].tolist()
+            yield Tile(
+                left,
+                top,
+                self._luma_bytes[y : y + bottom - top, x : x + right - left],
+                self._chroma_bytes[y // 2 : (y + bottom - top) // 2, x : x + right - left],
+            )
+
+    def release(self) -> None:
+        """Free what it holds of the context."""
+        for target in (self._luma, self._chroma):
+            for attachment in target.color_attachments:
+                attachment.release()
+            target.release()
+
+
+def _cut(boxes: NDArray[np.int64], size: tuple[int, int]) -> NDArray[np.int64]:
+    """Boxes within the frame; one that lies outside altogether becomes empty."""
+    width, height = size
+    return np.clip(boxes, 0, np.array([width, height, width, height]))
+
+
+_painters: weakref.WeakKeyDictionary[Any, Painter] = weakref.WeakKeyDictionary()
+
+
+def painter_of(gl: Any) -> Painter:
+    """The context's own painter: compiling takes longer than drawing a second of motion."""
+    if gl not in _painters:
+        _painters[gl] = Painter(gl)
+    return _painters[gl]

@@ -1,0 +1,1 @@
+"""The shaders' sources, `.vert` and `.frag` beside this file."""

@@ -1,0 +1,187 @@
+"""Shapes: a figure's capsules on the screen, in the order to paint them.
+
+In go positions `(frames, points, 3)` in metres, a `Figure` and a `Camera`; out come numbers that a shader paints
+without knowing anything of bodies: for every capsule two ends in pixels, radii, colour. Capsules are painted
+from the back to the front, each with smooth edges over what is there already, so that crossing limbs have smooth
+edges too (a depth buffer would leave them jagged). Order is decided pair by pair where two limbs cross on the screen,
+not by the middles of bones: else a long limb would jump before another while both are far from crossing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import Camera, project, smooth_path
+from renderer.colour import to_ycbcr
+from renderer.figure import Figure, place
+
+FloatArray = NDArray[np.float64]
+
+FLOATS = 16
+"""Numbers that the shader takes for each capsule; see `lay_out`."""
+
+# Pixels around a capsule that its smooth edge may touch: one for luma, three for the half-size chroma.
+EDGE_PIXELS = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Capsules on the screen.
+
+    Parameters
+    ----------
+    data : (frames, capsules, 16), float32
+        In the order to paint: start x, y and the way to the end x, y (pixels, y down); radius at the start,
+        growth of the radius, 1 / length squared, 1 / (2 mean radius); luma, blue chroma, red chroma (0..1 of the
+        8-bit range) and opacity; the shift into the picture that is drawn on (x, y), shading, stretch of y.
+    boxes : (frames, 4), int64
+        Left, top, right and bottom edge of what may be touched, even numbers, not cut at the frame's edges.
+    """
+
+    data: NDArray[np.float32]
+    boxes: NDArray[np.int64]
+
+
+def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 30.0) -> Shapes:
+    """Capsules on the screen, sorted from the back to the front; `fps` matters to a camera that tracks."""
+    if camera.track_seconds is not None:
+        positions = positions - smooth_path(positions, camera.track_seconds, fps)[:, None]
+    ends, nearness = project(camera, place(figure, positions))
+    # Rounded to 1/256 pixel, as far as the eye goes; what remains of a difference in the last bit of a sine between
+    # two machines is rounded away too.
+    ends = np.round(ends * 256.0) / 256.0
+    radii = figure.radii * camera.focal_pixels * nearness
+    radii = np.maximum(np.round(radii * 256.0) / 256.0, 0.5)
+    order = paint_order(ends, radii, nearness, joined(figure))
+    data = _shader_numbers(ends, radii, figure)
+    data = np.take_along_axis(data, order[..., None], axis=1)
+    return Shapes(data, _boxes(ends, radii))
+
+
+def joined(figure: Figure) -> NDArray[np.bool_]:
+    """Which capsules meet in a joint, `(capsules, capsules)`."""
+    first, second = figure.ends[:, None, :, None], figure.ends[None, :, None, :]
+    meets: NDArray[np.bool_] = (first == second).any(axis=(2, 3))
+    return meets
+
+
+def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure) -> NDArray[np.float32]:
+    frames, count = ends.shape[:2]
+    start = ends[:, :, 0]
+    way = ends[:, :, 1] - start
+    length2 = way[..., 0] ** 2 + way[..., 1] ** 2
+    colours = np.array([to_ycbcr(c) for c in figure.colours]) / 255.0
+    data = np.zeros((frames, count, FLOATS), dtype=np.float32)
+    data[..., 0:2] = start
+    data[..., 2:4] = way
+    data[..., 4] = radii[..., 0]
+    data[..., 5] = radii[..., 1] - radii[..., 0]
+    data[..., 6] = np.where(length2 > 1e-3, 1.0 / np.maximum(length2, 1e-3), 0.0)
+    data[..., 7] = 1.0 / (radii[..., 0] + radii[..., 1])
+    data[..., 8:11] = colours
+    data[..., 11] = 1.0
+    data[..., 14] = 1.0 if figure.lit else 0.0
+    data[..., 15] = 1.0
+    return data
+
+
+def _boxes(ends: FloatArray, radii: FloatArray) -> NDArray[np.int64]:
+    reach = radii[..., None] + EDGE_PIXELS
+    low = np.floor((ends - reach).min(axis=(1, 2)) / 2.0) * 2.0
+    high = np.ceil((ends + reach).max(axis=(1, 2)) / 2.0) * 2.0
+    boxes: NDArray[np.int64] = np.concatenate([low, high], axis=1).astype(np.int64)
+    return boxes
+
+
+def paint_order(
+    ends: FloatArray, radii: FloatArray, nearness: FloatArray, meets: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Capsules from the back to the front, `(frames, capsules)`.
+
+    Parameters
+    ----------
+    ends : (frames, capsules, 2, 2)
+        Pixels.
+    radii : (frames, capsules, 2)
+        Pixels.
+    nearness : (frames, capsules, 2)
+        1 / distance of each end, which is linear along a line on the screen.
+    meets : (capsules, capsules)
+        Which capsules share a joint: at the joint neither is before the other, so their middles decide.
+    """
+    frames, count = ends.shape[:2]
+    middle = nearness.sum(axis=2)
+    if count == 1:
+        return np.zeros((frames, 1), dtype=np.int64)
+    one, two = np.triu_indices(count, k=1)
+    s, t, gap = nearest_on_screen(ends[:, one], ends[:, two])
+    near_one = nearness[:, one, 0] + s * (nearness[:, one, 1] - nearness[:, one, 0])
+    near_two = nearness[:, two, 0] + t * (nearness[:, two, 1] - nearness[:, two, 0])
+    ahead = near_two - near_one
+    ahead = np.where(meets[one, two] | (ahead == 0.0), middle[:, two] - middle[:, one], ahead)
+    touch = gap < radii[:, one].max(axis=2) + radii[:, two].max(axis=2) + 2.0
+    behind = np.zeros((frames, count, count), dtype=bool)
+    behind[:, one, two] = touch & (ahead >= 0.0)
+    behind[:, two, one] = touch & (ahead < 0.0)
+    return _topological(behind, middle)
+
+
+def _topological(behind: NDArray[np.bool_], middle: FloatArray) -> NDArray[np.int64]:
+    """Orders in which `behind[f, i, j]` puts i before j; a ring of limbs is cut at the one that is furthest away."""
+    frames, count = middle.shape
+    rows = np.arange(frames)
+    waits = behind.sum(axis=1)
+    order = np.empty((frames, count), dtype=np.int64)
+    placed = np.zeros((frames, count), dtype=bool)
+    span = float(middle.max()) * 2.0 + 1.0
+    for position in range(count):
+        # Free ones first, the furthest of them first; then those still waiting; those done never again.
+        key = middle + span * (waits > 0) + 2.0 * span * placed
+        chosen = np.argmin(key, axis=1)
+        order[:, position] = chosen
+        placed[rows, chosen] = True
+        waits = waits - behind[rows, chosen]
+    return order
+
+
+def nearest_on_screen(one: FloatArray, two: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where two segments `(..., 2, 2)` come closest: the share along each, `(...)`, and the distance in pixels."""
+    a, u = one[..., 0, :], one[..., 1, :] - one[..., 0, :]
+    b, v = two[..., 0, :], two[..., 1, :] - two[..., 0, :]
+    w = b - a
+    cross = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    safe = np.where(np.abs(cross) > 1e-9, cross, 1.0)
+    s = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / safe
+    t = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / safe
+    crossing = (np.abs(cross) > 1e-9) & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    best_s, best_t = np.where(crossing, s, 0.0), np.where(crossing, t, 0.0)
+    best = np.where(crossing, 0.0, np.inf)
+    uu, vv = _dot(u, u), _dot(v, v)
+    for fixed in (0.0, 1.0):
+        end = w + fixed * v
+        share = np.clip(_dot(end, u) / np.maximum(uu, 1e-9), 0.0, 1.0)
+        best_s, best_t, best = _closer(
+            best_s, best_t, best, share, np.full_like(share, fixed), end - share[..., None] * u
+        )
+        end = fixed * u - w
+        share = np.clip(_dot(end, v) / np.maximum(vv, 1e-9), 0.0, 1.0)
+        best_s, best_t, best = _closer(
+            best_s, best_t, best, np.full_like(share, fixed), share, end - share[..., None] * v
+        )
+    return best_s, best_t, np.sqrt(best)
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    product: FloatArray = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
+    return product
+
+
+def _closer(
+    best_s: FloatArray, best_t: FloatArray, best: FloatArray, s: FloatArray, t: FloatArray, apart: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    distance2 = _dot(apart, apart)
+    better = distance2 < best
+    return np.where(better, s, best_s), np.where(better, t, best_t), np.where(better, distance2, best)
