@@ -19,6 +19,8 @@ FloatArray = NDArray[np.float64]
 # A leg may reach this share of its length, or as far as it reached before.
 FULL_REACH = 0.995
 LARGEST_DROP_M = 0.03
+# Heel to buttock, radians from straight.
+LARGEST_BEND = 2.6
 # Sine of the bend under which a knee counts as nearly straight.
 _STRAIGHT = 0.1
 # An overstretched knee is brought round over a correction of this size.
@@ -93,14 +95,14 @@ def _reach_one(
     """Joint rotations with one leg turned so that its ankle comes to `targets (frames, 3)`; the foot turns no more."""
     hip, _, ankle = leg
     before = joint_positions(original)
-    limit = np.linalg.norm(before[:, ankle] - before[:, hip], axis=1)
+    distance = np.linalg.norm(before[:, ankle] - before[:, hip], axis=1)
     # How much of a change there is at all: an overstretched knee comes round as the change grows, not at once.
     change = np.linalg.norm(targets - before[:, ankle], axis=1) + np.abs(
         lowered.root_positions[:, 1] - original.root_positions[:, 1]
     )
     part = lowered
     for _ in range(_PASSES):
-        part = _bend(part, leg, hinge, targets, limit, np.clip(change / _COME_ROUND_M, 0.0, 1.0))
+        part = _bend(part, leg, hinge, targets, distance, np.clip(change / _COME_ROUND_M, 0.0, 1.0))
         part = _swing(part, leg, targets)
     rotations = part.rotations.copy()
     above = global_rotations(part)[:, original.skeleton.parents[ankle]]
@@ -121,15 +123,19 @@ def _hinge(clip: Clip, side: str) -> FloatArray:
 
 
 def _bend(
-    clip: Clip, leg: tuple[int, ...], hinge: FloatArray, targets: FloatArray, limit: FloatArray, change: FloatArray
+    clip: Clip, leg: tuple[int, ...], hinge: FloatArray, targets: FloatArray, before: FloatArray, change: FloatArray
 ) -> Clip:
-    """The knee bent so that the ankle is as far from the hip as its target is, or as the leg reaches."""
+    """The knee bent so that the ankle is as far from the hip as its target is, or as the leg reaches.
+
+    `before (frames,)` is how far it was, metres: what the leg did already it may go on doing.
+    """
     hip, knee, ankle = leg
     positions, world = joint_positions(clip), global_rotations(clip)
     thigh, shank = positions[:, knee] - positions[:, hip], positions[:, ankle] - positions[:, knee]
     a, b = np.linalg.norm(thigh, axis=1), np.linalg.norm(shank, axis=1)
     wanted = np.linalg.norm(targets - positions[:, hip], axis=1)
-    wanted = np.clip(wanted, np.abs(a - b) + 0.05 * (a + b), np.maximum(FULL_REACH * (a + b), limit))
+    folded = np.sqrt(a**2 + b**2 + 2 * a * b * np.cos(LARGEST_BEND))
+    wanted = np.clip(wanted, np.minimum(folded, before), np.maximum(FULL_REACH * (a + b), before))
     normal = np.cross(thigh, shank) / (a * b)[:, None]
     axis = quat.rotate(world[:, hip], hinge)
     forward = np.where(np.sum(normal * axis, axis=1) < 0.0, -1.0, 1.0)
