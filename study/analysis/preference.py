@@ -109,8 +109,17 @@ def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
     return given
 
 
-def compare(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[str, Any]]:
+def compare(answers: pd.DataFrame, confidence: float = 0.95, alpha: float = 0.05) -> list[dict[str, Any]]:
     """Analyse every pair of methods that was compared.
+
+    Parameters
+    ----------
+    answers
+        Of one study.
+    confidence
+        Of the intervals.
+    alpha
+        Level of significance that the sentence in `answer` speaks of.
 
     Returns
     -------
@@ -123,11 +132,11 @@ def compare(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[str, A
     given = preference_answers(answers)
     results = []
     for (method_a, method_b), part in given.groupby(["method_a", "method_b"], sort=False):
-        results.append(_compare_two(str(method_a), str(method_b), part, confidence))
+        results.append(_compare_two(str(method_a), str(method_b), part, confidence, alpha))
     return results
 
 
-def _compare_two(method_a: str, method_b: str, part: pd.DataFrame, confidence: float) -> dict[str, Any]:
+def _compare_two(method_a: str, method_b: str, part: pd.DataFrame, confidence: float, alpha: float) -> dict[str, Any]:
     by_participant = part.groupby(part["participant"].astype(str))["chose_a"].agg(["sum", "count"])
     chosen, shown = by_participant["sum"].to_numpy(dtype=np.float64), by_participant["count"].to_numpy(dtype=np.float64)
     published = published_test(int(chosen.sum()), int(shown.sum()), confidence)
@@ -140,7 +149,7 @@ def _compare_two(method_a: str, method_b: str, part: pd.DataFrame, confidence: f
         "clustering": estimates.plain(estimates.clustering(chosen, shown)),
         "motions": motion_table(part, confidence).to_dict("records"),
         "order": order_effect(part, confidence),
-        "answer": _in_words(method_a, method_b, published, participants),
+        "answer": _in_words(method_a, method_b, published, participants, alpha),
     }
 
 
@@ -296,7 +305,7 @@ def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
     }
 
 
-def _in_words(method_a: str, method_b: str, published: Published, participants: dict[str, Any]) -> str:
+def _in_words(method_a: str, method_b: str, published: Published, participants: dict[str, Any], alpha: float) -> str:
     """One sentence: who was favoured, how often, and whether it can be told from chance."""
     if published.percent is None:
         return f"There are no answers that compare {method_a} with {method_b}."
@@ -304,7 +313,7 @@ def _in_words(method_a: str, method_b: str, published: Published, participants: 
     share = f"{published.percent:.1f}% of {published.answers} answers favoured {method_a} over {method_b}"
     if p_value is None:
         return f"{share}; with one participant nothing can be said about others."
-    if p_value < 0.05:
+    if p_value < alpha:
         return f"{share}; across participants this is not chance (p {_p_in_words(p_value)})."
     return f"{share}; across participants this can't be told from chance (p {_p_in_words(p_value)})."
 

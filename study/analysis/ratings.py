@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[str, Any]]:
-    """Return one entry a method: how it was rated.
+    """Return one entry a question and method: how it was rated.
 
     Returns
     -------
     list of dict
-        `method`, `answers`, `participants`, `mean` (over participants of their means), `standard_error`, `low`, `high`
-        (Student's t over participants), `standard_deviation` (of all answers), `median`, `distribution` (answers a
-        value).
+        `item`, `method`, `answers`, `participants`, `mean` (over participants of their means), `standard_error`,
+        `low`, `high` (Student's t over participants), `standard_deviation` (of all answers), `median`, `distribution`
+        (answers a value).
 
     Raises
     ------
@@ -36,14 +36,16 @@ def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[s
     rating = pd.to_numeric(part["answer"], errors="coerce")
     if rating.isna().any():
         strange = part.loc[rating.isna(), "answer"].iloc[0]
-        raise AnalysisError(f"expected ratings as numbers, found {strange!r}; recode the column `answer`")
+        raise AnalysisError(f"expected ratings as numbers, found {str(strange)!r}; recode the column `answer`")
     method = part["method_a"].astype(str) if "method_a" in part.columns else pd.Series("all", index=part.index)
     rows = []
-    for name, values in rating.groupby(method, sort=True):
+    item = part["item"].fillna("").astype(str) if "item" in part.columns else pd.Series("", index=part.index)
+    for (question, name), values in rating.groupby([item, method], sort=True):
         means = values.groupby(part.loc[values.index, "participant"].astype(str)).mean().to_numpy(dtype=np.float64)
         test = estimates.mean_test(means, 0.0, confidence)
         rows.append(
             {
+                "item": str(question),
                 "method": str(name),
                 "answers": len(values),
                 "participants": test.participants,

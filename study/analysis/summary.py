@@ -22,6 +22,7 @@ def analyse(
     *,
     threshold: float = 0.75,
     confidence: float = 0.95,
+    alpha: float = 0.05,
     resamples: int = 1000,
     seed: int = 0,
 ) -> dict[str, Any]:
@@ -36,6 +37,8 @@ def analyse(
         Share of "different" that defines the just noticeable difference read off the percentages.
     confidence
         Of all intervals.
+    alpha
+        Level of significance that sentences speak of.
     resamples, seed
         Of the bootstrap over participants behind the standard errors; the same seed gives the same numbers.
 
@@ -44,7 +47,7 @@ def analyse(
     dict
         `jnd` (by name of a same-different study), `preference` (by name of a preference study, a list of compared
         pairs of methods), `ratings` (by name of a rating study), each empty where there is no such study; `quality`,
-        `data` ("collected", "simulated", "mixed" or "none"), `confidence`.
+        `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
 
     Raises
     ------
@@ -64,10 +67,10 @@ def analyse(
                 part, level=threshold, confidence=confidence, resamples=resamples, seed=seed
             )
         elif task == "preference":
-            result["preference"][study] = compare(part, confidence)
+            result["preference"][study] = compare(part, confidence, alpha)
         else:
             result["ratings"][study] = rating_table(part, confidence)
-    result |= {"quality": quality(answers), "data": kind_of_data(answers), "confidence": confidence}
+    result |= {"quality": quality(answers), "data": kind_of_data(answers), "confidence": confidence, "alpha": alpha}
     return dict(estimates.plain(result))
 
 
