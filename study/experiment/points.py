@@ -1,0 +1,331 @@
+"""Transition points: motions long enough for entry, blend and exit, and the frames at which a blend starts and ends.
+
+Motions of a library and a protocol's conditions come in; two clips, a start frame, an end frame and the blend length
+of each method go out. Points are drawn at random, "to make the study independent of a particular transition metric"
+(2004 section 4.3), and kept where the lengths that follow meet the conditions. A cyclic motion that is too short is
+extended by whole cycles; points are always drawn within the part that the library supplied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from study.errors import MotionError, StimulusError, TransitionError
+from study.experiment.plan import generator
+from study.experiment.protocol import Points, Protocol, StudySpec, TransitionSpec
+from study.motion.clip import Clip
+from study.transitions.blend_length import BlendLength, blend_length
+
+if TYPE_CHECKING:
+    from study.motion.library import Library
+
+CANDIDATES = 3000
+"""So many pairs of frames are tried before a transition is refused."""
+
+LONGEST_BLEND_S = 2.0
+FREEDOM_S = 1.0
+"""Points are drawn within a second or more of motion: a whole cycle of a gait."""
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Frames around a point: `before` it, and `after` (the point itself counted), with the least that will do."""
+
+    before: int
+    after: int
+    least_before: int
+    least_after: int
+    words: str
+
+
+@dataclass(frozen=True, eq=False)
+class Supply:
+    """A motion as it is used.
+
+    `first` and `stop` bound the frames that the library supplied, as a slice counts them; those before and after
+    were added by extension. `window` are the frames in which a point may lie.
+    """
+
+    name: str
+    clip: Clip
+    first: int
+    stop: int
+    window: tuple[int, int]
+    file: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def added_before(self) -> int:
+        """Frames added before the captured ones."""
+        return self.first
+
+    @property
+    def added_after(self) -> int:
+        """Frames added after the captured ones."""
+        return self.clip.frames - self.stop
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A transition with its points and the blend length of each method."""
+
+    transition: TransitionSpec
+    source: Supply
+    destination: Supply
+    start_frame: int
+    end_frame: int
+    lengths: Mapping[str, BlendLength]
+    tried: int
+
+
+def settle(protocol: Protocol, study: StudySpec, transition: TransitionSpec, library: Library) -> Settled:
+    """Find the points of one transition of a study.
+
+    Raises
+    ------
+    StimulusError
+        Where motions are missing or too short (with the number of frames that are missing), where given points leave
+        a level below one frame, or where no drawn points meet the conditions.
+    """
+    points = protocol.points_for(study, transition)
+    source_needs, destination_needs = _needs(protocol, study, points)
+    source = _supply(protocol, library, transition.source, source_needs, points.source_within)
+    destination = _supply(protocol, library, transition.destination, destination_needs, points.destination_within)
+    if not source.clip.skeleton.matches(destination.clip.skeleton):
+        raise StimulusError(
+            f"transition {transition.name!r}: expected motions of one rig, found {transition.source!r} and "
+            f"{transition.destination!r} with different joints; choose motions of one library and rig."
+        )
+    if points.choose == "given":
+        return _given(protocol, study, transition, points, source, destination)
+    return _drawn(protocol, study, transition, points, source, destination)
+
+
+def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs, Needs]:
+    """What the source needs around its point, and the destination around its."""
+    entry = round(protocol.stimuli.entry_s * protocol.fps)
+    after_exit = round(protocol.stimuli.exit_s * protocol.fps)
+    search = round(LONGEST_BLEND_S * protocol.fps)
+    longest = min(points.longest_frames or search, search) + max((0, *study.differences_frames))
+    if "fixed" in study.methods:
+        longest = max(longest, study.fixed_frames + max((0, *study.differences_frames)))
+    if study.methods == ("cut",):
+        longest = search = 1
+    room = max(longest, search)
+    blend = f"blends of up to {longest} frames"
+    return (
+        Needs(entry, room, entry, longest, f"{entry} frames of entry and {blend}"),
+        Needs(room - 1, after_exit + 1, longest - 1, after_exit + 1, f"{blend} and {after_exit} frames of exit"),
+    )
+
+
+def _supply(
+    protocol: Protocol, library: Library, name: str, needs: Needs, within: tuple[float, float] | None
+) -> Supply:
+    """A motion of the library, extended where it is too short and cyclic."""
+    freedom = round(FREEDOM_S * protocol.fps)
+    # Captured motions come as they are, so that what is added to them is known.
+    seconds = (needs.before + needs.after + 4 * freedom) / protocol.fps if library.synthetic else None
+    try:
+        clip = library.clip(name, fps=protocol.fps, min_seconds=seconds)
+        entry = library.entry(name)
+    except MotionError as error:
+        raise StimulusError(f"motion {name!r}: {error}") from error
+    span = within or (0.0, 1.0)
+    wanted = (int(np.ceil(span[0] * clip.frames)), max(int(span[1] * clip.frames), 1))
+    ends = (bool(entry.cyclic_start), bool(entry.cyclic_end))
+    for before, after in ((needs.before, needs.after), (needs.least_before, needs.least_after)):
+        found = _extended(clip, wanted, before, after, freedom, ends)
+        if found is not None:
+            longer, added, window, notes = found
+            return Supply(name, longer, added, added + clip.frames, window, str(entry.file or ""), notes)
+    total = needs.least_before + needs.least_after
+    missing = max(total - clip.frames, total - 1 - (wanted[1] - wanted[0]), 1)
+    raise StimulusError(
+        f"motion {name!r}: expected {total} frames at {protocol.fps:g} fps ({needs.words}), found {clip.frames} in "
+        f"{library.name}, and it can't be extended{_why(ends)}: {missing} frames are missing. Use a longer motion, "
+        "or lower entry_s, exit_s or longest_frames."
+    )
+
+
+def _why(ends: tuple[bool, bool]) -> str:
+    sides = [side for side, cyclic in zip(("start", "end"), ends, strict=True) if not cyclic]
+    return f" (not cyclic at its {' or '.join(sides)})" if sides else ""
+
+
+def _extended(
+    clip: Clip, wanted: tuple[int, int], before: int, after: int, freedom: int, ends: tuple[bool, bool]
+) -> tuple[Clip, int, tuple[int, int], tuple[str, ...]] | None:
+    """The clip with room around its points: clip, frames added before, the points' window, notes; or None."""
+    low, high = wanted
+    enough = min(freedom, high - low)
+    legal = (max(low, before), min(high, clip.frames - after + 1))
+    if legal[1] - legal[0] >= enough:
+        return clip, 0, legal, ()
+    target = _target(clip.frames, wanted, before, after, enough, ends)
+    if target is None:
+        return None
+    missing_before = max(0, before - target[0])
+    missing_after = max(0, target[1] - 1 + after - clip.frames)
+    if missing_before == missing_after == 0:
+        return clip, 0, target, ()
+    from study.motion.cycles import extend
+
+    try:
+        extension = extend(clip, frames_before=missing_before, frames_after=missing_after)
+    except MotionError:
+        return None
+    added = extension.added_before
+    return extension.clip, added, (target[0] + added, target[1] + added), (extension.note,)
+
+
+def _target(
+    frames: int, wanted: tuple[int, int], before: int, after: int, enough: int, ends: tuple[bool, bool]
+) -> tuple[int, int] | None:
+    """The stretch of frames to draw points from: about the middle of what is wanted, moved off ends that are fixed."""
+    low = wanted[0] if ends[0] else max(wanted[0], before)
+    high = wanted[1] if ends[1] else min(wanted[1], frames - after + 1)
+    if low >= high:
+        return None
+    middle = (wanted[0] + wanted[1] - enough) // 2
+    first = min(max(middle, low), max(high - enough, low))
+    return first, min(first + enough, high)
+
+
+def lengths_at(
+    protocol: Protocol, study: StudySpec, source: Clip, destination: Clip, start: int, end: int
+) -> dict[str, BlendLength]:
+    """The blend length of each of a study's methods at two points."""
+    found: dict[str, BlendLength] = {}
+    for method in study.methods:
+        if method == "cut":
+            found[method] = BlendLength("cut", 0, 0.0, float("nan"))
+            continue
+        found[method] = blend_length(
+            source,
+            destination,
+            start,
+            end,
+            method=method,
+            fixed_frames=study.fixed_frames,
+            specification=protocol.stimuli.specification,
+            restrict=True,
+        )
+    return found
+
+
+def _given(
+    protocol: Protocol,
+    study: StudySpec,
+    transition: TransitionSpec,
+    points: Points,
+    source: Supply,
+    destination: Supply,
+) -> Settled:
+    """The points that the protocol gives, counted in the motion as the library supplies it."""
+    frames = []
+    for end, supply in (("source", source), ("destination", destination)):
+        seconds, frame = getattr(points, f"{end}_s"), getattr(points, f"{end}_frame")
+        given = round(seconds * protocol.fps) if frame is None else frame
+        at = given + supply.first
+        if not supply.first <= at < supply.stop:
+            raise StimulusError(
+                f"transition {transition.name!r}: expected {end}_frame from 0 to {supply.stop - supply.first - 1}, the "
+                f"frames of {supply.name!r}, found {given}; choose another point."
+            )
+        frames.append(at)
+    try:
+        lengths = lengths_at(protocol, study, source.clip, destination.clip, frames[0], frames[1])
+    except TransitionError as error:
+        raise StimulusError(f"transition {transition.name!r}: {error}") from error
+    shortest = lengths[study.reference].blend_frames + min((0, *study.differences_frames))
+    if study.differences_frames and shortest < 1:
+        raise StimulusError(
+            f"transition {transition.name!r}: a level below one frame: the {study.reference} blend here takes "
+            f"{lengths[study.reference].blend_frames} frames, the difference {min(study.differences_frames)} leaves "
+            f"{shortest}. Choose other points, or other differences_frames."
+        )
+    settled = Settled(transition, source, destination, frames[0], frames[1], lengths, 1)
+    if problem := _room_problem(protocol, study, settled):
+        raise StimulusError(f"transition {transition.name!r}: {problem}")
+    return settled
+
+
+def level_lengths(study: StudySpec, lengths: Mapping[str, BlendLength]) -> list[int]:
+    """All blend lengths that a study shows, in frames."""
+    own = [length.blend_frames for length in lengths.values()]
+    return own + [lengths[study.reference].blend_frames + d for d in study.differences_frames]
+
+
+def _room_problem(protocol: Protocol, study: StudySpec, settled: Settled) -> str:
+    """What is missing around given points for entry, the longest blend and exit; empty where nothing is."""
+    entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
+    longest = max(level_lengths(study, settled.lengths))
+    rooms = (
+        ("entry", entry, settled.start_frame, settled.source),
+        ("the longest blend", longest, settled.source.clip.frames - settled.start_frame, settled.source),
+        ("the longest blend", longest, settled.end_frame + 1, settled.destination),
+        ("exit", after, settled.destination.clip.frames - 1 - settled.end_frame, settled.destination),
+    )
+    return "; ".join(
+        f"expected {needed} frames for {what}, found {there} in {supply.name!r}: {needed - there} are missing"
+        for what, needed, there, supply in rooms
+        if there < needed
+    )
+
+
+def _drawn(
+    protocol: Protocol,
+    study: StudySpec,
+    transition: TransitionSpec,
+    points: Points,
+    source: Supply,
+    destination: Supply,
+) -> Settled:
+    """Pairs of frames at random, in the order drawn, until one meets the conditions."""
+    starts, ends = np.arange(*source.window), np.arange(*destination.window)
+    count = len(starts) * len(ends)
+    # The name alone, so that studies that share a transition and its conditions share its points and stimuli.
+    rng = generator(protocol.seed, "points", transition.name)
+    reasons: dict[str, int] = {}
+    seen: list[int] = []
+    for tried, draw in enumerate(rng.choice(count, size=min(count, CANDIDATES), replace=False), start=1):
+        start, end = int(starts[draw // len(ends)]), int(ends[draw % len(ends)])
+        lengths = lengths_at(protocol, study, source.clip, destination.clip, start, end)
+        seen.append(lengths[study.reference].blend_frames)
+        reason = _unmet(study, points, lengths)
+        settled = Settled(transition, source, destination, start, end, lengths, tried)
+        if not reason and _room_problem(protocol, study, settled):
+            reason = "no room for the longest blend"
+        if not reason:
+            return settled
+        reasons[reason] = reasons.get(reason, 0) + 1
+    raise StimulusError(_none_found(study, transition, reasons, seen))
+
+
+def _unmet(study: StudySpec, points: Points, lengths: Mapping[str, BlendLength]) -> str:
+    """The first condition that a drawn transition doesn't meet; empty where all are met."""
+    length = lengths[study.reference].blend_frames
+    if study.reference == "cut":
+        return ""
+    least = max(points.shortest_frames or 1, 1 - min((0, *study.differences_frames)))
+    if length < least:
+        return f"shorter than {least} frames"
+    if points.longest_frames is not None and length > points.longest_frames:
+        return f"longer than {points.longest_frames} frames"
+    if points.avoid_frames is not None and abs(length - points.avoid_frames) <= (points.avoid_within_frames or 0):
+        return f"within {points.avoid_within_frames or 0} frames of {points.avoid_frames}"
+    return ""
+
+
+def _none_found(study: StudySpec, transition: TransitionSpec, reasons: Mapping[str, int], seen: Sequence[int]) -> str:
+    counts = ", ".join(f"{number} {reason}" for reason, number in reasons.items())
+    return (
+        f"transition {transition.name!r}: expected points whose {study.reference} blend meets the conditions "
+        f"of the study {study.name!r}, found none among {len(seen)} drawn ({counts}; lengths from {min(seen)} to "
+        f"{max(seen)} frames). Widen the conditions, or choose other motions."
+    )

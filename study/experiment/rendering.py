@@ -1,0 +1,282 @@
+"""Rendering: a stimulus set to videos in a results folder, and the manifest that says what each one is.
+
+A `StimulusSet` and a folder come in; `protocol.toml`, `manifest.json` and `stimuli/<id>.mp4` go out. Every file is
+written under another name and renamed when it is whole, and the manifest is written again after every video, so work
+that was interrupted at any moment is taken up by calling `render` again: what is finished is checked and reused.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.errors import StimulusError
+from study.experiment.plan import Pair, pair_from_json
+from study.experiment.stimulus_set import Stimulus, StimulusRecord, StimulusSet, record_from_json
+
+if TYPE_CHECKING:
+    from renderer.jobs import Progress
+    from renderer.video import VideoInfo
+
+MANIFEST_VERSION = 1
+MANIFEST, PROTOCOL, STIMULI = "manifest.json", "protocol.toml", "stimuli"
+
+
+@dataclass(frozen=True)
+class RenderSummary:
+    """What was rendered: videos, frames and seconds in all; how many videos were made now and how many reused."""
+
+    videos: int
+    frames: int
+    seconds: float
+    rendered: int
+    reused: int
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The record of a results folder: what its stimuli are, and the pairs that are shown.
+
+    `videos` maps a stimulus id to what is known of its file (`file`, `frames_sha256`, `file_sha256`, `bytes`);
+    stimuli that are not rendered yet are missing from it.
+    """
+
+    folder: Path
+    protocol: str
+    protocol_sha256: str
+    library: str
+    synthetic: bool
+    acknowledgement: str
+    fps: float
+    size: tuple[int, int]
+    records: tuple[StimulusRecord, ...]
+    pairs: tuple[Pair, ...]
+    videos: Mapping[str, Mapping[str, Any]]
+    versions: Mapping[str, str]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every stimulus has its video."""
+        return all(record.id in self.videos for record in self.records)
+
+    def record(self, identifier: str) -> StimulusRecord:
+        """A stimulus by its id."""
+        for record in self.records:
+            if record.id == identifier:
+                return record
+        raise StimulusError(f"Expected the id of a stimulus in {self.folder / MANIFEST}, found {identifier!r}.")
+
+    def video(self, identifier: str) -> Path:
+        """The video of a stimulus."""
+        self.record(identifier)
+        if identifier not in self.videos:
+            raise StimulusError(f"Expected a video of {identifier} in {self.folder}, found none yet; render first.")
+        return self.folder / str(self.videos[identifier]["file"])
+
+
+def render(
+    stimulus_set: StimulusSet,
+    out: str | Path,
+    workers: int | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> RenderSummary:
+    """Render what is not rendered yet.
+
+    Parameters
+    ----------
+    stimulus_set
+        From `stimuli.prepare`.
+    out
+        The results folder; made where there is none.
+    workers
+        Processes; one a core by default.
+    progress
+        Called after every video with `renderer.jobs.Progress` (videos, frames, frames a second, seconds left).
+
+    Raises
+    ------
+    StimulusError
+        Where the folder belongs to another protocol or library, can't be written, or a video can't be made.
+    """
+    from renderer.errors import RendererError
+    from renderer.jobs import RenderJob, render_many
+
+    folder = Path(out)
+    try:
+        (folder / STIMULI).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StimulusError(
+            f"{folder}: expected a folder to write to, found {error.strerror}; name another."
+        ) from error
+    _claim(folder, stimulus_set)
+    videos = _finished(folder, stimulus_set)
+    reused = len(videos)
+    _write_manifest(folder, stimulus_set, videos)
+    todo = [stimulus for stimulus in stimulus_set.stimuli if stimulus.id not in videos]
+
+    def finished(state: Progress) -> None:
+        if state.last is not None:
+            videos[state.last.path.stem] = _video_entry(state.last)
+            _write_manifest(folder, stimulus_set, videos)
+        if progress:
+            progress(state)
+
+    jobs = [
+        RenderJob(
+            _path(folder, stimulus), stimulus.positions, stimulus.figure, stimulus.camera, stimulus_set.protocol.fps
+        )
+        for stimulus in todo
+    ]
+    try:
+        render_many(jobs, workers, finished)
+    except RendererError as error:
+        raise StimulusError(str(error)) from error
+    frames = sum(record.frames for record in stimulus_set.records)
+    return RenderSummary(len(videos), frames, frames / stimulus_set.protocol.fps, len(todo), reused)
+
+
+def _path(folder: Path, stimulus: Stimulus) -> Path:
+    return folder / STIMULI / f"{stimulus.id}.mp4"
+
+
+def _video_entry(video: VideoInfo) -> dict[str, Any]:
+    return {
+        "file": f"{STIMULI}/{video.path.name}",
+        "frames": video.frames,
+        "frames_sha256": video.frames_sha256,
+        "file_sha256": video.file_sha256,
+        "bytes": video.bytes,
+    }
+
+
+def _claim(folder: Path, stimulus_set: StimulusSet) -> None:
+    """Store the protocol's exact text, or refuse a folder that belongs to another protocol or library."""
+    protocol = stimulus_set.protocol
+    stored = folder / PROTOCOL
+    if stored.exists():
+        found = hashlib.sha256(stored.read_bytes()).hexdigest()
+        if found != protocol.sha256:
+            raise StimulusError(
+                f"{folder}: expected the results of {protocol.name!r} with sha256 {protocol.sha256[:12]}, found a "
+                f"protocol.toml with {found[:12]}; name another folder, or move this one away."
+            )
+    if (folder / MANIFEST).exists():
+        library = read_manifest(folder).library
+        if library != stimulus_set.library:
+            raise StimulusError(
+                f"{folder}: expected stimuli from the library {stimulus_set.library!r}, found some from {library!r}; "
+                "name another folder."
+            )
+    if not stored.exists():
+        write_whole(stored, protocol.text.encode())
+
+
+def _finished(folder: Path, stimulus_set: StimulusSet) -> dict[str, dict[str, Any]]:
+    """The videos that the manifest knows and that are still what they were."""
+    if not (folder / MANIFEST).exists():
+        return {}
+    known = read_manifest(folder).videos
+    return {
+        stimulus.id: dict(known[stimulus.id])
+        for stimulus in stimulus_set.stimuli
+        if stimulus.id in known and _is_whole(_path(folder, stimulus), known[stimulus.id])
+    }
+
+
+def _is_whole(path: Path, video: Mapping[str, Any]) -> bool:
+    try:
+        if path.stat().st_size != video["bytes"]:
+            return False
+        return hashlib.sha256(path.read_bytes()).hexdigest() == str(video["file_sha256"])
+    except OSError:
+        return False
+
+
+def _write_manifest(folder: Path, stimulus_set: StimulusSet, videos: Mapping[str, Mapping[str, Any]]) -> None:
+    protocol = stimulus_set.protocol
+    cameras = {
+        stimulus.record.group: {
+            "eye_m": stimulus.camera.eye.round(6).tolist(),
+            "axes": stimulus.camera.axes.round(9).tolist(),
+            "focal_pixels": round(stimulus.camera.focal_pixels, 6),
+        }
+        for stimulus in stimulus_set.stimuli
+    }
+    data = {
+        "version": MANIFEST_VERSION,
+        "protocol": protocol.name,
+        "title": protocol.title,
+        "protocol_sha256": protocol.sha256,
+        "library": stimulus_set.library,
+        "synthetic": stimulus_set.synthetic,
+        "acknowledgement": stimulus_set.acknowledgement,
+        "fps": protocol.fps,
+        "size": [protocol.stimuli.width, protocol.stimuli.height],
+        "style": protocol.stimuli.style,
+        "versions": dict(stimulus_set.versions),
+        "cameras": cameras,
+        "pairs": [asdict(pair) for pair in stimulus_set.pairs],
+        "stimuli": [{**asdict(record), "video": videos.get(record.id)} for record in stimulus_set.records],
+    }
+    write_whole(folder / MANIFEST, (json.dumps(data, indent=1) + "\n").encode())
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it is there whole, or not at all, at every moment."""
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with unfinished.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+    except OSError as error:
+        raise StimulusError(f"{path}: can't be written: {error.strerror}.") from error
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def read_manifest(folder: str | Path) -> Manifest:
+    """The manifest of a results folder.
+
+    Raises
+    ------
+    StimulusError
+        Where there is none, or it was written by a newer Segue.
+    """
+    folder = Path(folder)
+    path = folder / MANIFEST
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise StimulusError(f"{path}: expected the manifest of a results folder, found none; render first.") from error
+    except ValueError as error:
+        raise StimulusError(
+            f"{path}: expected JSON, found something else ({error}); render into a new folder."
+        ) from error
+    if data.get("version") != MANIFEST_VERSION:
+        raise StimulusError(
+            f"{path}: expected a manifest of version {MANIFEST_VERSION}, found {data.get('version')!r}; "
+            "use the Segue that wrote it, or render into a new folder."
+        )
+    videos = {entry["id"]: entry["video"] for entry in data["stimuli"] if entry["video"] is not None}
+    records = [{key: value for key, value in entry.items() if key != "video"} for entry in data["stimuli"]]
+    return Manifest(
+        folder=folder,
+        protocol=data["protocol"],
+        protocol_sha256=data["protocol_sha256"],
+        library=data["library"],
+        synthetic=data["synthetic"],
+        acknowledgement=data["acknowledgement"],
+        fps=data["fps"],
+        size=(data["size"][0], data["size"][1]),
+        records=tuple(record_from_json(record) for record in records),
+        pairs=tuple(pair_from_json(pair) for pair in data["pairs"]),
+        videos=videos,
+        versions=data["versions"],
+    )

@@ -1,0 +1,361 @@
+"""Stimuli: from a protocol and a library to all that participants see.
+
+A protocol and a library come in; a `StimulusSet` goes out: each stimulus is a blended transition, cut to entry, blend
+and exit, as joint positions with a figure and a camera. What is seen is hashed, and the hash is the stimulus's name,
+so a stimulus is rendered once and reused after. Nothing is drawn here; see `rendering`.
+
+One fixed camera serves a group (2004 section 4.1: groups of motions were shown from the same position). Transitions
+start over the same point with the same heading, so that it sees all of them from the same side, as near as may be.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import SegueError, StimulusError
+from study.experiment.plan import Pair
+from study.experiment.points import Settled, Supply, settle
+from study.experiment.protocol import Protocol, StudySpec
+from study.experiment.rendering import Manifest, RenderSummary, read_manifest, render
+from study.experiment.stimulus_set import MotionUse, Stimulus, StimulusRecord, StimulusSet
+from study.motion import quaternions as quat
+from study.motion.clip import Clip, joint_positions, trim
+from study.transitions.blending import Transition, blend, cut, facing
+from study.transitions.footskate import remove_foot_slide
+
+if TYPE_CHECKING:
+    from renderer.camera import Camera
+    from renderer.figure import Figure
+    from study.motion.library import Library
+
+__all__ = [
+    "Manifest",
+    "RenderSummary",
+    "Stimulus",
+    "StimulusRecord",
+    "StimulusSet",
+    "check",
+    "prepare",
+    "read_manifest",
+    "render",
+]
+
+FloatArray = NDArray[np.float64]
+
+LOOK_VERSION = 1
+"""Part of every stimulus's name: raised when the renderer comes to draw the same figure otherwise."""
+
+_TRAVELS_M = 0.5
+_LEG_SHARE = 0.491
+"""Hip to ankle over stature (Winter, Biomechanics and Motor Control of Human Movement, anthropometric table)."""
+
+
+@dataclass(frozen=True)
+class _Key:
+    """What makes two stimuli of one transition the same: points, method's blend length, and nothing else."""
+
+    transition: str
+    start_frame: int
+    end_frame: int
+    blend_frames: int
+    added: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class _Draft:
+    """A stimulus before it has a camera."""
+
+    settled: Settled
+    method: str
+    difference_frames: int
+    blend_frames: int
+    clip: Clip
+    blend: tuple[int, int]
+    positions: FloatArray
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _DraftPair:
+    study: StudySpec
+    settled: Settled
+    a: _Key
+    b: _Key | None
+    method_b: str
+    difference_frames: int | None
+
+
+def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None = None) -> StimulusSet:
+    """Build all stimuli of a protocol.
+
+    Parameters
+    ----------
+    protocol, library
+        What to show, and the motions to show it with.
+    progress
+        Called with transitions that are done and the number of them, after each.
+
+    Raises
+    ------
+    StimulusError
+        With everything that can't be shown, one problem a line.
+    """
+    settled, problems = _settle_all(protocol, library, progress)
+    if problems:
+        raise StimulusError("\n".join(problems))
+    drafts: dict[_Key, _Draft] = {}
+    pairs: list[_DraftPair] = []
+    for study in protocol.studies:
+        for transition in protocol.transitions_of(study):
+            pairs += _draft_pairs(protocol, study, settled[study.name, transition.name], drafts)
+    stimuli = _with_cameras(protocol, library, drafts)
+    return StimulusSet(
+        protocol,
+        library.name,
+        library.synthetic,
+        library.acknowledgement,
+        tuple({stimulus.id: stimulus for stimulus in stimuli.values()}.values()),
+        tuple(_pair(pair, stimuli) for pair in pairs),
+        versions(),
+    )
+
+
+def check(protocol: Protocol, library: Library) -> list[str]:
+    """Everything that can't be shown, one sentence each; empty where all can."""
+    return _settle_all(protocol, library, None)[1]
+
+
+def versions() -> dict[str, str]:
+    """What made the stimuli, for manifests."""
+    import scipy
+
+    import study
+
+    return {
+        "segue": study.__version__,
+        "look": str(LOOK_VERSION),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+    }
+
+
+def _settle_all(
+    protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None
+) -> tuple[dict[tuple[str, str], Settled], list[str]]:
+    """The points of every transition in every study, and the problems of those that have none."""
+    todo = [(study, transition) for study in protocol.studies for transition in protocol.transitions_of(study)]
+    settled: dict[tuple[str, str], Settled] = {}
+    problems: dict[str, None] = {}
+    for done, (study, transition) in enumerate(todo, start=1):
+        try:
+            settled[study.name, transition.name] = settle(protocol, study, transition, library)
+        except SegueError as error:
+            problems[str(error)] = None
+        if progress:
+            progress(done, len(todo))
+    return settled, list(problems)
+
+
+def _draft_pairs(
+    protocol: Protocol, study: StudySpec, settled: Settled, drafts: dict[_Key, _Draft]
+) -> Iterator[_DraftPair]:
+    """The pairs of one transition in one study; the stimuli that they need are added to `drafts`."""
+
+    def need(method: str, difference: int = 0) -> _Key:
+        frames = settled.lengths[method].blend_frames + difference
+        added = (settled.source.added_before, settled.destination.added_before)
+        key = _Key(settled.transition.name, settled.start_frame, settled.end_frame, frames, added)
+        if key not in drafts:
+            drafts[key] = _draft(protocol, settled, method, difference, frames)
+        return key
+
+    if study.task == "same-different":
+        for difference in study.differences_frames:
+            reference = need(study.reference)
+            yield _DraftPair(study, settled, reference, need(study.reference, difference), study.reference, difference)
+    elif study.task == "preference":
+        other = study.comparison or study.reference
+        yield _DraftPair(study, settled, need(study.reference), need(other), other, None)
+    else:
+        for method in study.methods:
+            yield _DraftPair(study, settled, need(method), None, method, None)
+
+
+def _draft(protocol: Protocol, settled: Settled, method: str, difference: int, blend_frames: int) -> _Draft:
+    """Blend, cut to entry and exit, clean the feet, and place at the origin with the common heading."""
+    made = _transition(protocol, settled, blend_frames)
+    entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
+    clip = trim(made.clip, made.blend_start - entry, made.blend_stop + after)
+    notes = [note for note in (made.note, settled.lengths[method].note) if note]
+    if protocol.stimuli.clean_feet and blend_frames:
+        cleaned = remove_foot_slide(clip, region=(entry, entry + blend_frames))
+        notes.append(
+            f"foot slide reduced from {100 * cleaned.slide_before_m:.1f} to {100 * cleaned.slide_after_m:.1f} cm"
+        )
+        clip = cleaned.clip
+    positions = _placed(joint_positions(clip, ends=True), protocol, settled)
+    return _Draft(
+        settled, method, difference, blend_frames, clip, (entry, entry + blend_frames), positions, tuple(notes)
+    )
+
+
+def _transition(protocol: Protocol, settled: Settled, blend_frames: int) -> Transition:
+    source, destination = settled.source.clip, settled.destination.clip
+    if blend_frames == 0:
+        return cut(source, destination, settled.start_frame, settled.end_frame)
+    return blend(
+        source,
+        destination,
+        settled.start_frame,
+        settled.end_frame,
+        blend_frames,
+        weight=protocol.stimuli.weight,
+        specification=protocol.stimuli.specification,
+    )
+
+
+def _placed(positions: FloatArray, protocol: Protocol, settled: Settled) -> FloatArray:
+    """Points with the pelvis over the origin where the blend starts, and the way of the transition along +Z.
+
+    The way is that of a blend of one frame whatever the length: entries are the same for all lengths and shall stay
+    so. Rounded to a tenth of a millimetre, so that the hash doesn't hang on the last bits of a machine's arithmetic.
+    """
+    made = _transition(protocol, settled, 1)
+    entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
+    path = made.clip.root_positions
+    way = path[made.blend_stop + after - 1] - path[made.blend_start - entry]
+    if np.hypot(way[0], way[2]) > _TRAVELS_M:
+        heading = float(np.arctan2(way[0], way[2]))
+    else:
+        heading = float(facing(trim(settled.source.clip, settled.start_frame, settled.start_frame + 1))[0])
+    floor = settled.source.clip.root_positions[settled.start_frame] * np.array([1.0, 0.0, 1.0])
+    return np.round(quat.rotate(quat.yaw(-heading), positions - floor), 4)
+
+
+def _with_cameras(protocol: Protocol, library: Library, drafts: dict[_Key, _Draft]) -> dict[_Key, Stimulus]:
+    """Figures, one camera a group, and names."""
+    from renderer.camera import frame_group
+    from renderer.errors import RendererError
+
+    settings = protocol.stimuli
+    groups: dict[str, list[_Key]] = {}
+    for key, draft in drafts.items():
+        groups.setdefault(_group(protocol, draft), []).append(key)
+    stimuli: dict[_Key, Stimulus] = {}
+    try:
+        for group, keys in groups.items():
+            camera = frame_group(
+                [drafts[key].positions for key in keys],
+                size=(settings.width, settings.height),
+                view=settings.view,
+                heading=0.0,
+            )
+            for key in keys:
+                stimuli[key] = _stimulus(protocol, library, drafts[key], group, camera)
+    except RendererError as error:
+        raise StimulusError(str(error)) from error
+    return {key: stimuli[key] for key in drafts}
+
+
+def _group(protocol: Protocol, draft: _Draft) -> str:
+    kind = protocol.stimuli.camera_group
+    if kind == "study":
+        return protocol.name
+    return draft.settled.transition.category if kind == "category" else draft.settled.transition.name
+
+
+def _stimulus(protocol: Protocol, library: Library, draft: _Draft, group: str, camera: Camera) -> Stimulus:
+    figure = _figure(protocol, draft.clip)
+    settled = draft.settled
+    record = StimulusRecord(
+        id=_content_hash(protocol.fps, draft.positions, figure, camera),
+        transition=settled.transition.name,
+        category=settled.transition.category,
+        method=draft.method,
+        optimal_frames=settled.lengths[draft.method].blend_frames,
+        difference_frames=draft.difference_frames,
+        blend_frames=draft.blend_frames,
+        frames=len(draft.positions),
+        blend_start=draft.blend[0],
+        blend_stop=draft.blend[1],
+        source=_use(settled.source, settled.start_frame),
+        destination=_use(settled.destination, settled.end_frame),
+        group=group,
+        synthetic=library.synthetic,
+        notes=draft.notes,
+    )
+    return Stimulus(record, draft.positions, figure, camera)
+
+
+def _use(supply: Supply, frame: int) -> MotionUse:
+    return MotionUse(
+        motion=supply.name,
+        file=supply.file,
+        frame=frame - supply.first,
+        frames=supply.stop - supply.first,
+        added_before=supply.added_before,
+        added_after=supply.added_after,
+        notes=(*supply.clip.history, *(note for note in supply.notes if note not in supply.clip.history)),
+    )
+
+
+def _figure(protocol: Protocol, clip: Clip) -> Figure:
+    from renderer.figure import make_figure
+
+    skeleton, colours = clip.skeleton, protocol.stimuli.colours
+    own = {side: _rgb(text) for side in ("left", "right", "centre") if (text := getattr(colours, side))}
+    return make_figure(
+        skeleton.bones,
+        skeleton.sides,
+        dict(skeleton.roles),
+        style=protocol.stimuli.style,
+        height_m=skeleton.leg_length / _LEG_SHARE,
+        colours=own,
+        background=_rgb(colours.background) if colours.background else None,
+    )
+
+
+def _rgb(text: str) -> tuple[int, int, int]:
+    red, green, blue = bytes.fromhex(text.removeprefix("#"))
+    return red, green, blue
+
+
+def _content_hash(fps: float, positions: FloatArray, figure: Figure, camera: Camera) -> str:
+    """Hash of all that is seen: points, figure, camera, size, frame rate and the renderer's look; 16 digits."""
+    digest = hashlib.sha256(f"look {LOOK_VERSION}; {fps:g} fps; {camera.size}; {figure.style}; ".encode())
+    digest.update(f"{figure.background}; {figure.lit}; {camera.track_seconds}; ".encode())
+    digest.update(np.round(positions * 1e4).astype("<i4").tobytes())
+    for array in (figure.ends, figure.along, figure.beyond, figure.radii, figure.colours):
+        digest.update(np.round(np.asarray(array, dtype=np.float64) * 1e6).astype("<i8").tobytes())
+    for array in (camera.eye, camera.axes, np.array([camera.focal_pixels])):
+        digest.update(np.round(array * 1e5).astype("<i8").tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _pair(draft: _DraftPair, stimuli: dict[_Key, Stimulus]) -> Pair:
+    study, transition = draft.study, draft.settled.transition
+    name = f"{study.name}/{transition.name}"
+    if study.task == "same-different":
+        name += f"/{draft.difference_frames:+d}"
+    elif study.task == "rating":
+        name += f"/{draft.method_b}"
+    return Pair(
+        name=name,
+        study=study.name,
+        task=study.task,
+        motion=transition.name,
+        category=transition.category,
+        a=stimuli[draft.a].id,
+        b="" if draft.b is None else stimuli[draft.b].id,
+        method_a=draft.method_b if study.task == "rating" else study.reference,
+        method_b="" if study.task == "rating" else draft.method_b,
+        difference_frames=draft.difference_frames,
+    )
