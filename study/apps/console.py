@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -30,23 +29,10 @@ def library_option(command: Command) -> Command:
 
 
 def emit(result: Mapping[str, Any], as_json: bool, text: str) -> None:
-    """Prints a verb's result: the mapping as JSON, or the text."""
+    """Prints a verb's result: the mapping as JSON (numbers that are not finite become null), or the text."""
+    from study.analysis.estimates import plain
+
     click.echo(json.dumps(plain(result), indent=2, allow_nan=False) if as_json else text)
-
-
-def plain(value: Any) -> Any:  # noqa: ANN401 - JSON values are of any type
-    """A value as JSON has it: arrays become lists, paths become text, numbers that are not finite become null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, str | int):
-        return value
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    return str(value)
 
 
 def say(message: str) -> None:
@@ -55,30 +41,30 @@ def say(message: str) -> None:
 
 
 @contextmanager
-def progress(label: str, total: int) -> Iterator[Callable[[int, str], None]]:
-    """A progress bar on standard error; gives a function of (how many are done, a few words such as "310 frames/s").
+def progress(label: str) -> Iterator[Callable[[float, str], None]]:
+    """A progress bar on standard error; gives a function of (the share that is done, a few words such as "3 of 7").
 
-    Where standard error is not a terminal, a line at each tenth takes the bar's place, so that logs stay short.
+    Where standard error is not a terminal, a line at each quarter takes the bar's place, so that logs stay short.
     """
     if not sys.stderr.isatty():
-        last = -1
+        shown = -1
 
-        def report(done: int, words: str) -> None:
-            nonlocal last
-            tenth = 10 * done // max(total, 1)
-            if tenth != last:
-                last = tenth
-                say(f"{label}: {done} of {total}{f', {words}' if words else ''}")
+        def report(share: float, words: str) -> None:
+            nonlocal shown
+            if int(4 * share) != shown:
+                shown = int(4 * share)
+                say(f"{label}: {words}")
 
         yield report
         return
-    state = {"words": ""}
+    words_now = [""]
+    steps = 1000
     with click.progressbar(
-        length=total, label=label, file=sys.stderr, show_eta=True, show_pos=True, item_show_func=lambda _: state["words"]
+        length=steps, label=label, file=sys.stderr, show_eta=True, item_show_func=lambda _: words_now[0]
     ) as bar:
 
-        def advance(done: int, words: str) -> None:
-            state["words"] = words
-            bar.update(done - bar.pos, None)
+        def advance(share: float, words: str) -> None:
+            words_now[0] = words
+            bar.update(round(steps * share) - bar.pos)
 
         yield advance

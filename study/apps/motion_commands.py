@@ -37,7 +37,9 @@ def list_motions(library: str | None, as_json: bool) -> None:
 
 @motions.command()
 @click.argument("file", type=EXISTING)
-@click.option("--metres-per-unit", type=click.FloatRange(min=0, min_open=True), help="The file's length unit, in metres.")
+@click.option(
+    "--metres-per-unit", type=click.FloatRange(min=0, min_open=True), help="The file's length unit, in metres."
+)
 @click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, where the file does not say it.")
 @json_option
 def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
@@ -89,4 +91,54 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 
     files = [download_trial(trial, out) for trial in trials]
     say(CMU_ACKNOWLEDGEMENT)
-    emit({"files": [str(file) for file in files], "acknowledgement": CMU_ACKNOWLEDGEMENT}, as_json, "\n".join(map(str, files)))
+    emit(
+        {"files": [str(file) for file in files], "acknowledgement": CMU_ACKNOWLEDGEMENT},
+        as_json,
+        "\n".join(map(str, files)),
+    )
+
+
+@click.command()
+@click.argument("clip", metavar="FILE|NAME")
+@library_option
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.mp4, or X.png: a strip.")
+@click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video; the clip's own unless given.")
+@click.option(
+    "--view", type=click.Choice(["front", "side", "three-quarter"]), default="three-quarter", show_default=True
+)
+@click.option("--style", type=click.Choice(["stick", "points", "mannequin"]), default="stick", show_default=True)
+@click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Of the video, in pixels.")
+@click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Of the strip.")
+@click.option("--track", is_flag=True, help="Let the camera travel with the figure.")
+@json_option
+def preview(
+    clip: str,
+    library: str | None,
+    out: Path,
+    fps: float | None,
+    view: str,
+    style: str,
+    size: str,
+    poses: int,
+    track: bool,
+    as_json: bool,
+) -> None:
+    """One clip as a video, or as a strip of poses in one picture."""
+    from study.apps.clips import load_clip
+    from study.experiment.drawing import draw_clip
+
+    width, _, height = size.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise click.UsageError(f"expected --size as WIDTHxHEIGHT such as 640x480, found {size!r}.")
+    shown = load_clip(clip, library, fps)
+    draw_clip(
+        shown,
+        out,
+        size=(int(width), int(height)),
+        view=view,
+        style=style,
+        poses=poses,
+        track_seconds=1.0 if track else None,
+    )
+    result = {"file": str(out), "frames": shown.frames, "fps": shown.fps, "history": list(shown.history)}
+    emit(result, as_json, f"{out}: {shown.name or clip}, {shown.frames} frames at {shown.fps:g} fps")

@@ -107,16 +107,8 @@ def render(
     from renderer.jobs import RenderJob, render_many
 
     folder = Path(out)
-    try:
-        (folder / STIMULI).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StimulusError(
-            f"{folder}: expected a folder to write to, found {error.strerror}; name another."
-        ) from error
-    _claim(folder, stimulus_set)
-    videos = _finished(folder, stimulus_set)
+    videos = record(stimulus_set, folder)
     reused = len(videos)
-    _write_manifest(folder, stimulus_set, videos)
     todo = [stimulus for stimulus in stimulus_set.stimuli if stimulus.id not in videos]
 
     def finished(state: Progress) -> None:
@@ -138,6 +130,32 @@ def render(
         raise StimulusError(str(error)) from error
     frames = sum(record.frames for record in stimulus_set.records)
     return RenderSummary(len(videos), frames, frames / stimulus_set.protocol.fps, len(todo), reused)
+
+
+def record(stimulus_set: StimulusSet, out: str | Path) -> dict[str, dict[str, Any]]:
+    """Make a results folder's record of its stimuli (protocol and manifest) without rendering any.
+
+    Returns
+    -------
+    dict
+        The videos that are there already, by stimulus id, as the manifest describes them.
+
+    Raises
+    ------
+    StimulusError
+        Where the folder belongs to another protocol or library, or can't be written.
+    """
+    folder = Path(out)
+    try:
+        (folder / STIMULI).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StimulusError(
+            f"{folder}: expected a folder to write to, found {error.strerror}; name another."
+        ) from error
+    _claim(folder, stimulus_set)
+    videos = _finished(folder, stimulus_set)
+    _write_manifest(folder, stimulus_set, videos)
+    return videos
 
 
 def _path(folder: Path, stimulus: Stimulus) -> Path:

@@ -1,0 +1,221 @@
+"""The verbs of a study's life: check, render, simulate, analyse, report, export, and demo, which does them all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.console import emit, json_option, library_option, progress, say
+
+if TYPE_CHECKING:
+    from study.experiment.protocol import Protocol
+    from study.experiment.stimulus_set import StimulusSet
+
+RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
+OUT = click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=None,
+    help="Results folder; results/<name of the protocol> unless given.",
+)
+WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes; one a core unless given.")
+
+
+def load(protocol: str) -> Protocol:
+    """A protocol by path, or by the name of one that comes with Segue."""
+    from study.experiment.protocol import find_protocol, load_protocol
+
+    return load_protocol(find_protocol(protocol))
+
+
+def results_folder(protocol: Protocol, out: Path | None) -> Path:
+    """Where a run of a protocol goes."""
+    return out if out is not None else Path("results") / protocol.name
+
+
+def prepare_stimuli(protocol: Protocol, library: str | None) -> StimulusSet:
+    """All stimuli of a protocol, with progress on standard error."""
+    from study.experiment.stimuli import prepare
+    from study.motion.library import open_library
+
+    opened = open_library(library or "synthetic")
+    with progress("transitions") as report:
+        return prepare(protocol, opened, lambda done, total: report(done / total, f"{done} of {total}"))
+
+
+def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> dict[str, Any]:
+    """Render what is not rendered yet, with progress on standard error; the numbers for `--json`."""
+    from dataclasses import asdict
+
+    from study.experiment.rendering import render as render_all
+
+    with progress("videos") as report:
+        summary = render_all(
+            stimuli, folder, workers, lambda state: report(state.videos / max(state.videos_total, 1), str(state))
+        )
+    return {**asdict(summary), "folder": str(folder)}
+
+
+def simulate_participants(protocol: Protocol, folder: Path, participants: int, seed: int) -> dict[str, Any]:
+    """Simulated sessions on the stimuli of a results folder; the numbers for `--json`."""
+    from dataclasses import asdict
+
+    from study.experiment.observers import simulate as simulate_all
+    from study.experiment.rendering import read_manifest
+    from study.experiment.responses import open_responses
+
+    manifest = read_manifest(folder)
+    with open_responses(folder) as responses, progress("answers") as report:
+        summary = simulate_all(
+            protocol,
+            manifest,
+            responses,
+            participants,
+            seed,
+            lambda done, total: report(done / max(total, 1), f"{done} of {total}"),
+        )
+    return {**asdict(summary), "folder": str(folder), "simulated": True}
+
+
+def analyse_results(folder: Path) -> dict[str, Any]:
+    """All analyses of a results folder, as its protocol decided."""
+    from study.analysis.summary import analyse as analyse_all
+    from study.experiment.protocol import load_protocol
+    from study.experiment.rendering import PROTOCOL
+    from study.experiment.responses import answers_frame, open_responses
+
+    settings = load_protocol(folder / PROTOCOL).analysis
+    with open_responses(folder) as responses:
+        answers = answers_frame(responses)
+    return analyse_all(answers, threshold=settings.threshold, alpha=settings.alpha)
+
+
+def headlines(analysis: dict[str, Any]) -> list[str]:
+    """The answers of an analysis in sentences."""
+    sentences = [study["words"] for study in analysis["jnd"].values()]
+    sentences += [compared["words"] for study in analysis["preference"].values() for compared in study]
+    return sentences
+
+
+@click.command()
+@click.argument("protocol")
+@library_option
+@json_option
+def check(protocol: str, library: str | None, as_json: bool) -> None:
+    """Everything that would go wrong later, now. Exit status 2 where something can't be shown."""
+    from study.experiment.stimuli import check as problems_of
+    from study.motion.library import open_library
+
+    checked, opened = load(protocol), open_library(library or "synthetic")
+    problems = problems_of(checked, opened)
+    text = "\n".join(problems) or f"{checked.name}: all that it shows can be shown with the library {opened.name}."
+    emit({"protocol": checked.name, "library": opened.name, "problems": problems}, as_json, text)
+    if problems:
+        raise click.exceptions.Exit(2)
+
+
+@click.command()
+@click.argument("protocol")
+@library_option
+@OUT
+@WORKERS
+@json_option
+def render(protocol: str, library: str | None, out: Path | None, workers: int | None, as_json: bool) -> None:
+    """Render all stimuli of a protocol; what is rendered already is reused, so an interrupted run goes on."""
+    checked = load(protocol)
+    summary = render_stimuli(prepare_stimuli(checked, library), results_folder(checked, out), workers)
+    text = (
+        f"{summary['folder']}: {summary['videos']} videos, {summary['frames']} frames, {summary['seconds']:.0f} s of "
+        f"motion; {summary['rendered']} rendered now, {summary['reused']} reused"
+    )
+    emit(summary, as_json, text)
+
+
+@click.command()
+@click.argument("protocol")
+@click.option("--participants", type=click.IntRange(min=1), required=True, help="How many there should be in the end.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the observers' chance.")
+@library_option
+@OUT
+@json_option
+def simulate(protocol: str, participants: int, seed: int, library: str | None, out: Path | None, as_json: bool) -> None:
+    """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
+    from study.experiment.rendering import MANIFEST, record
+
+    checked = load(protocol)
+    folder = results_folder(checked, out)
+    if library is not None or not (folder / MANIFEST).exists():
+        record(prepare_stimuli(checked, library), folder)
+    summary = simulate_participants(checked, folder, participants, seed)
+    text = (
+        f"{summary['folder']}: {summary['participants']} simulated participants, "
+        f"{summary['answers']} answers made now, {summary['found']} found"
+    )
+    emit(summary, as_json, text)
+
+
+@click.command()
+@click.argument("results", type=RESULTS)
+@json_option
+def analyse(results: Path, as_json: bool) -> None:
+    """Thresholds, preferences and ratings of a results folder."""
+    analysis = analyse_results(results)
+    emit(analysis, as_json, "\n".join(headlines(analysis)))
+
+
+@click.command()
+@click.argument("results", type=RESULTS)
+@json_option
+def report(results: Path, as_json: bool) -> None:
+    """One self-contained HTML page, and its tables as CSV and JSON."""
+    from study.report.document import write_report
+
+    page = write_report(results)
+    emit({"report": str(page)}, as_json, str(page))
+
+
+@click.command()
+@click.argument("results", type=RESULTS)
+@click.option("--to", "kind", type=click.Choice(["csv"]), default="csv", show_default=True)
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="File; RESULTS/answers.csv unless given.")
+@json_option
+def export(results: Path, kind: str, out: Path | None, as_json: bool) -> None:
+    """All answers as a table for other programs."""
+    from study.experiment.responses import export_csv, open_responses
+
+    del kind  # one so far
+    with open_responses(results) as responses:
+        file = export_csv(responses, out or results / "answers.csv")
+    emit({"file": str(file)}, as_json, str(file))
+
+
+@click.command()
+@OUT
+@WORKERS
+@click.option("--participants", type=click.IntRange(min=1), default=12, show_default=True, help="Simulated.")
+@json_option
+def demo(out: Path | None, workers: int | None, participants: int, as_json: bool) -> None:
+    """A small study end to end, with no screen and no network: stimuli, simulated observers, analysis, report."""
+    from study.report.document import write_report
+
+    protocol = load("demo")
+    folder = results_folder(protocol, out)
+    say("A small study on synthetic motions, answered by simulated observers; real ones take their place later.")
+    rendered = render_stimuli(prepare_stimuli(protocol, None), folder, workers)
+    simulated = simulate_participants(protocol, folder, participants, seed=0)
+    analysis = analyse_results(folder)
+    page = write_report(folder)
+    lines = [
+        f"{rendered['videos']} stimulus videos ({rendered['frames']} frames) in {folder / 'stimuli'}",
+        f"{simulated['answers'] + simulated['found']} answers of {participants} simulated participants "
+        f"in {folder / 'responses.sqlite'}",
+        *headlines(analysis),
+        f"The report: {page.resolve()}",
+    ]
+    emit(
+        {"render": rendered, "simulate": simulated, "analysis": analysis, "report": str(page)},
+        as_json,
+        "\n".join(lines),
+    )
