@@ -245,15 +245,46 @@ class _Parts:
 
 def _stick(body: _Body, paint: Mapping[str, RGB], background: RGB) -> Figure:
     made = _Parts()
-    head = body.parts.get("head")
+    hidden = _below(body, "head", "wrist.L", "wrist.R")
     for start, end in body.bones.tolist():
-        if start == head:
-            continue  # the head itself covers its bone
+        if start in hidden:
+            continue  # the head covers its bone, and a hand is one piece
         role, _ = body.role_of(start)
         first, second = _STICK_RADII.get(role, (0.032, 0.028))
         made.add((start, end), (first * body.scale, second * body.scale), paint[body.side_of(start, end)])
+    for side, name in (("L", "left"), ("R", "right")):
+        _add_hand(made, body, f"wrist.{side}", paint[name])
     _add_head(made, body, paint["centre"])
     return made.figure("stick", len(body.sides), background, lit=True)
+
+
+def _below(body: _Body, *roles: str) -> set[int]:
+    """The joints with these roles, and all that hang on them."""
+    found = {body.parts[role] for role in roles if role in body.parts}
+    grown = True
+    while grown:
+        more = {int(child) for parent, child in body.bones if int(parent) in found} - found
+        found |= more
+        grown = bool(more)
+    return found
+
+
+def _add_hand(made: _Parts, body: _Body, wrist: str, colour: RGB) -> None:
+    """One capsule from the wrist to the tip of the longest chain of bones on it: the fingers are held together."""
+    if wrist not in body.parts:
+        return
+    children: dict[int, list[int]] = {}
+    for parent, child in body.bones.tolist():
+        children.setdefault(parent, []).append(child)
+
+    def longest(point: int) -> list[int]:
+        chains = [longest(child) for child in children.get(point, [])]
+        return [point, *max(chains, key=len, default=[])]
+
+    tip = longest(body.parts[wrist])[-1]
+    if tip != body.parts[wrist]:
+        first, second = _STICK_RADII["wrist"]
+        made.add((body.parts[wrist], tip), (first * body.scale, second * body.scale), colour)
 
 
 def _add_head(made: _Parts, body: _Body, colour: RGB) -> None:

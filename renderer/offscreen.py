@@ -28,6 +28,7 @@ from renderer.painter import Painter
 from renderer.shapes import Shapes, lay_out
 
 Bytes = NDArray[np.uint8]
+Box = tuple[int, int, int, int]
 BATCH = 16
 
 
@@ -74,8 +75,8 @@ def render_frames(
     RendererError
         For positions that are not finite, no frames, or another size than the camera's.
     """
-    for canvas_frame in paste_frames(positions, figure, camera, size, batch, context, fps):
-        yield canvas_frame.copy()
+    for frame, _ in paste_frames(positions, figure, camera, size, batch, context, fps):
+        yield frame.copy()
 
 
 def render_rgb(
@@ -128,8 +129,11 @@ def paste_frames(
     batch: int,
     context: Context | None,
     fps: float = 30.0,
-) -> Iterator[Bytes]:
-    """The frames of `render_frames`, each in the *same* array: to be used up before the next one is asked for."""
+) -> Iterator[tuple[Bytes, Box]]:
+    """The frames of `render_frames`, each in the *same* array: to be used up before the next one is asked for.
+
+    With each comes the box (left, top, right, bottom) outside which it is the background.
+    """
     points = check_positions(positions)
     if size is not None and check_size(size) != camera.size:
         raise RendererError(f"Expected the size that the camera was made for, {camera.size}, got {tuple(size)}.")
@@ -145,7 +149,7 @@ def paste_frames(
             tiles = atlas.draw(first, min(first + batch, len(points)))
             for tile in tiles:
                 _put(canvas, camera.size[1], tile)
-                yield canvas
+                yield canvas, tile.box
                 _put_back(canvas, background, camera.size[1], tile)
     finally:
         atlas.release()
@@ -159,6 +163,12 @@ class Tile:
     top: int
     luma: Bytes
     chroma: Bytes
+
+    @property
+    def box(self) -> Box:
+        """Left, top, right and bottom edge in the frame."""
+        rows, columns = self.luma.shape
+        return self.left, self.top, self.left + columns, self.top + rows
 
 
 def _put(canvas: Bytes, height: int, tile: Tile) -> None:

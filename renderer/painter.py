@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import RendererError
-from renderer.shapes import EDGE_PIXELS, FLOATS
+from renderer.shapes import FLOATS
 
 TARGETS = ("luma", "chroma", "rgb")
 
+# Pixels beyond a capsule that its smooth edge touches: half of one, or of a sample of two pixels that lies half a pixel
+# aside, and something for the rounding of the corners.
+_EDGE = {"luma": 0.75, "chroma": 1.75, "rgb": 0.75}
+
 # The light: how much brighter in the middle, towards the light (screen axes, y down), and darker at the rim.
 _CONSTANTS = {
-    "EDGE": EDGE_PIXELS,
     "LIGHT_BASE": 0.12,
     "LIGHT_X": -0.10,
     "LIGHT_Y": -0.20,
@@ -110,6 +113,7 @@ def _compile(gl: Any, target: str) -> Any:
     # `precise` came with GLSL 4.00. Mesa's software renderers never fuse, so 3.30 gives the same pixels there.
     version, precise = ("400", "precise") if gl.version_code >= 400 else ("330", "")
     head = f"#version {version}\n#define PRECISE {precise}\n#define {target.upper()} 1\n"
+    head += f"#define EDGE {_EDGE[target]}\n"
     head += "".join(f"#define {name} ({value!r})\n" for name, value in _CONSTANTS.items())
     folder = resources.files("renderer.shaders")
     vertex, fragment = ((folder / f"capsule.{kind}").read_text(encoding="utf-8") for kind in ("vert", "frag"))

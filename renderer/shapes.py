@@ -9,7 +9,7 @@ not by the middles of bones: else a long limb would jump before another while bo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,8 @@ FloatArray = NDArray[np.float64]
 FLOATS = 16
 """Numbers that the shader takes for each capsule; see `lay_out`."""
 
-# Pixels around a capsule that its smooth edge may touch: one for luma, three for the half-size chroma.
-EDGE_PIXELS = 3.0
+# Pixels around a capsule that its smooth edge may touch, in luma or in the half-size chroma.
+EDGE_PIXELS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,9 @@ def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 
     """Capsules on the screen, sorted from the back to the front; `fps` matters to a camera that tracks."""
     if camera.track_seconds is not None:
         positions = positions - smooth_path(positions, camera.track_seconds, fps)[:, None]
-    ends, nearness = project(camera, place(figure, positions))
+    placed = place(figure, positions)
+    figure, placed = _without_hidden(figure, placed)
+    ends, nearness = project(camera, placed)
     # Rounded to 1/256 pixel, as far as the eye goes; what remains of a difference in the last bit of a sine between
     # two machines is rounded away too.
     ends = np.round(ends * 256.0) / 256.0
@@ -59,6 +61,20 @@ def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 
     data = _shader_numbers(ends, radii, figure)
     data = np.take_along_axis(data, order[..., None], axis=1)
     return Shapes(data, _boxes(ends, radii))
+
+
+def _without_hidden(figure: Figure, placed: FloatArray) -> tuple[Figure, FloatArray]:
+    """Leave out bones that have no length in any frame and hang on a bone that has: nobody would see them.
+
+    Rigs are full of them (an offset of zero from the pelvis to both hips), and each costs as much as a limb.
+    """
+    way = np.abs(placed[:, :, 1] - placed[:, :, 0]).max(axis=(0, 2))
+    long = way > 1e-6
+    hidden = ~long & (joined(figure) & long[None]).any(axis=1)
+    if not hidden.any():
+        return figure, placed
+    kept = {name: getattr(figure, name)[~hidden] for name in ("ends", "along", "beyond", "radii", "colours")}
+    return replace(figure, **kept), placed[:, ~hidden]
 
 
 def joined(figure: Figure) -> NDArray[np.bool_]:
@@ -114,19 +130,40 @@ def paint_order(
     """
     frames, count = ends.shape[:2]
     middle = nearness.sum(axis=2)
-    if count == 1:
-        return np.zeros((frames, 1), dtype=np.int64)
-    one, two = np.triu_indices(count, k=1)
-    s, t, gap = nearest_on_screen(ends[:, one], ends[:, two])
-    near_one = nearness[:, one, 0] + s * (nearness[:, one, 1] - nearness[:, one, 0])
-    near_two = nearness[:, two, 0] + t * (nearness[:, two, 1] - nearness[:, two, 0])
-    ahead = near_two - near_one
-    ahead = np.where(meets[one, two] | (ahead == 0.0), middle[:, two] - middle[:, one], ahead)
-    touch = gap < radii[:, one].max(axis=2) + radii[:, two].max(axis=2) + 2.0
     behind = np.zeros((frames, count, count), dtype=bool)
-    behind[:, one, two] = touch & (ahead >= 0.0)
-    behind[:, two, one] = touch & (ahead < 0.0)
+    one, two = np.triu_indices(count, k=1)
+    apart = ~meets[one, two]
+    near, far = one[~apart], two[~apart]
+    behind[:, near, far] = middle[:, far] >= middle[:, near]
+    behind[:, far, near] = ~behind[:, near, far]
+    one, two = one[apart], two[apart]
+    frame, pair = np.nonzero(_boxes_overlap(ends, radii, one, two))
+    one, two = one[pair], two[pair]
+    s, t, gap = nearest_on_screen(ends[frame, one], ends[frame, two])
+    ahead = _between(nearness[frame, two], t) - _between(nearness[frame, one], s)
+    ahead = np.where(ahead == 0.0, middle[frame, two] - middle[frame, one], ahead)
+    touch = gap < radii[frame, one].max(axis=1) + radii[frame, two].max(axis=1) + 2.0
+    behind[frame, one, two] = touch & (ahead >= 0.0)
+    behind[frame, two, one] = touch & (ahead < 0.0)
     return _topological(behind, middle)
+
+
+def _between(ends: FloatArray, share: FloatArray) -> FloatArray:
+    between: FloatArray = ends[:, 0] + share * (ends[:, 1] - ends[:, 0])
+    return between
+
+
+def _boxes_overlap(
+    ends: FloatArray, radii: FloatArray, one: NDArray[np.int64], two: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Which pairs might touch, by the boxes around them: most do not, and need no closer look."""
+    reach = radii.max(axis=2)[..., None] + 1.0
+    low, high = ends.min(axis=2) - reach, ends.max(axis=2) + reach
+    overlap: NDArray[np.bool_] = np.ones((len(ends), len(one)), dtype=bool)
+    for axis in (0, 1):
+        overlap &= low[:, one, axis] < high[:, two, axis]
+        overlap &= low[:, two, axis] < high[:, one, axis]
+    return overlap
 
 
 def _topological(behind: NDArray[np.bool_], middle: FloatArray) -> NDArray[np.int64]:

@@ -23,7 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.camera import Camera, check_size
+from renderer.colour import to_ycbcr
 from renderer.context import Context
+from renderer.digest import Box, FramesHash
 from renderer.errors import RendererError
 from renderer.figure import Figure
 from renderer.files import whole_file
@@ -48,7 +50,7 @@ class VideoInfo:
     width, height
         Pixels.
     frames_sha256
-        SHA-256 of all raw NV12 frames, one after the other, in hexadecimal.
+        Hash of all raw NV12 frames, as `renderer.digest` takes it, in hexadecimal.
     file_sha256
         SHA-256 of the file.
     bytes
@@ -125,8 +127,9 @@ def render_video(
         For input that can't be drawn, a folder that can't be written, a full disk, a missing encoder. Nothing is then
         left under `path`, but for what was there before.
     """
-    frames = paste_frames(positions, figure, camera, size, batch, context, fps=float(fps))
-    return write_video(path, frames, size=camera.size, fps=fps, preset=preset, crf=crf)
+    frames = paste_frames(positions, figure, camera, size, batch, context, fps=float(frame_rate(fps)))
+    luma, blue, red = (round(value) for value in to_ycbcr(figure.background))
+    return _write(path, frames, (luma, blue, red), size=camera.size, fps=fps, preset=preset, crf=crf)
 
 
 def write_video(
@@ -138,7 +141,24 @@ def write_video(
     preset: str = "veryfast",
     crf: int = 16,
 ) -> VideoInfo:
-    """Encode NV12 frames `(height * 3 / 2, width)`; each array may be reused once the next is asked for."""
+    """Encode NV12 frames `(height * 3 / 2, width)`; each array may be reused once the next is asked for.
+
+    The other arguments, and what is raised and returned: as for `render_video`.
+    """
+    return _write(path, ((frame, None) for frame in frames), None, size=size, fps=fps, preset=preset, crf=crf)
+
+
+def _write(
+    path: Path | str,
+    frames: Iterable[tuple[NDArray[np.uint8], Box | None]],
+    ground: tuple[int, int, int] | None,
+    *,
+    size: tuple[int, int],
+    fps: float | Fraction,
+    preset: str,
+    crf: int,
+) -> VideoInfo:
+    """Encode frames that come with the box outside which they are ground."""
     width, height = check_size(size)
     rate = frame_rate(fps)
     if preset not in PRESETS:
@@ -148,24 +168,22 @@ def write_video(
     target = Path(path)
     if target.suffix.lower() != ".mp4":
         raise RendererError(f"Expected a video's name to end in .mp4, got {target.name!r}.")
-    digest = hashlib.sha256()
-    count = 0
+    digest = FramesHash((width, height))
     with whole_file(target) as unfinished, _encoder(unfinished, (width, height), rate, preset, crf) as encode:
-        for frame in frames:
+        for frame, touched in frames:
             if frame.shape != (height * 3 // 2, width) or frame.dtype != np.uint8:
                 raise RendererError(
                     f"Expected NV12 frames of uint8 {(height * 3 // 2, width)}, got {frame.dtype} {frame.shape}."
                 )
-            digest.update(frame.data)
+            digest.update(frame, touched, ground)
             encode(frame)
-            count += 1
-        if count == 0:
+        if digest.frames == 0:
             raise RendererError(f"Expected at least one frame for {target.name}, got none.")
     return VideoInfo(
         target,
-        count,
+        digest.frames,
         str(rate),
-        float(count / rate),
+        float(digest.frames / rate),
         width,
         height,
         digest.hexdigest(),

@@ -1,0 +1,76 @@
+"""A hash of raw frames: NV12 frames in, one SHA-256 out, the same whoever encodes them and however.
+
+Hashing every byte would cost as much as drawing, and most bytes are background. So the hash covers a shorter form
+that says as much: the frame's size, the ground (the colours of the first frame's top left corner), and for each plane
+of each frame the smallest box outside which everything is ground, with its place and its bytes. Frames that are equal
+give equal forms, and frames that differ in one byte give different ones.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Box = tuple[int, int, int, int]
+
+FORM = b"segue frames 1"
+
+
+class FramesHash:
+    """SHA-256 over frames that arrive one after the other."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._width, self._height = size
+        self._sha = hashlib.sha256(FORM + np.array(size, dtype="<i8").tobytes())
+        self._ground: tuple[int, int] | None = None
+        self.frames = 0
+
+    def update(self, frame: Bytes, touched: Box | None = None, ground: tuple[int, int, int] | None = None) -> None:
+        """Take the next frame.
+
+        Parameters
+        ----------
+        frame : (height * 3 / 2, width)
+            NV12.
+        touched, ground
+            A shortcut, which does not change the hash: left, top, right and bottom (even numbers) of a box outside
+            which the frame is known to be of this luma and chroma.
+        """
+        luma, chroma = frame[: self._height], frame[self._height :].view("<u2")
+        if self._ground is None:
+            self._ground = (int(luma[0, 0]), int(chroma[0, 0]))
+            self._sha.update(np.array(self._ground, dtype="<i8").tobytes())
+        if touched is None or ground is None or (ground[0], ground[1] + 256 * ground[2]) != self._ground:
+            touched = (0, 0, self._width, self._height)
+        left, top, right, bottom = touched
+        self._plane(luma, self._ground[0], (left, top, right, bottom))
+        self._plane(chroma, self._ground[1], (left // 2, top // 2, right // 2, bottom // 2))
+        self.frames += 1
+
+    def _plane(self, plane: NDArray[np.unsignedinteger], ground: int, within: Box) -> None:
+        left, top, right, bottom = within
+        differs = plane[top:bottom, left:right] != ground
+        rows = np.flatnonzero(differs.any(axis=1))
+        if not len(rows):
+            self._sha.update(np.zeros(4, dtype="<i8").tobytes())
+            return
+        columns = np.flatnonzero(differs.any(axis=0))
+        box = (left + columns[0], top + rows[0], left + columns[-1] + 1, top + rows[-1] + 1)
+        self._sha.update(np.array(box, dtype="<i8").tobytes())
+        self._sha.update(np.ascontiguousarray(plane[box[1] : box[3], box[0] : box[2]]).view(np.uint8).data)
+
+    def hexdigest(self) -> str:
+        """The hash of the frames so far."""
+        return self._sha.hexdigest()
+
+
+def hash_frames(frames: Iterable[Bytes], size: tuple[int, int]) -> str:
+    """The hash of NV12 frames, as `VideoInfo.frames_sha256` has it."""
+    digest = FramesHash(size)
+    for frame in frames:
+        digest.update(frame)
+    return digest.hexdigest()
