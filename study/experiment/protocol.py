@@ -102,10 +102,10 @@ class Points(_Part):
     )
     destination_frame: int | None = Field(default=None, ge=0, description="The same as a frame. [frames]")
     shortest_frames: int | None = Field(
-        default=None, ge=1, le=60, description="Shortest optimal blend to accept. [frames]"
+        default=None, ge=1, le=600, description="Shortest optimal blend to accept. [frames]"
     )
     longest_frames: int | None = Field(
-        default=None, ge=1, le=60, description="Longest optimal blend to accept. [frames]"
+        default=None, ge=1, le=600, description="Longest optimal blend to accept. [frames]"
     )
     avoid_frames: int | None = Field(default=None, ge=1, description="A blend length to stay away from. [frames]")
     avoid_within_frames: int | None = Field(

@@ -107,8 +107,7 @@ def _unknown_key(model: type[BaseModel], location: Location) -> str:
     keys = list(parent.model_fields) if parent else []
     key = str(location[-1])
     elsewhere = [f"{p}.{key}" if p else key for p, part in parts(model) if key in part.model_fields]
-    # Half words are common slips (answer for answer_s), so the bar is low.
-    near = get_close_matches(key, keys, n=1, cutoff=0.5)
+    near = get_close_matches(key, keys, n=1)
     if elsewhere:
         hint = f"it belongs at {elsewhere[0]}."
     elif near:

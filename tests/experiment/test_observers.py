@@ -1,0 +1,267 @@
+"""Simulated participants: known truth, chance that repeats, work that is taken up."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study.errors import SessionError
+from study.experiment.observer_models import (
+    PreferenceObserver,
+    SameDifferentObserver,
+    population_different,
+    preference_probability,
+    probability_different,
+    truth,
+)
+from study.experiment.observers import ObserverSettings, default_observer, person, simulate
+from study.experiment.responses import all_sessions, answers_frame, has_event, open_responses
+from study.experiment.session import advanced, answered, current, missed, open_session
+
+
+def alike(settings: ObserverSettings) -> ObserverSettings:
+    """The same observer without differences between participants."""
+    return replace(settings, same_different=replace(settings.same_different, log_sensitivity_sd=0.0, criterion_sd=0.0))
+
+
+def timeless(responses) -> pd.DataFrame:
+    return answers_frame(responses, all_attempts=True).drop(columns="answered_at")
+
+
+def test_the_differencing_model_agrees_with_simulated_percepts():
+    """Percepts drawn one by one, against the closed form."""
+    observer = SameDifferentObserver(0.3, 0.5, criterion=1.7, lapse=0.1)
+    rng = np.random.default_rng(1)
+    for difference in (-8, -2, 0, 3, 9):
+        distance = abs(difference) * (0.3 if difference < 0 else 0.5)
+        first, second = rng.standard_normal((2, 200_000))
+        different = np.abs(first - (second + distance)) > 1.7
+        lapsed = rng.random(200_000) < 0.1
+        different = np.where(lapsed, rng.random(200_000) < 0.5, different)
+        assert float(probability_different(observer, difference)) == pytest.approx(different.mean(), abs=0.005)
+
+
+def test_false_alarms_have_their_closed_form():
+    """2 Phi(-criterion / sqrt 2) with no difference, no lapse."""
+    observer = SameDifferentObserver(0.3, 0.5, criterion=1.7, lapse=0.0)
+    assert float(probability_different(observer, 0.0)) == pytest.approx(math.erfc(1.7 / 2.0), abs=1e-12)
+
+
+def test_the_population_is_the_mean_over_participants():
+    observer = SameDifferentObserver(0.37, 0.43, log_sensitivity_sd=0.3, criterion_sd=0.3)
+    settings = replace(default_observer(), same_different=observer)
+    people = [person(settings, f"sim-{n}", 3).settings.same_different for n in range(4000)]
+    for difference in (-10, -5, 0, 5, 10):
+        mean = np.mean([float(probability_different(one, difference)) for one in people])
+        assert float(population_different(observer, difference)) == pytest.approx(mean, abs=0.012)
+
+
+def test_the_default_observer_has_the_threshold_of_the_paper(jnd_protocol):
+    """2004 section 5.1: 75% at k - 8 and k + 7."""
+    settings = default_observer()
+    known = truth(jnd_protocol, settings)["studies"]["jnd"]
+    assert known["threshold_shorter_frames"] == pytest.approx(-8.0, abs=1e-5)
+    assert known["threshold_longer_frames"] == pytest.approx(7.0, abs=1e-5)
+    for frames in (-8.0, 7.0):
+        assert float(population_different(settings.same_different, frames)) == pytest.approx(0.75, abs=1e-6)
+    assert 0.05 < known["false_alarms"] < 0.2
+    # What the paper's straight lines between the levels would give lies near, but not on it.
+    assert known["interpolated_shorter_frames"] == pytest.approx(-8.0, abs=1.0)
+    assert known["interpolated_longer_frames"] == pytest.approx(7.0, abs=1.0)
+
+
+def test_the_default_preferences_are_those_of_table_2():
+    """2004 Table 2: 96.4% for the geodesic method, 65.7% for the velocity method."""
+    from study.experiment.protocol import find_protocol, load_protocol
+
+    for name, percent in (("geodesic_vs_fixed", 96.4), ("velocity_vs_fixed", 65.7)):
+        study = load_protocol(find_protocol(name)).studies[0]
+        assert 100 * preference_probability(default_observer().preference, study) == pytest.approx(percent, abs=1.0)
+
+
+def test_an_observer_without_threshold_is_refused(jnd_protocol):
+    settings = default_observer()
+    stubborn = replace(settings, same_different=replace(settings.same_different, lapse=0.6))
+    with pytest.raises(SessionError, match=r"reaches 75% 'different' at some difference, found .* at none and"):
+        truth(jnd_protocol, stubborn)
+
+
+def test_simulated_answers_follow_the_known_curve(tmp_path, jnd_protocol, make_stimuli):
+    settings = replace(alike(default_observer()), missed=0.0)
+    with open_responses(tmp_path) as responses:
+        simulate(jnd_protocol, make_stimuli(jnd_protocol), responses, 60, seed=11, settings=settings)
+        table = answers_frame(responses)
+    for difference, rows in table[~table["missed"]].groupby("difference_frames"):
+        chance = float(probability_different(settings.same_different, int(difference)))
+        error = math.sqrt(chance * (1 - chance) / len(rows))
+        assert abs((rows["answer"] == "different").mean() - chance) < 3.5 * error, difference
+
+
+def test_simulated_preferences_follow_the_known_ones(tmp_path, toy_protocol, toy_stimuli):
+    preference = PreferenceObserver({"fixed": 0.0, "geodesic": 1.0}, order_bias=0.4, lapse=0.1)
+    settings = replace(default_observer(), preference=preference)
+    with open_responses(tmp_path) as responses:
+        simulate(toy_protocol, toy_stimuli, responses, 120, seed=2, settings=settings)
+        table = answers_frame(responses)
+    chosen = table[(table["task"] == "preference") & ~table["missed"]]
+    for first, rows in chosen.groupby("a_first"):
+        chance = 0.05 + 0.9 / (1 + math.exp(-(1.0 + (0.4 if first else -0.4))))
+        assert rows["chose_a"].mean() == pytest.approx(chance, abs=0.12)
+    expected = preference_probability(preference, toy_protocol.study("liking"))
+    assert chosen["chose_a"].mean() == pytest.approx(expected, abs=0.09)
+
+
+def test_response_times_are_plausible_and_some_answers_are_missed(tmp_path, toy_protocol, toy_stimuli):
+    settings = replace(default_observer(), missed=0.1)
+    with open_responses(tmp_path) as responses:
+        simulate(toy_protocol, toy_stimuli, responses, 60, seed=2, settings=settings)
+        table = answers_frame(responses)
+    assert 0.06 < table["missed"].mean() < 0.15
+    assert table.loc[table["missed"], "response_s"].isna().all()
+    times = table.loc[~table["missed"], "response_s"]
+    assert times.between(0.1, 5.0).all()
+    assert 1.0 < times.median() < 2.0
+
+
+def test_sessions_are_marked_as_simulated_with_their_truth(tmp_path, toy_protocol, toy_stimuli):
+    with open_responses(tmp_path) as responses:
+        summary = simulate(toy_protocol, toy_stimuli, responses, 2, seed=3)
+        assert (summary.participants, summary.answers, summary.found) == (2, 16, 0)
+        records = all_sessions(responses)
+        assert [record.participant for record in records] == ["sim-001", "sim-002"]
+        for record in records:
+            assert record.simulated
+            assert record.truth == summary.truth
+            assert record.truth["seed"] == 3
+            assert has_event(responses, record, "finished")
+        assert answers_frame(responses)["simulated"].all()
+
+
+def test_running_again_adds_nothing_and_more_participants_leave_the_first(tmp_path, toy_protocol, toy_stimuli):
+    with open_responses(tmp_path) as responses:
+        simulate(toy_protocol, toy_stimuli, responses, 2, seed=3)
+        first = timeless(responses)
+        again = simulate(toy_protocol, toy_stimuli, responses, 2, seed=3)
+        assert (again.answers, again.found) == (0, 16)
+        pd.testing.assert_frame_equal(timeless(responses), first)
+        simulate(toy_protocol, toy_stimuli, responses, 3, seed=3)
+        pd.testing.assert_frame_equal(timeless(responses).iloc[:16], first)
+
+
+class StopHereError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("after", [1, 7, 8, 9, 20])
+def test_an_interrupted_simulation_ends_as_an_uninterrupted_one(tmp_path, toy_protocol, toy_stimuli, after):
+    with open_responses(tmp_path / "whole.sqlite") as responses:
+        simulate(toy_protocol, toy_stimuli, responses, 3, seed=4)
+        whole = timeless(responses)
+
+    def stop(done, total):
+        assert total == 24
+        if done == after:
+            raise StopHereError
+
+    with open_responses(tmp_path / "halves.sqlite") as responses:
+        with pytest.raises(StopHereError):
+            simulate(toy_protocol, toy_stimuli, responses, 3, seed=4, progress=stop)
+        assert len(timeless(responses)) == after
+        assert simulate(toy_protocol, toy_stimuli, responses, 3, seed=4).answers == 24 - after
+        pd.testing.assert_frame_equal(timeless(responses), whole)
+
+
+KILLED = """
+import sys
+sys.path.insert(0, "tests/experiment")
+import conftest as c
+from study.experiment.observers import simulate
+from study.experiment.protocol import find_protocol, load_protocol
+from study.experiment.responses import open_responses
+protocol = load_protocol(find_protocol("blend_length_jnd"))
+say = lambda done, total: print(done, flush=True)
+simulate(protocol, c.FakeStimuli(c.pairs_of(protocol)), open_responses(sys.argv[1]), 4, 9, say)
+"""
+
+
+def test_a_killed_simulation_is_finished_by_running_it_again(tmp_path, repository, jnd_protocol, make_stimuli):
+    """SIGKILL at several moments; in the end the answers are those of a run that was let alone."""
+    stimuli = make_stimuli(jnd_protocol)
+    with open_responses(tmp_path / "whole.sqlite") as responses:
+        simulate(jnd_protocol, stimuli, responses, 4, seed=9)
+        whole = timeless(responses)
+    path = tmp_path / "killed.sqlite"
+    for lines in (1, 42, 30):
+        child = subprocess.Popen(
+            [sys.executable, "-c", KILLED, str(path)], cwd=repository, stdout=subprocess.PIPE, text=True
+        )
+        acknowledged = [int(child.stdout.readline()) for _ in range(lines)][-1]
+        os.kill(child.pid, signal.SIGKILL)
+        child.stdout.read()
+        child.stdout.close()
+        child.wait()
+        with open_responses(path) as responses:
+            stored = timeless(responses)
+        assert len(stored) >= acknowledged
+        assert not stored.duplicated(["participant", "trial", "item", "attempt"]).any()
+    with open_responses(path) as responses:
+        simulate(jnd_protocol, stimuli, responses, 4, seed=9)
+        pd.testing.assert_frame_equal(timeless(responses), whole)
+
+
+def test_another_observer_or_seed_does_not_continue_a_session(tmp_path, toy_protocol, toy_stimuli):
+    with open_responses(tmp_path) as responses:
+        simulate(toy_protocol, toy_stimuli, responses, 1, seed=3)
+        with pytest.raises(SessionError, match="Expected the observer and seed under which 'sim-001' was begun"):
+            simulate(toy_protocol, toy_stimuli, responses, 1, seed=4)
+        with pytest.raises(SessionError, match="Expected one participant or more"):
+            simulate(toy_protocol, toy_stimuli, responses, 0)
+
+
+def test_a_person_is_the_same_whatever_else_is_drawn():
+    settings = default_observer()
+    assert person(settings, "sim-002", 5) == person(settings, "sim-002", 5)
+    assert person(settings, "sim-002", 5).settings != person(settings, "sim-003", 5).settings
+    assert person(settings, "sim-002", 5).settings != person(settings, "sim-002", 6).settings
+
+
+def test_ratings_stay_on_their_scale_and_follow_utility(tmp_path, rating_protocol, make_stimuli):
+    with open_responses(tmp_path) as responses:
+        simulate(rating_protocol, make_stimuli(rating_protocol), responses, 30, seed=1)
+        table = answers_frame(responses)
+    rated = table[table["task"] == "rating"]
+    assert len(rated) == 30 * 4 * 2
+    assert set(rated["item"]) == {"natural", "noticeable"}
+    assert rated["answer"].isin([str(point) for point in range(5)]).all()
+    means = rated.assign(point=rated["answer"].astype(float)).groupby("method_a")["point"].mean()
+    assert means["geodesic"] > means["cut"] + 0.5
+
+
+def test_front_ends_and_simulation_drive_the_same_session(toy_protocol, toy_stimuli):
+    """What a simulated participant is asked is what the session asks: by hand the same trials come."""
+    from study.experiment.observers import respond
+    from study.experiment.plan import draw_plan
+
+    plan = draw_plan(toy_protocol, toy_stimuli.pairs, "sim-001")
+    who = person(default_observer(), "sim-001", 3)
+    state, asked = open_session(toy_protocol, plan), []
+    while current(state).kind != "done":
+        step = current(state)
+        if step.kind != "answer":
+            state = advanced(state)
+            continue
+        value, response_s = respond(who, plan.trial(step.trial), step)
+        state, answer = missed(state) if value is None else answered(state, value, response_s)
+        asked.append(answer)
+    with open_responses("sqlite://") as responses:
+        simulate(toy_protocol, toy_stimuli, responses, 1, seed=3)
+        table = answers_frame(responses)
+    assert [a.value for a in asked] == [None if pd.isna(value) else value for value in table["answer"]]

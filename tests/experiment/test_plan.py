@@ -1,0 +1,151 @@
+"""The plan: drawn once, balanced, the same wherever it is drawn."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+
+from study.errors import SessionError
+from study.experiment.plan import TRIAL_COLUMNS, draw_plan, plan_from_json, trial_table
+
+
+def test_the_jnd_study_has_42_pairs_in_both_orders(jnd_protocol, make_stimuli):
+    """2004 section 4.2: 7 lengths x 2 orders x 3 motions."""
+    plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p01")
+    assert len(plan.trials) == 42
+    assert [trial.trial for trial in plan.trials] == list(range(1, 43))
+    shown = Counter((trial.motion, trial.difference_frames, trial.reference_first) for trial in plan.trials)
+    assert set(shown.values()) == {1}
+    assert {difference for _, difference, _ in shown} == {-15, -10, -5, 0, 5, 10, 20}
+    for trial in plan.trials:
+        reference = trial.first if trial.reference_first else trial.second
+        assert reference == f"{trial.motion}-k"
+        if trial.difference_frames == 0:
+            assert trial.first == trial.second
+        else:
+            assert trial.first != trial.second
+
+
+def test_pairs_and_orders_are_randomised(jnd_protocol, make_stimuli):
+    pairs = make_stimuli(jnd_protocol).pairs
+    plans = [draw_plan(jnd_protocol, pairs, f"p{number:02d}") for number in range(40)]
+    assert len({tuple(trial.pair for trial in plan.trials) for plan in plans}) == 40
+    # Where each pair's first showing has the reference first: about half, over 40 x 21 of them (sd 14.5).
+    first = sum(
+        next(trial for trial in plan.trials if trial.pair == pair.name).reference_first is True
+        for plan in plans
+        for pair in pairs
+    )
+    assert abs(first - 420) < 75
+    # The pair in the first trial differs over participants about as a fair draw of 21 would have it.
+    assert len({plan.trials[0].pair for plan in plans}) > 10
+
+
+def test_the_same_seed_and_participant_give_the_same_plan(toy_protocol, toy_stimuli):
+    plan = draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
+    assert draw_plan(toy_protocol, toy_stimuli.pairs, "p01") == plan
+    assert draw_plan(toy_protocol, toy_stimuli.pairs, "p02").trials != plan.trials
+    assert draw_plan(toy_protocol, toy_stimuli.pairs, "p01", seed=6).trials != plan.trials
+
+
+def test_another_process_draws_the_same_plan(jnd_protocol, make_stimuli, repository):
+    """Nothing hangs on hash randomisation, on the clock or on anything else outside seed and name."""
+    code = (
+        "import sys; sys.path.insert(0, 'tests/experiment');"
+        "import conftest as c;"
+        "from study.experiment.plan import draw_plan;"
+        "from study.experiment.protocol import find_protocol, load_protocol;"
+        "p = load_protocol(find_protocol('blend_length_jnd'));"
+        "print(draw_plan(p, c.pairs_of(p), 'p07').to_json())"
+    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=repository, capture_output=True, text=True, check=True)
+    plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p07")
+    assert plan_from_json(run.stdout) == plan
+
+
+def test_a_known_plan_never_changes(jnd_protocol, make_stimuli):
+    """A change here means that stored seeds no longer give the plans that participants saw."""
+    plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p01", seed=1)
+    assert [(trial.motion[:4], trial.difference_frames, trial.reference_first) for trial in plan.trials[:6]] == KNOWN
+
+
+KNOWN = [
+    ("walk", 20, True),
+    ("stan", 10, False),
+    ("walk", 10, True),
+    ("runn", 0, False),
+    ("runn", -15, True),
+    ("walk", 20, False),
+]
+
+
+def test_studies_come_in_order_and_repeats_one_after_another(toy_protocol, toy_stimuli):
+    plan = draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
+    assert [trial.study for trial in plan.trials] == ["jnd"] * 6 + ["liking"] * 2
+    studies = tuple(s.model_copy(update={"repeats": 3}) for s in toy_protocol.studies)
+    thrice = draw_plan(toy_protocol.model_copy(update={"studies": studies}), toy_stimuli.pairs, "p01")
+    assert [trial.repeat for trial in thrice.trials] == [1] * 6 + [2] * 6 + [3] * 6 + [1, 1, 2, 2, 3, 3]
+
+
+def test_random_study_order_keeps_studies_whole(toy_protocol, toy_stimuli):
+    mixed = toy_protocol.model_copy(update={"study_order": "random"})
+    orders = {
+        tuple(dict.fromkeys(trial.study for trial in draw_plan(mixed, toy_stimuli.pairs, f"p{n}").trials))
+        for n in range(12)
+    }
+    assert orders == {("jnd", "liking"), ("liking", "jnd")}
+
+
+def test_balanced_order_shows_half_each_way(toy_protocol, toy_stimuli):
+    studies = (toy_protocol.studies[0], toy_protocol.studies[1].model_copy(update={"order": "balanced"}))
+    balanced = toy_protocol.model_copy(update={"studies": studies})
+    for number in range(8):
+        plan = draw_plan(balanced, toy_stimuli.pairs, f"p{number}")
+        assert sorted(trial.a_first for trial in plan.trials[6:]) == [False, True]
+
+
+def test_preference_trials_say_which_method_is_first(toy_protocol, toy_stimuli):
+    for number in range(8):
+        for trial in draw_plan(toy_protocol, toy_stimuli.pairs, f"p{number}").trials[6:]:
+            assert (trial.method_a, trial.method_b) == ("geodesic", "fixed")
+            a, b = f"{trial.motion}-k", f"{trial.motion}-fixed"
+            assert (trial.first, trial.second) == ((a, b) if trial.a_first else (b, a))
+            assert trial.reference_first is None
+
+
+def test_rating_trials_rotate_by_group(rating_protocol, make_stimuli):
+    """2003 section 4.2: two groups, each shown the stimuli in its own order."""
+    pairs = make_stimuli(rating_protocol).pairs
+    rated = [pair.a for pair in pairs if pair.study == "rating"]
+    for group in range(2):
+        trials = draw_plan(rating_protocol, pairs, "p01", group=group).trials
+        shown = [trial.first for trial in trials if trial.study == "rating"]
+        assert shown == rated[group:] + rated[:group]
+        assert all(trial.second == "" for trial in trials if trial.study == "rating")
+
+
+def test_a_plan_survives_its_json(rating_protocol, make_stimuli):
+    plan = draw_plan(rating_protocol, make_stimuli(rating_protocol).pairs, "p01")
+    assert plan_from_json(plan.to_json()) == plan
+
+
+def test_the_trial_table_has_the_columns_of_a_trial(toy_protocol, toy_stimuli):
+    table = trial_table(draw_plan(toy_protocol, toy_stimuli.pairs, "p01"))
+    assert all(tuple(row) == TRIAL_COLUMNS for row in table)
+
+
+def test_what_is_no_plan_is_refused(toy_protocol, toy_stimuli):
+    with pytest.raises(SessionError, match="Expected a participant's name, found none"):
+        draw_plan(toy_protocol, toy_stimuli.pairs, " ")
+    with pytest.raises(SessionError, match="Expected pairs for the study 'liking', found none"):
+        draw_plan(toy_protocol, toy_stimuli.pairs[:3], "p01")
+    text = draw_plan(toy_protocol, toy_stimuli.pairs, "p01").to_json()
+    with pytest.raises(SessionError, match="Expected a plan of version 1, found 9"):
+        plan_from_json(text.replace('"version":1', '"version":9'))
+    with pytest.raises(SessionError, match="Expected a stored plan"):
+        plan_from_json("{}")
+    with pytest.raises(SessionError, match="Expected a trial from 1 to 8, found 9"):
+        draw_plan(toy_protocol, toy_stimuli.pairs, "p01").trial(9)

@@ -1,0 +1,159 @@
+"""Protocols: what is read, and what is refused, with its place and what to do."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import pytest
+
+from study.errors import ProtocolError
+from study.experiment.protocol import find_protocol, load_protocol, parse_protocol, protocols_folder
+
+GOOD = Path(__file__).parents[2].joinpath("protocols", "demo.toml").read_text()
+
+
+def refused(old: str, new: str, base: str = GOOD) -> str:
+    assert old in base, f"the text to change, {old!r}, is not in the protocol"
+    with pytest.raises(ProtocolError) as caught:
+        parse_protocol(base.replace(old, new, 1), Path("demo.toml"))
+    return str(caught.value)
+
+
+def test_the_exact_text_and_its_hash_are_kept(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(GOOD.encode() + b"# a comment with \xc3\xa4\r\n")
+    protocol = load_protocol(path)
+    assert protocol.text.encode() == path.read_bytes()
+    assert protocol.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert protocol.path == path
+
+
+def test_nothing_can_be_changed_afterwards():
+    protocol = parse_protocol(GOOD)
+    with pytest.raises(Exception, match="frozen"):
+        protocol.seed = 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("answer_s = 5.0", "answer = 5.0", r"demo.toml:\d+: timing.answer: unknown key; did you mean 'answer_s'\?"),
+        ('task = "preference"', 'taks = "preference"', r"studies\[1\].taks: unknown key; did you mean 'task'\?"),
+        ("[points]\n", "[points]\nfixed_frames = 3\n", r"points.fixed_frames: unknown key; it belongs at studies"),
+        ("fps = 30", "frobnication = 30", "frobnication: unknown key; valid keys here: name, title"),
+        ("fps = 30", 'fps = "30"', r"fps: expected a number in frames per second, found '30' \(text\)"),
+        ("seed = 7", "seed = 7.5", r"seed: expected a whole number, found 7.5"),
+        ("seed = 7", "seed = true", r"seed: expected a whole number, found True \(true or false\)"),
+        ("gap_s = 0.5", "gap_s = -1", r"timing.gap_s: expected at least 0 in seconds, found -1"),
+        ("answer_s = 5.0", "answer_s = 0", r"timing.answer_s: expected above 0 in seconds, found 0"),
+        ("width = 480", "width = 481", r"stimuli.width: expected a multiple of 2 in pixels, found 481"),
+        ('task = "preference"', 'task = "preferance"', r"studies\[1\].task: .*found 'preferance'; did you mean 'pref"),
+        ('name = "demo"', 'name = "The demo"', r"name: expected a name of small letters, digits, - and _, found 'The"),
+        ('title = "A small study of blend lengths"', 'title = ""', r"title: expected some text, found ''"),
+        ('title = "A small study of blend lengths"', "", r"demo.toml: title: expected this key, found none; add it"),
+        ('name = "boxing"', 'name = "walking"', r"demo.toml:\d+: transitions\[3\].name: .*'walking' twice"),
+        ('name = "geodesic_vs_fixed"', 'name = "jnd"', r"studies\[1\].name: .*'jnd' twice"),
+        ('["walk_run", ', '["walk_ran", ', r"studies\[1\].transitions: .*found 'walk_ran'; did you mean 'walk_run'\?"),
+        ('["walk_run", ', '["stand_walk", ', r"studies\[1\].transitions: expected each transition once"),
+        ("[-15, -10, -5, 0, 5, 10, 20]", "[0, 5, 5]", r"differences_frames: expected each difference once, found 5"),
+        ("[-15, -10, -5, 0, 5, 10, 20]", "[0.5]", r"differences_frames\[0\]: expected a whole number in frames"),
+        ("[-15, -10, -5, 0, 5, 10, 20]", "[]", r"studies\[0\]: expected differences_frames"),
+        ("[-15, -10, -5, 0, 5, 10, 20]", "5", r"differences_frames: expected a list in brackets"),
+        ('comparison = "fixed"', 'comparison = "geodesic"', r"studies\[1\].comparison: expected a comparison other"),
+        ("shortest_frames = 5", "shortest_frames = 50", r"shortest_frames <= longest_frames, found 50 and 35"),
+        ("longest_frames = 35", "longest_frames = 12", r"a level below one frame .*longest_frames of 16 or more"),
+        ('choose = "random"', 'choose = "given"', r"expected one of source_s and source_frame .*found neither"),
+        ("avoid_frames = 10,", "source_within = [0.9, 0.1],", r"source_within: expected \[from, to\] with from < to"),
+        ('order = "random"\nq', 'items = []\norder = "both"\nsource = 1\nq', r"studies\[1\].source: unknown key; it"),
+        ("[stimuli]", '[stimuli.colours]\nleft = "red"\n[stimuli]', r"colours.left: expected a colour such as #20305a"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_place(old, new, message):
+    text = refused(old, new)
+    assert re.search(message, text), text
+
+
+def test_a_slip_in_toml_names_its_line():
+    assert "line 8" in refused("seed = 7", "seed = = 7")
+
+
+def test_all_problems_are_named_at_once():
+    text = refused("answer_s = 5.0", "answer = 5.0", GOOD.replace("seed = 7", 'seed = "x"'))
+    assert len(text.splitlines()) == 2
+    assert "timing.answer" in text
+    assert "seed: expected a whole number" in text
+
+
+def test_the_line_is_the_line_of_the_key():
+    text = refused('task = "preference"', 'task = "preferance"')
+    line = int(text.split(":")[1])
+    assert GOOD.splitlines()[line - 1] == 'task = "preference"'
+
+
+def test_rating_studies_have_items_and_single_stimuli(rating_protocol):
+    study = rating_protocol.study("rating")
+    assert [item.name for item in study.items] == ["natural", "noticeable"]
+    base = rating_protocol.text
+    assert "items: expected each item's name once" in refused('name = "noticeable"', 'name = "natural"', base)
+    assert "shown singly" in refused('order = "by-group"', 'order = "both"', base)
+
+
+def test_a_sitting_may_hold_the_four_studies_of_2004():
+    """Section 4.1: all in a single session; 42 + 8 + 8 + 8 pairs (here with the methods that there are)."""
+    text = GOOD.split("[[transitions]]")[0]
+    for number in range(11):
+        text += f'[[transitions]]\nname = "t{number}"\ncategory = "c"\nsource = "walk"\ndestination = "run"\n'
+    three, eight = (str([f"t{n}" for n in names]) for names in (range(3), range(3, 11)))
+    text += (
+        f'[[studies]]\nname = "one"\ntask = "same-different"\ntransitions = {three}\norder = "both"\n'
+        "differences_frames = [-15, -10, -5, 0, 5, 10, 20]\n"
+    )
+    for name, a, b in (("two", "geodesic", "fixed"), ("three", "velocity", "fixed"), ("four", "geodesic", "velocity")):
+        text += (
+            f'[[studies]]\nname = "{name}"\ntask = "preference"\ntransitions = {eight}\nreference = "{a}"\n'
+            f'comparison = "{b}"\npoints = {{ avoid_frames = 10, avoid_within_frames = 4 }}\n'
+        )
+    protocol = parse_protocol(text)
+    assert [len(protocol.transitions_of(study)) for study in protocol.studies] == [3, 8, 8, 8]
+
+
+def test_nearer_conditions_win():
+    text = GOOD.replace(
+        'order = "random"\n', 'order = "random"\npoints = { longest_frames = 20, avoid_within_frames = 2 }\n', 1
+    )
+    protocol = parse_protocol(text)
+    study = protocol.study("geodesic_vs_fixed")
+    points = protocol.points_for(study, protocol.transition("stand_walk"))
+    assert (points.choose, points.shortest_frames, points.longest_frames) == ("random", 5, 20)
+    assert points.avoid_within_frames == 4
+    assert protocol.points_for(protocol.study("jnd"), protocol.transition("walking")).longest_frames == 35
+
+
+def test_protocols_are_found_by_name_and_by_path(tmp_path):
+    assert find_protocol("demo") == protocols_folder() / "demo.toml"
+    assert find_protocol("demo.toml") == protocols_folder() / "demo.toml"
+    own = tmp_path / "own.toml"
+    own.write_text(GOOD)
+    assert find_protocol(own) == own
+    with pytest.raises(ProtocolError, match="found 'blend_jnd'; did you mean 'blend_length_jnd'"):
+        find_protocol("blend_jnd")
+    with pytest.raises(ProtocolError, match="Expected a protocol file"):
+        find_protocol(tmp_path / "demo.toml")
+
+
+def test_files_that_are_no_text_are_refused(tmp_path):
+    with pytest.raises(ProtocolError, match="expected a protocol file, found none"):
+        load_protocol(tmp_path / "none.toml")
+    bad = tmp_path / "bad.toml"
+    bad.write_bytes(b"name = '\xff\xfe'")
+    with pytest.raises(ProtocolError, match="expected UTF-8 text, found byte 8"):
+        load_protocol(bad)
+
+
+def test_every_key_is_described_and_stands_in_the_documentation(repository):
+    from study.experiment.protocol_keys import key_tables
+
+    document = (repository / "docs" / "protocols.md").read_text()
+    assert key_tables() in document, "run `python -m study.experiment.protocol_keys` and paste its tables"

@@ -1,0 +1,281 @@
+"""The database: nothing lost, nothing doubled, nothing mixed, and a table that the analysis can take."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from datetime import UTC, datetime
+
+import pandas as pd
+import pytest
+import sqlalchemy as sa
+
+from study.errors import SessionError
+from study.experiment import response_tables
+from study.experiment.plan import draw_plan
+from study.experiment.protocol import parse_protocol
+from study.experiment.responses import (
+    ANSWER_COLUMNS,
+    all_sessions,
+    answers_frame,
+    begin_session,
+    export_csv,
+    find_session,
+    has_event,
+    open_responses,
+    record_answer,
+    record_event,
+    session_table,
+    stored_answers,
+)
+from study.experiment.session import Answer
+
+
+@pytest.fixture
+def responses(tmp_path):
+    with open_responses(tmp_path) as opened:
+        yield opened
+
+
+@pytest.fixture
+def plan(toy_protocol, toy_stimuli):
+    return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
+
+
+def answer(trial, value="same", response_s=1.0, **more):
+    return Answer(trial, "", more.pop("attempt", 1), value, response_s, **more)
+
+
+def test_a_session_stores_protocol_plan_seed_and_versions(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan, library="toy", library_synthetic=True)
+    assert find_session(responses, "p01") == record
+    assert record.plan == plan
+    row = session_table(responses).iloc[0]
+    assert (row["seed"], row["library"], row["library_synthetic"], row["answers"]) == (5, "toy", True, 0)
+    assert row["protocol_sha256"] == toy_protocol.sha256
+    assert row["segue_version"]
+    assert row["python_version"]
+    assert row["numpy_version"]
+    assert not row["simulated"]
+    with responses.engine.connect() as connection:
+        stored = connection.execute(sa.select(response_tables.sessions.c.protocol_text)).scalar_one()
+    assert stored == toy_protocol.text
+
+
+def test_answers_come_back_as_they_were(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan)
+    given = (answer(1), answer(2, "different", 0.123), answer(3, None, None), answer(4, shown_well=False))
+    assert all(record_answer(responses, record, one) for one in given)
+    assert stored_answers(responses, record.id) == given
+
+
+def test_an_answer_sent_twice_counts_once_and_another_one_is_refused(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan)
+    assert record_answer(responses, record, answer(1))
+    assert not record_answer(responses, record, answer(1))
+    with pytest.raises(SessionError, match=r"first answer of 'p01' to trial 1 \(showing 1\), found that one is stored"):
+        record_answer(responses, record, answer(1, "different"))
+    assert stored_answers(responses, record.id) == (answer(1),)
+
+
+def test_answers_can_be_neither_changed_nor_deleted(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan)
+    record_answer(responses, record, answer(1))
+    for statement in ("UPDATE answers SET answer = 'different'", "DELETE FROM answers"):
+        with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:
+            connection.execute(sa.text(statement))
+
+
+def test_a_missed_answer_has_no_value(responses, toy_protocol, plan):
+    """The database itself refuses what would contradict itself."""
+    record = begin_session(responses, toy_protocol, plan)
+    record_answer(responses, record, answer(1, None, None))
+    with pytest.raises(sa.exc.IntegrityError, match="missed_has_no_answer"), responses.engine.begin() as connection:
+        connection.execute(
+            sa.insert(response_tables.answers).values(
+                session_id=record.id, trial=2, item="", attempt=1, study="s", task="t", repeat=1, pair="p", motion="m",
+                category="c", first="a", second="b", method_a="x", method_b="y", answer="same", missed=True,
+                shown_well=True, answered_at=datetime.now(UTC),
+            )
+        )  # fmt: skip
+
+
+def test_the_table_says_what_each_answer_means(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan)
+    for trial in plan.trials:
+        value = "different" if trial.task == "same-different" else "first"
+        record_answer(responses, record, answer(trial.trial, value))
+    table = answers_frame(responses)
+    assert tuple(table.columns) == ANSWER_COLUMNS
+    assert len(table) == 8
+    jnd = table[table["study"] == "jnd"]
+    assert list(jnd["correct"]) == [difference != 0 for difference in jnd["difference_frames"]]
+    assert jnd["chose_a"].isna().all()
+    liking = table[table["study"] == "liking"]
+    assert list(liking["chose_a"]) == list(liking["a_first"])
+    assert liking["correct"].isna().all()
+    assert liking["difference_frames"].isna().all()
+    assert table["answered_at"].str.endswith("+00:00").all()
+
+
+def test_missed_answers_are_neither_right_nor_wrong(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan)
+    record_answer(responses, record, answer(1, None, None))
+    row = answers_frame(responses).iloc[0]
+    assert row["missed"]
+    assert pd.isna(row["answer"])
+    assert pd.isna(row["correct"])
+    assert pd.isna(row["response_s"])
+
+
+def test_the_last_showing_counts_and_all_can_be_had(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan)
+    record_answer(responses, record, answer(1, "same", shown_well=False))
+    record_answer(responses, record, answer(1, "different", attempt=2))
+    assert list(answers_frame(responses)["answer"]) == ["different"]
+    assert list(answers_frame(responses, all_attempts=True)["answer"]) == ["same", "different"]
+
+
+def test_an_empty_database_gives_an_empty_table(responses):
+    assert tuple(answers_frame(responses).columns) == ANSWER_COLUMNS
+    assert len(answers_frame(responses)) == 0
+    assert len(session_table(responses)) == 0
+
+
+def test_a_session_is_taken_up_not_begun_again(responses, toy_protocol, plan):
+    first = begin_session(responses, toy_protocol, plan)
+    record_answer(responses, first, answer(1))
+    second = begin_session(responses, toy_protocol, plan)
+    assert second == first
+    assert len(all_sessions(responses)) == 1
+    assert len(stored_answers(responses, second.id)) == 1
+    assert has_event(responses, second, "resumed")
+    assert not has_event(responses, second, "finished")
+    record_event(responses, second, "finished", {"why": "done"})
+    assert has_event(responses, second, "finished")
+
+
+def test_protocols_are_not_mixed(responses, toy_protocol, toy_stimuli, plan):
+    begin_session(responses, toy_protocol, plan)
+    other = parse_protocol(toy_protocol.text + "# changed\n")
+    with pytest.raises(
+        SessionError, match=f"sha256 {other.sha256[:12]}, found some of 'toy' with {toy_protocol.sha256[:12]}"
+    ):
+        begin_session(responses, other, draw_plan(other, toy_stimuli.pairs, "p02"))
+
+
+def test_answers_of_merged_protocols_are_not_mixed_silently(responses, toy_protocol, plan):
+    record = begin_session(responses, toy_protocol, plan)
+    record_answer(responses, record, answer(1))
+    with responses.engine.begin() as connection:
+        row = dict(connection.execute(sa.select(response_tables.sessions)).mappings().one())
+        row |= {"id": 2, "participant": "p02", "protocol_sha256": "f" * 64}
+        connection.execute(sa.insert(response_tables.sessions).values(row))
+    other = find_session(responses, "p02")
+    record_answer(responses, other, answer(1))
+    with pytest.raises(SessionError, match="expected answers under one protocol, found 2"):
+        answers_frame(responses)
+    assert list(answers_frame(responses, protocol_sha256="f" * 64)["participant"]) == ["p02"]
+
+
+def test_a_real_participant_never_becomes_a_simulated_one(responses, toy_protocol, plan):
+    begin_session(responses, toy_protocol, plan)
+    with pytest.raises(SessionError, match="Expected a simulated participant 'p01', found a real one"):
+        begin_session(responses, toy_protocol, plan, simulated=True)
+
+
+def test_another_plan_for_the_same_participant_is_refused(responses, toy_protocol, toy_stimuli, plan):
+    begin_session(responses, toy_protocol, plan)
+    with pytest.raises(SessionError, match=r"stored plan of participant 'p01' \(seed 5\), found another \(seed 6\)"):
+        begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01", seed=6))
+
+
+def test_sqlite_writes_through(responses):
+    with responses.engine.connect() as connection:
+        assert connection.execute(sa.text("PRAGMA journal_mode")).scalar_one() == "wal"
+        assert connection.execute(sa.text("PRAGMA synchronous")).scalar_one() == 2
+        assert connection.execute(sa.text("PRAGMA foreign_keys")).scalar_one() == 1
+
+
+def test_an_old_database_is_brought_up_to_date_without_loss(tmp_path, toy_protocol, plan):
+    path = tmp_path / "responses.sqlite"
+    with open_responses(path) as responses:
+        record = begin_session(responses, toy_protocol, plan)
+        record_answer(responses, record, answer(1))
+    with sqlite3.connect(path) as raw:
+        raw.execute("DROP TRIGGER answers_no_update")
+        raw.execute("DROP TRIGGER answers_no_delete")
+        raw.execute("DELETE FROM schema_version WHERE version > 1")
+    raw.close()
+    with open_responses(path) as responses:
+        assert stored_answers(responses, record.id) == (answer(1),)
+        with responses.engine.connect() as connection:
+            rows = connection.execute(sa.select(response_tables.schema_version)).all()
+        assert [row.version for row in rows] == list(range(1, len(response_tables.MIGRATIONS) + 1))
+        with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:
+            connection.execute(sa.text("DELETE FROM answers"))
+
+
+def test_a_newer_database_and_other_files_are_refused(tmp_path):
+    path = tmp_path / "responses.sqlite"
+    open_responses(path).close()
+    with sqlite3.connect(path) as raw:
+        raw.execute("INSERT INTO schema_version VALUES (99, 'from_the_future', '2030-01-01 00:00:00')")
+    raw.close()
+    with pytest.raises(SessionError, match="found version 99; open it with the newer Segue"):
+        open_responses(path)
+    other = tmp_path / "other.sqlite"
+    other.write_text("this is no database, but a text that is long enough to have a header" * 9)
+    with pytest.raises(SessionError, match="found one that can't be opened"):
+        open_responses(other)
+
+
+def test_csv_holds_every_showing(responses, toy_protocol, plan, tmp_path):
+    record = begin_session(responses, toy_protocol, plan)
+    record_answer(responses, record, answer(1, "same", shown_well=False))
+    record_answer(responses, record, answer(1, "different", attempt=2))
+    table = pd.read_csv(export_csv(responses, tmp_path / "answers.csv"))
+    assert tuple(table.columns) == ANSWER_COLUMNS
+    assert list(table["attempt"]) == [1, 2]
+    assert not list(tmp_path.glob("*.part"))
+
+
+KILLED = """
+import sys
+sys.path.insert(0, "tests/experiment")
+import conftest as c
+from study.experiment.plan import draw_plan
+from study.experiment.protocol import parse_protocol
+from study.experiment.responses import begin_session, open_responses, record_answer
+from study.experiment.session import Answer
+protocol = parse_protocol(c.TOY_PROTOCOL)
+responses = open_responses(sys.argv[1])
+for number in range(1000):
+    record = begin_session(responses, protocol, draw_plan(protocol, c.pairs_of(protocol), f"p{number:03d}"))
+    for trial in range(1, 9):
+        record_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
+        print(record.participant, trial, flush=True)
+"""
+
+
+def test_every_acknowledged_answer_survives_a_kill(tmp_path, repository):
+    path = tmp_path / "responses.sqlite"
+    child = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(path)], cwd=repository, stdout=subprocess.PIPE, text=True
+    )
+    acknowledged = [tuple(child.stdout.readline().split()) for _ in range(37)]
+    os.kill(child.pid, signal.SIGKILL)
+    acknowledged += [tuple(line.split()) for line in child.stdout if line.endswith("\n")]
+    child.stdout.close()
+    assert child.wait() == -signal.SIGKILL
+    with open_responses(path) as responses:
+        table = answers_frame(responses)
+    stored = [
+        (participant, str(trial)) for participant, trial in zip(table["participant"], table["trial"], strict=True)
+    ]
+    assert len(set(stored)) == len(stored)
+    assert set(acknowledged) <= set(stored)
+    assert len(stored) <= len(acknowledged) + 1

@@ -1,0 +1,184 @@
+"""The session: the order of steps, legal answers, missed ones, faulty showings, and taking up what was left."""
+
+from __future__ import annotations
+
+import pytest
+
+from study.errors import SessionError
+from study.experiment.plan import draw_plan
+from study.experiment.protocol import parse_protocol
+from study.experiment.session import (
+    advanced,
+    answered,
+    current,
+    missed,
+    open_session,
+    progress,
+)
+
+
+def to_question(session):
+    while current(session).kind not in ("answer", "done"):
+        session = advanced(session)
+    return session
+
+
+def run(session, count=None, choose=lambda step: step.legal[0], seen=None):
+    """Answer `count` questions (all by default); the session after it and the answers."""
+    answers = []
+    while current(session).kind != "done" and (count is None or len(answers) < count):
+        step = current(session)
+        if seen is not None:
+            seen.append(step)
+        if step.kind == "answer":
+            session, answer = answered(session, choose(step), 1.0)
+            answers.append(answer)
+        else:
+            session = advanced(session)
+    return session, answers
+
+
+@pytest.fixture
+def opened(toy_protocol, toy_stimuli):
+    return open_session(toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01"))
+
+
+def test_a_trial_is_first_gap_second_answer_pause(opened):
+    seen = []
+    run(opened, seen=seen)
+    kinds = [step.kind for step in seen]
+    assert kinds[:2] == ["instructions", "instructions"]
+    assert kinds[2:7] == ["first", "gap", "second", "answer", "pause"]
+    assert kinds[-1] == "debrief"
+    assert kinds.count("answer") == 8
+    for step in seen:
+        if step.trial:
+            trial = opened.plan.trial(step.trial)
+            assert step.study == trial.study
+            assert step.stimulus == {"first": trial.first, "second": trial.second}.get(step.kind, "")
+    durations = {step.kind: step.duration_s for step in seen}
+    assert (durations["gap"], durations["answer"], durations["pause"]) == (1.0, 5.0, 1.0)
+    assert [step.text for step in seen if step.kind == "instructions"] == ["Welcome.", "Some pairs are the same."]
+
+
+def test_trials_come_in_the_order_of_the_plan(opened):
+    _, answers = run(opened)
+    assert [answer.trial for answer in answers] == list(range(1, 9))
+
+
+def test_only_legal_answers_in_the_answer_window_count(opened):
+    session = to_question(opened)
+    assert current(session).legal == ("same", "different")
+    with pytest.raises(SessionError, match="Expected one of same, different in trial 1, found 'first'"):
+        answered(session, "first", 1.0)
+    with pytest.raises(SessionError, match=r"response time from 0 to 5.0 s in trial 1, found 5.1 s"):
+        answered(session, "same", 5.1)
+    with pytest.raises(SessionError, match="found -1 s"):
+        answered(session, "same", -1.0)
+    session, answer = answered(session, "same", 5.0)
+    assert (answer.value, answer.response_s, answer.attempt, answer.missed) == ("same", 5.0, 1, False)
+
+
+def test_a_wrong_order_of_calls_is_refused(opened):
+    with pytest.raises(SessionError, match="Expected no answer now: the session is at 'instructions'"):
+        answered(opened, "same", 1.0)
+    with pytest.raises(SessionError, match="Expected no answer now"):
+        missed(opened)
+    session = to_question(opened)
+    with pytest.raises(SessionError, match=r"Expected an answer to trial 1 .* can't be passed over"):
+        advanced(session)
+    after, _ = answered(session, "same", 1.0)
+    with pytest.raises(SessionError, match="the session is at 'pause'"):
+        answered(after, "same", 1.0)
+    done, _ = run(opened)
+    assert current(done).kind == "done"
+    with pytest.raises(SessionError, match="the session is done"):
+        advanced(done)
+
+
+def test_a_missed_answer_is_recorded_and_not_asked_again(opened):
+    session, answer = missed(to_question(opened))
+    assert (answer.value, answer.response_s, answer.missed) == (None, None, True)
+    _, rest = run(session)
+    assert [a.trial for a in rest] == list(range(2, 9))
+
+
+@pytest.mark.parametrize("done", range(9))
+def test_a_session_is_taken_up_where_it_stopped(opened, done):
+    """Whatever was answered before, the rest is the rest, in the same order."""
+    _, whole = run(opened)
+    _, before = run(opened, done)
+    again = open_session(opened.protocol, opened.plan, before)
+    assert progress(again) == (done, 8)
+    _, after = run(again)
+    assert before + after == whole
+
+
+def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opened):
+    _, before = run(opened, 2)
+    seen = []
+    run(open_session(opened.protocol, opened.plan, before), seen=seen)
+    assert seen[0].text == "Some pairs are the same."
+    assert seen[1].kind == "first"
+    assert seen[1].trial == 3
+
+
+def test_a_badly_shown_trial_comes_again_at_the_end_of_its_study(opened):
+    session, faulty = answered(to_question(opened), "same", 1.0, shown_well=False)
+    _, rest = run(session)
+    assert [(a.trial, a.attempt) for a in rest][4:] == [(6, 1), (1, 2), (7, 1), (8, 1)]
+    for count in range(9):
+        before = [faulty, *rest[:count]]
+        _, after = run(open_session(opened.protocol, opened.plan, before))
+        assert [faulty, *rest] == before + after
+
+
+def test_a_trial_is_not_repeated_for_ever(opened):
+    session = opened
+    answers = []
+    while current(session := to_question(session)).kind != "done":
+        session, answer = answered(session, current(session).legal[0], 1.0, shown_well=False)
+        answers.append(answer)
+    assert len(answers) == 16
+    assert {answer.attempt for answer in answers} == {1, 2}
+    assert current(open_session(opened.protocol, opened.plan, answers)).kind == "debrief"
+
+
+def test_rating_asks_every_item_without_time_limit(rating_protocol, make_stimuli):
+    plan = draw_plan(rating_protocol, make_stimuli(rating_protocol).pairs, "p01")
+    seen = []
+    _, answers = run(open_session(rating_protocol, plan), choose=lambda step: step.legal[-1], seen=seen)
+    rated = [step for step in seen if step.study == "rating" and step.kind == "answer"]
+    assert [(step.item, step.legal, step.duration_s) for step in rated[:2]] == [
+        ("natural", ("0", "1", "2", "3", "4"), None),
+        ("noticeable", ("0", "1", "2", "3", "4"), None),
+    ]
+    assert (rated[0].low, rated[0].high) == ("not at all", "very")
+    kinds = [step.kind for step in seen if step.trial == rated[0].trial]
+    assert kinds == ["first", "answer", "answer", "pause"]
+    half = answers[: [a.item for a in answers].index("natural") + 1]
+    _, rest = run(open_session(rating_protocol, plan, half), choose=lambda step: step.legal[-1])
+    assert half + rest == answers
+
+
+def test_breaks_come_after_so_many_trials(toy_protocol, toy_stimuli):
+    text = toy_protocol.text.replace("[points]", '[timing]\nbreak_after = 3\n\n[points]').replace(
+        "[texts]", '[texts]\nbreak_text = "Rest."'
+    )  # fmt: skip
+    protocol = parse_protocol(text)
+    session = open_session(protocol, draw_plan(protocol, toy_stimuli.pairs, "p01"))
+    seen = []
+    run(session, seen=seen)
+    before = [seen[i - 1].trial for i, step in enumerate(seen) if step.kind == "break"]
+    assert before == [3, 6]
+
+
+def test_another_protocol_or_stray_answers_are_refused(opened):
+    other = parse_protocol(opened.protocol.text + "# changed\n")
+    with pytest.raises(SessionError, match="Expected the protocol under which the plan was drawn"):
+        open_session(other, opened.plan)
+    _, answers = run(opened, 1)
+    from dataclasses import replace
+
+    with pytest.raises(SessionError, match=r"trials 1 to 8, found trials \[99\]"):
+        open_session(opened.protocol, opened.plan, [replace(answers[0], trial=99)])
