@@ -15,6 +15,7 @@ floor is the same for both, and so is the lean that is left of the root's rotati
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,8 +24,9 @@ from numpy.typing import NDArray
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved, retarget
+from study.motion.skeleton import Skeleton
 from study.transitions.distances import check_same_rig
-from study.transitions.windows import Window, check_frames, shortfall, window
+from study.transitions.windows import check_frames, shortfall, window
 
 FloatArray = NDArray[np.float64]
 
@@ -114,6 +116,7 @@ def blend(
     *,
     weight: str = "linear",
     specification: str = "start-end",
+    joint_frames: Mapping[str, int] | None = None,
 ) -> Transition:
     """Source, then a blend, then destination (2004 section 3).
 
@@ -128,6 +131,9 @@ def blend(
         Blended frames, at least 1.
     weight
         `"linear"` or `"sigmoid"`; see `blend_weights`.
+    joint_frames
+        Shorter blends for some joints, by role, each in the middle of the blend; 2004 (section 3.1.4) tried this and
+        advises against it, since it breaks the coherence of the body.
 
     Returns
     -------
@@ -148,16 +154,36 @@ def blend(
             f"destination frame {end_frame}, but {lacking}. Choose other frames, extend the clip or blend shorter."
         )
     destination = retarget(destination, source.skeleton)
-    share = blend_weights(blend_frames, weight)
-    return _joined(
+    return join(
         source,
         destination,
-        frames,
         _margins(source, frames.source_start, blend_frames),
         _margins(destination, frames.destination_start, blend_frames),
-        share,
+        (frames.source_start, frames.source_stop),
+        (frames.destination_start, frames.destination_stop),
+        blend_weights(blend_frames, weight),
+        joint_shares(source.skeleton, blend_frames, weight, joint_frames),
         f"{weight} blend of {blend_frames} frames, {specification}",
     )
+
+
+def joint_shares(
+    skeleton: Skeleton, blend_frames: int, weight: str, joint_frames: Mapping[str, int] | None
+) -> FloatArray:
+    """The destination's share by blended frame and joint, `(blend_frames, joints)`; `joint_frames` as in `blend`."""
+    shares = np.tile(blend_weights(blend_frames, weight)[:, None], (1, skeleton.joints))
+    for role, own_frames in (joint_frames or {}).items():
+        if not 1 <= own_frames <= blend_frames:
+            raise TransitionError(
+                f"Expected a blend of 1 to {blend_frames} frames for the role {role!r}, got {own_frames}; "
+                "no joint blends for longer than the figure."
+            )
+        first = (blend_frames - own_frames) // 2
+        own = np.zeros(blend_frames)
+        own[first : first + own_frames] = blend_weights(own_frames, weight)
+        own[first + own_frames :] = 1.0
+        shares[:, skeleton.role(role)] = own
+    return shares
 
 
 def cut(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Transition:
@@ -178,60 +204,74 @@ def cut(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Tr
 
 
 @dataclass(frozen=True, eq=False)
-class _Stretch:
-    """A blend window of one clip with the frame before and the frame after it, and whether these exist."""
+class Stretch:
+    """The poses of one clip that go into a blend, with one before and one after them, and whether these exist.
+
+    Where they don't, the nearest pose stands in and its step is not used.
+    """
 
     clip: Clip
     has_before: bool
     has_after: bool
 
 
-def _margins(clip: Clip, start: int, blend_frames: int) -> _Stretch:
+def _margins(clip: Clip, start: int, blend_frames: int) -> Stretch:
     wanted = np.arange(start - 1, start + blend_frames + 1)
     inside = np.clip(wanted, 0, clip.frames - 1)
-    return _Stretch(_pick(clip, inside), bool(wanted[0] >= 0), bool(wanted[-1] < clip.frames))
+    return Stretch(_pick(clip, inside), bool(wanted[0] >= 0), bool(wanted[-1] < clip.frames))
 
 
 def _pick(clip: Clip, frames: NDArray[np.int64] | list[int]) -> Clip:
     return replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
 
 
-def _joined(
+def join(
     source: Clip,
     destination: Clip,
-    frames: Window,
-    source_part: _Stretch,
-    destination_part: _Stretch,
+    source_stretch: Stretch,
+    destination_stretch: Stretch,
+    source_frames: tuple[int, int],
+    destination_frames: tuple[int, int],
     share: FloatArray,
+    shares: FloatArray,
     note: str,
 ) -> Transition:
-    """The transition whose blended frames mix two stretches of equally many frames."""
+    """The transition whose blended frames mix two stretches of equally many poses.
+
+    Parameters
+    ----------
+    source, destination
+        Clips on one skeleton.
+    source_stretch, destination_stretch
+        What is mixed; `len(share) + 2` poses each.
+    source_frames, destination_frames
+        The frames of each clip that the stretches cover, as slices count them; the rest before and after is kept.
+    share : (blend_frames,)
+        The destination's share in the root.
+    shares : (blend_frames, joints)
+        The destination's share in each joint.
+    note
+        What is done, in words.
+    """
     count = len(share)
-    rotations = slerp_one_way(source_part.clip.rotations[1:-1], destination_part.clip.rotations[1:-1], share)
-    positions, rotations[:, 0], end_facing, end_position = _blend_root(source_part, destination_part, share)
-    last = count + (1 if destination_part.has_after else 0)
+    rotations = slerp_one_way(source_stretch.clip.rotations[1:-1], destination_stretch.clip.rotations[1:-1], shares)
+    positions, rotations[:, 0], end_facing, end_position = _blend_root(source_stretch, destination_stretch, share)
+    last = count + (1 if destination_stretch.has_after else 0)
     alignment = _alignment(
-        end_facing - float(facing(destination_part.clip)[last]),
+        end_facing - float(facing(destination_stretch.clip)[last]),
         end_position,
-        destination_part.clip.root_positions[last],
+        destination_stretch.clip.root_positions[last],
     )
     blended = replace(source, root_positions=positions, rotations=rotations)
-    note = f"{note}, from source frame {frames.source_start} to destination frame {frames.destination_stop - 1}"
-    clip = _assemble(source, frames.source_start, blended, destination, frames.destination_stop, alignment, note)
+    note = f"{note}, from source frame {source_frames[0]} to destination frame {destination_frames[1] - 1}"
+    clip = _assemble(source, source_frames[0], blended, destination, destination_frames[1], alignment, note)
     return Transition(
-        clip,
-        frames.source_start,
-        frames.source_start + count,
-        (frames.source_start, frames.source_stop),
-        (frames.destination_start, frames.destination_stop),
-        count,
-        alignment,
-        note,
+        clip, source_frames[0], source_frames[0] + count, source_frames, destination_frames, count, alignment, note
     )
 
 
 def slerp_one_way(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray:
-    """Slerp of two stretches of motion `(frames, joints, 4)` under `share (frames,)`, each joint the same way round.
+    """Slerp of two stretches of motion `(frames, joints, 4)` under shares `(frames, joints)`, each joint one way round.
 
     Each joint takes the way that is shorter over the whole stretch. Choosing anew at each frame, two rotations
     about half a turn apart would swap sides from one frame to the next, and the limb would jump. Both stretches have
@@ -241,7 +281,7 @@ def slerp_one_way(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray
     sign = np.where(np.sum(dots, axis=0) < 0.0, -1.0, 1.0)
     angle = np.arctan2(np.linalg.norm(a - b * sign[:, None], axis=-1), np.linalg.norm(a + b * sign[:, None], axis=-1))
     angle = 2.0 * angle[..., None]
-    weight = share[:, None, None]
+    weight = share[..., None]
     near = np.sin(angle) < 1e-6
     safe = np.where(near, 1.0, np.sin(angle))
     share_a = np.where(near, 1.0 - weight, np.sin((1.0 - weight) * angle) / safe)
@@ -253,7 +293,7 @@ def slerp_one_way(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray
 
 
 def _blend_root(
-    source: _Stretch, destination: _Stretch, share: FloatArray
+    source: Stretch, destination: Stretch, share: FloatArray
 ) -> tuple[FloatArray, FloatArray, float, FloatArray]:
     """Root positions and rotations of the blended frames, and facing and position to go on from (see the module).
 
@@ -280,7 +320,7 @@ def _blend_root(
         quat.continuous(quat.multiply(quat.yaw(-own[1:-1]), part.clip.rotations[1:-1, 0]))[:, None]
         for part, own in zip((source, destination), headings, strict=True)
     ]
-    rotations = quat.multiply(quat.yaw(heading[1:-1]), slerp_one_way(leans[0], leans[1], share)[:, 0])
+    rotations = quat.multiply(quat.yaw(heading[1:-1]), slerp_one_way(leans[0], leans[1], share[:, None])[:, 0])
     last = count + (1 if destination.has_after else 0)
     return path[1:-1], rotations, float(heading[last]), path[last]
 

@@ -155,7 +155,7 @@ def test_slerp_keeps_its_way_round_where_the_shorter_way_would_swap():
     angle = np.linspace(0.9 * np.pi, 1.02 * np.pi, 12)  # crosses half a turn apart
     a = np.tile(quat.IDENTITY, (12, 1, 1))
     b = quat.from_axis_angle([0.0, 0.0, 1.0], angle)[:, None]
-    mixed = slerp_one_way(a, b, np.full(12, 0.5))
+    mixed = slerp_one_way(a, b, np.full((12, 1), 0.5))
     assert np.max(quat.half_angle_between(mixed[1:], mixed[:-1])) < 0.02
     np.testing.assert_allclose(2 * quat.half_angle_between(mixed[:, 0], a[:, 0]), angle / 2, atol=1e-9)
 
@@ -165,9 +165,9 @@ def test_slerp_agrees_with_the_shorter_way_where_there_is_no_doubt():
     a = quat.normalise(np.array([1.0, 0, 0, 0]) + 0.15 * rng.normal(size=(6, 4, 4)))
     b = quat.normalise(np.array([1.0, 0, 0, 0]) + 0.15 * rng.normal(size=(6, 4, 4)))
     share = np.linspace(0, 1, 6)
-    np.testing.assert_allclose(slerp_one_way(a, -b, share), quat.slerp(a, b, share[:, None]), atol=1e-12)
+    np.testing.assert_allclose(slerp_one_way(a, -b, share[:, None]), quat.slerp(a, b, share[:, None]), atol=1e-12)
     same = np.tile(quat.IDENTITY, (6, 1, 1))
-    np.testing.assert_array_equal(slerp_one_way(same, -same, share), same)
+    np.testing.assert_array_equal(slerp_one_way(same, -same, share[:, None]), same)
 
 
 def test_blends_reach_to_the_very_ends_of_the_clips(make_walk):
@@ -180,6 +180,21 @@ def test_blends_reach_to_the_very_ends_of_the_clips(make_walk):
     left = blend(source, destination, 5, 0, 15, specification="left")
     assert left.clip.frames == 25
     assert np.max(np.abs(np.diff(speeds(left.clip)))) < 0.05
+
+
+def test_joints_may_blend_for_less_long_than_the_figure(make_walk):
+    source, destination = make_walk(100), make_walk(100, phase=2.0)
+    shoulder, hip = (source.skeleton.role(role) for role in ("shoulder.L", "hip.L"))
+    whole = blend(source, destination, 40, 60, 20).clip.rotations[40:60]
+    result = blend(source, destination, 40, 60, 20, joint_frames={"shoulder.L": 10}).clip.rotations[40:60]
+    np.testing.assert_array_equal(result[:, hip], whole[:, hip])
+    apart = quat.half_angle_between(result[:, shoulder], source.rotations[40:60, shoulder])
+    np.testing.assert_allclose(apart[:5], 0.0, atol=1e-7)
+    assert np.all(apart[5:] > 0)
+    there = quat.half_angle_between(result[:, shoulder], destination.rotations[41:61, shoulder])
+    np.testing.assert_allclose(there[15:], 0.0, atol=1e-7)
+    with pytest.raises(TransitionError, match=r"1 to 20 frames for the role 'knee\.R', got 21"):
+        blend(source, destination, 40, 60, 20, joint_frames={"knee.R": 21})
 
 
 def test_a_cut_matches_facing_and_floor_position(make_walk):

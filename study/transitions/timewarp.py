@@ -1,0 +1,293 @@
+"""Time-warped blends: the window in the source and the window in the destination may differ in length.
+
+In: two clips of one rig at one frame rate, a start frame and an end frame. Out: the cost of every pair of lengths, the
+cheapest pair, and the blend that follows. Wang & Bodenheimer 2004, section 3.1.4, Eqs. 5 and 6, Figure 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import TransitionError
+from study.motion.clip import Clip, retarget, sample
+from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames
+from study.transitions.blending import Stretch, Transition, blend_weights, join, joint_shares
+from study.transitions.distances import check_same_rig, half_angle_squares
+from study.transitions.weights import joint_weights
+from study.transitions.windows import check_frames
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class WarpLength:
+    """The cheapest pair of blend lengths.
+
+    Parameters
+    ----------
+    source_frames, destination_frames
+        Frames of each clip in the blend (2004: b_from and b_to).
+    blend_frames, blend_s
+        How long the blend takes: the longer of the two, in frames and in seconds.
+    cost
+        Its cost.
+    costs : (lengths, lengths)
+        The cost of each pair, by source length, then destination length.
+    shortest
+        The length of the first row and column, frames.
+    note
+        What a reader should know: that candidates were left out.
+    """
+
+    source_frames: int
+    destination_frames: int
+    blend_frames: int
+    blend_s: float
+    cost: float
+    costs: FloatArray
+    shortest: int
+    note: str = ""
+
+
+def warp_length(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    *,
+    shortest: int | None = None,
+    longest: int | None = None,
+    weights: str | Mapping[str, float] = "wang2003",
+    average: bool = True,
+    restrict: bool = False,
+) -> WarpLength:
+    """The pair of blend lengths with the least cost (2004 Eqs. 5 and 6).
+
+    Parameters
+    ----------
+    source, destination, start_frame, end_frame, shortest, longest, weights, restrict
+        As in `study.transitions.blend_length.blend_length`; the range holds for both lengths.
+    average
+        Divide each sum by its number of terms, as Eq. 1 does, so that equal lengths cost what the geodesic method
+        says. Eqs. 5 and 6 print the sum itself (False), which favours short blends for being short.
+
+    Raises
+    ------
+    TransitionError
+        Where the clips don't supply the frames, or differ in rig or frame rate.
+    """
+    check_same_rig(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
+    high = default_frames(source.fps, LONGEST_S) if longest is None else longest
+    if not 1 <= low <= high:
+        raise TransitionError(f"Expected 1 <= shortest <= longest blend length in frames, got {low} and {high}.")
+    note = ""
+    available = min(source.frames - start_frame, end_frame)
+    if restrict and start_frame > 0 and low <= available < high:
+        note = f"the clips supply warped blends of up to {available} frames; {high} were asked for"
+        high = available
+    weight = joint_weights(source.skeleton, weights)
+    costs = warp_costs(source, destination, start_frame, end_frame, high, weight, average=average)[low - 1 :, low - 1 :]
+    row, column = np.unravel_index(int(np.argmin(costs)), costs.shape)
+    lengths = (low + int(row), low + int(column))
+    return WarpLength(*lengths, max(lengths), max(lengths) / source.fps, float(costs[row, column]), costs, low, note)
+
+
+def warp_costs(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    longest: int,
+    weights: FloatArray,
+    *,
+    average: bool = True,
+) -> FloatArray:
+    """The cost of every pair of lengths 1 to `longest` frames, `(longest, longest)`: source length, destination length.
+
+    Eq. 5 where the source's window is no longer than the destination's, else Eq. 6; see `warp_length`.
+
+    Raises
+    ------
+    TransitionError
+        Where the clips lack frames. A warped window also looks between its first frame and the frame before it, so
+        one frame more is needed before the start frame and before the destination's window.
+
+    Notes
+    -----
+    Poses between frames come by slerp. On the arc from `q0` to `q1`, `theta` apart, the dot product with any `p` is
+    `cos(u theta) (q0 . p) + sin(u theta) ((q1 . p) - cos(theta) (q0 . p)) / sin(theta)`, so a table of dot products of
+    whole frames serves all the poses between them, exactly.
+    """
+    _check_supply(source, destination, start_frame, end_frame, longest, longest)
+    used = np.flatnonzero(weights)
+    a = source.rotations[start_frame - 1 : start_frame + longest][:, used]
+    b = destination.rotations[end_frame - longest : end_frame + 1][:, used]
+    # Eq. 5: the source's poses move, from frame i-1 on; the destination's are frames j-b_to+1 to j.
+    source_moves = _Arcs(a, b[1:], weights[used])
+    # Eq. 6: the destination's poses move, from frame j-b_to on; the source's are frames i to i+b_from-1.
+    destination_moves = _Arcs(b, a[1:], weights[used])
+    costs = np.empty((longest, longest))
+    for longer in range(1, longest + 1):
+        costs[:longer, longer - 1] = source_moves.sums(_pairs(longer, longest, False))
+        costs[longer - 1, :longer] = destination_moves.sums(_pairs(longer, longest, True))
+    if average:
+        lengths = np.arange(1, longest + 1)
+        costs /= np.maximum.outer(lengths, lengths)
+    return costs
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """Which poses meet in all windows of one longer length, for each shorter length (rows) and each t (columns).
+
+    A moving pose lies `share (poses,)` of the way from its `row (poses,)` to the next one; many pairs use the same
+    pose, so `pose (pairs,)` says which one, and `cell (pairs,)` where its row and the fixed frame are in a table.
+    """
+
+    longer: int
+    row: IntArray
+    share: FloatArray
+    pose: IntArray
+    cell: IntArray
+
+
+@lru_cache(maxsize=512)
+def _pairs(longer: int, longest: int, from_end: bool) -> _Pairs:
+    """The pairs of Eq. 5, or with `from_end` those of Eq. 6, whose moving window ends at the last row."""
+    lengths, t = np.arange(1, longer + 1), np.arange(1, longer + 1)
+    # In parts of 1 / longer of a frame, from the first row or to the last one.
+    parts = np.outer(lengths, longer - t) if from_end else np.outer(lengths, t)
+    found, pose = np.unique(parts, return_inverse=True)
+    row, rest = np.divmod(longest * longer - found if from_end else found, longer)
+    pose = pose.reshape(parts.shape)
+    fixed = t - 1 if from_end else longest - longer + t - 1
+    return _Pairs(longer, row, rest / longer, pose.ravel(), (row[pose] * longest + fixed).ravel())
+
+
+class _Arcs:
+    """Dot products of the arcs between the poses of one clip with the frames of another, joint by joint.
+
+    Parameters
+    ----------
+    moving : (frames + 1, joints, 4)
+    fixed : (frames, joints, 4)
+    weights : (joints,)
+    """
+
+    def __init__(self, moving: FloatArray, fixed: FloatArray, weights: FloatArray) -> None:
+        # The last pose has no arc after it; its own serves, and is only asked for at its start.
+        after = np.concatenate([moving[1:], moving[-1:]])
+        sign = np.where(np.sum(moving * after, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+        chord = np.linalg.norm(moving - sign * after, axis=-1)
+        self.angles = 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+        dots, dots_after = (
+            np.matmul(q.transpose(1, 0, 2), fixed.transpose(1, 2, 0)).transpose(1, 2, 0) for q in (moving, sign * after)
+        )
+        sine = np.sin(self.angles)
+        across = (dots_after - np.cos(self.angles)[:, None] * dots) / np.where(sine < 1e-9, 1.0, sine)[:, None]
+        self.dots, self.across = (np.ascontiguousarray(x).reshape(-1, moving.shape[1]) for x in (dots, across))
+        self.weights = weights
+        # Arrays of this size are given back to the system and asked for again each time, which costs more than
+        # the sums do.
+        self.work = np.empty((3, len(fixed) ** 2, moving.shape[1]))
+
+    def sums(self, pairs: _Pairs) -> FloatArray:
+        """The cost summed over t for each shorter length, `(longer,)`."""
+        sine = np.sin(self.angles[pairs.row] * pairs.share[:, None])
+        # Arcs between frames stay far below a quarter turn of the half angle, where this would lose digits.
+        cosine = np.sqrt(1.0 - sine * sine)
+        dots, rest, table = self.work[:, : len(pairs.pose)]
+        # "clip" lets take write in place; every index is within range.
+        cosine.take(pairs.pose, axis=0, out=dots, mode="clip")
+        dots *= self.dots.take(pairs.cell, axis=0, out=table, mode="clip")
+        sine.take(pairs.pose, axis=0, out=rest, mode="clip")
+        rest *= self.across.take(pairs.cell, axis=0, out=table, mode="clip")
+        dots += rest
+        return np.asarray((half_angle_squares(dots) @ self.weights).reshape(pairs.longer, -1).sum(axis=1))
+
+
+def _check_supply(
+    source: Clip, destination: Clip, start_frame: int, end_frame: int, source_frames: int, destination_frames: int
+) -> None:
+    names = [
+        f"the {kind} {c.name}" if c.name else f"the {kind}"
+        for kind, c in (("source", source), ("destination", destination))
+    ]
+    faults = []
+    if start_frame < 1:
+        faults.append(f"{names[0]} lacks 1 frame before its first")
+    if (lacking := start_frame + source_frames - source.frames) > 0:
+        faults.append(f"{names[0]} lacks {lacking} frames after its last")
+    if (lacking := destination_frames - end_frame) > 0:
+        faults.append(f"{names[1]} lacks {lacking} frames before its first")
+    if faults:
+        raise TransitionError(
+            f"Expected clips with frames for warped blends of {source_frames} source and {destination_frames} "
+            f"destination frames at source frame {start_frame} and destination frame {end_frame}, but "
+            f"{'; '.join(faults)}. Choose other frames, extend the clip or lower the longest blend."
+        )
+
+
+def warped_blend(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    source_frames: int,
+    destination_frames: int,
+    *,
+    weight: str = "linear",
+) -> Transition:
+    """Source, a blend in which the shorter window is slowed to the length of the longer one, destination.
+
+    Parameters
+    ----------
+    source, destination, start_frame, end_frame, weight
+        As in `study.transitions.blending.blend`.
+    source_frames, destination_frames
+        Frames of each clip that go into the blend, at least 1, as `warp_length` chooses them. The blend takes as many
+        frames as the longer window has.
+
+    Returns
+    -------
+    Transition
+        With equal lengths, the same as `blend`.
+    """
+    check_same_rig(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    if min(source_frames, destination_frames) < 1:
+        raise TransitionError(
+            f"Expected at least 1 frame of each clip in a blend, got {source_frames} and {destination_frames}."
+        )
+    _check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
+    destination = retarget(destination, source.skeleton)
+    count = max(source_frames, destination_frames)
+    return join(
+        source,
+        destination,
+        _stretch(source, start_frame - 1, source_frames, count, rate_after=source_frames / count),
+        _stretch(destination, end_frame - destination_frames, destination_frames, count, rate_after=1.0),
+        (start_frame, start_frame + source_frames),
+        (end_frame - destination_frames + 1, end_frame + 1),
+        blend_weights(count, weight),
+        joint_shares(source.skeleton, count, weight, None),
+        f"{weight} time-warped blend of {source_frames} source and {destination_frames} destination frames",
+    )
+
+
+def _stretch(clip: Clip, before: int, frames: int, count: int, *, rate_after: float) -> Stretch:
+    """`count` poses over `frames` frames, with the pose before them and, where there is one, the pose after."""
+    times = before + np.arange(count + 1) * frames / count
+    # Rounding must not put the last pose beside its frame.
+    times[-1] = before + frames
+    after = times[-1] + rate_after
+    has_after = after <= clip.frames - 1
+    return Stretch(sample(clip, np.append(times, after if has_after else times[-1])), True, bool(has_after))

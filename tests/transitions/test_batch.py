@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from study.errors import TransitionError
+from study.transitions.batch import geodesic_lengths
+from study.transitions.blend_length import blend_length
+
+
+def test_many_at_once_are_what_they_are_one_by_one(make_walk):
+    source, destination = make_walk(200, phase=0.3), make_walk(180, phase=2.0, cadence=1.3, swing=0.7)
+    rng = np.random.default_rng(5)
+    starts, ends = rng.integers(0, 141, 60), rng.integers(59, 180, 60)
+    lengths, costs = geodesic_lengths(source, destination, starts, ends)
+    for i, j, length, cost in zip(starts, ends, lengths, costs, strict=True):
+        one = blend_length(source, destination, int(i), int(j))
+        assert one.costs is not None
+        assert one.costs[length - 1] == pytest.approx(one.cost, abs=1e-13)
+        assert cost == pytest.approx(one.cost, abs=1e-13)
+
+
+def test_a_range_of_lengths_is_kept(make_walk):
+    walk, other = make_walk(100), make_walk(100, phase=2.0)
+    lengths, costs = geodesic_lengths(walk, other, [10, 20], [80, 90], shortest=5, longest=12)
+    for k, (i, j) in enumerate([(10, 80), (20, 90)]):
+        one = blend_length(walk, other, i, j, shortest=5, longest=12)
+        assert lengths[k] == one.blend_frames
+        assert costs[k] == pytest.approx(one.cost, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("starts", "ends", "message"),
+    [
+        (
+            [0, 41],
+            [59, 99],
+            "start frames from 0 to 40 in the source.*1 of 2 transitions do not, the first from 41 to 99",
+        ),
+        ([0], [58], "end frames from 59 to 99"),
+        ([-1], [60], "first from -1 to 60"),
+        ([0, 1], [60], r"as many start frames as end frames.*\(2,\) and \(1,\)"),
+    ],
+)
+def test_frames_that_are_not_there_are_counted(make_walk, starts, ends, message):
+    with pytest.raises(TransitionError, match=message):
+        geodesic_lengths(make_walk(100), make_walk(100), starts, ends)

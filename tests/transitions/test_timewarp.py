@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from study.errors import TransitionError
+from study.motion import quaternions as quat
+from study.motion.clip import moved, sample
+from study.transitions.blend_length import geodesic_costs
+from study.transitions.blending import blend
+from study.transitions.timewarp import warp_costs, warp_length, warped_blend
+from study.transitions.weights import joint_weights
+
+
+def plain_cost(source, destination, i, j, b_from, b_to, weights):
+    """2004 Eqs. 5 and 6 as printed, pose by pose, with slerp between frames; the sum, not the mean."""
+    total = 0.0
+    for t in range(1, max(b_from, b_to) + 1):
+        if b_from <= b_to:
+            at_source, at_destination = i + b_from * t / b_to - 1, j - b_to + t
+        else:
+            at_source, at_destination = i + t - 1, j - b_to + b_to * t / b_from
+        # Where the division rounds, a time that should be whole is made whole.
+        times = [round(time) if abs(time - round(time)) < 1e-9 else time for time in (at_source, at_destination)]
+        a, b = sample(source, [times[0]]).rotations[0], sample(destination, [times[1]]).rotations[0]
+        turn = quat.log(quat.multiply(quat.conjugate(b), a))
+        total += float(weights @ np.sum(turn * turn, axis=-1))
+    return total
+
+
+@pytest.fixture(scope="module")
+def pair(make_walk):
+    return make_walk(60, phase=0.4), make_walk(60, phase=2.1, cadence=1.4, swing=0.7)
+
+
+@pytest.mark.parametrize("average", [True, False])
+def test_costs_are_those_of_the_plain_equations(pair, average):
+    weights = joint_weights(pair[0].skeleton)
+    costs = warp_costs(*pair, 20, 40, 9, weights, average=average)
+    for b_from in range(1, 10):
+        for b_to in range(1, 10):
+            expected = plain_cost(*pair, 20, 40, b_from, b_to, weights)
+            expected /= max(b_from, b_to) if average else 1
+            assert costs[b_from - 1, b_to - 1] == pytest.approx(expected, rel=1e-11, abs=1e-14), (b_from, b_to)
+
+
+def test_long_windows_agree_at_a_sample_of_lengths(make_walk):
+    pair = make_walk(90, phase=0.4), make_walk(90, phase=2.1, cadence=1.4)
+    weights = joint_weights(pair[0].skeleton)
+    costs = warp_costs(*pair, 25, 70, 60, weights, average=False)
+    for b_from, b_to in ((60, 60), (1, 60), (60, 1), (37, 59), (59, 37), (47, 13)):
+        assert costs[b_from - 1, b_to - 1] == pytest.approx(plain_cost(*pair, 25, 70, b_from, b_to, weights), rel=1e-11)
+
+
+def test_equal_lengths_cost_what_the_geodesic_method_says(pair):
+    weights = joint_weights(pair[0].skeleton)
+    warped = np.diag(warp_costs(*pair, 15, 45, 30, weights))
+    np.testing.assert_allclose(warped, geodesic_costs(*pair, 15, 45, 30, weights), rtol=1e-12, atol=1e-15)
+
+
+def test_another_tempo_of_the_same_motion_is_found(make_walk):
+    """The destination is the source at two thirds of its tempo: two source frames to three of the destination."""
+    source, destination = make_walk(150, cadence=1.2), make_walk(150, cadence=0.8)
+    # Source frame i - 1 + s is at phase 1.2 (i - 1 + s), destination frame j - b + t at 0.8 (j - b + t): equal for
+    # i = 31, j = 90, b_from = 30, b_to = 45, in all frames.
+    found = warp_length(source, destination, 31, 90, shortest=20, longest=60)
+    assert found.source_frames * 3 == found.destination_frames * 2
+    assert found.cost < 1e-5
+    assert (found.blend_frames, found.blend_s) == (45, 1.5)
+
+
+def test_the_printed_sum_favours_short_blends(pair):
+    mean = warp_length(*pair, 20, 40, longest=15)
+    printed = warp_length(*pair, 20, 40, longest=15, average=False)
+    assert printed.blend_frames <= mean.blend_frames
+    assert printed.cost <= mean.cost * mean.blend_frames
+
+
+def test_where_the_clips_stand_changes_nothing(pair):
+    turned = moved(pair[1], np.radians(170), np.array([1.0, 0.0, 2.0]))
+    assert warp_length(*pair, 20, 40, longest=12).cost == warp_length(pair[0], turned, 20, 40, longest=12).cost
+
+
+def test_equal_lengths_blend_as_without_a_warp(pair):
+    plain, warped = blend(*pair, 20, 40, 12), warped_blend(*pair, 20, 40, 12, 12)
+    np.testing.assert_allclose(warped.clip.root_positions, plain.clip.root_positions, atol=1e-12)
+    np.testing.assert_allclose(quat.half_angle_between(warped.clip.rotations, plain.clip.rotations), 0, atol=1e-7)
+    assert (warped.blend_start, warped.blend_stop) == (plain.blend_start, plain.blend_stop)
+    assert warped.source_frames == plain.source_frames
+    assert warped.destination_frames == plain.destination_frames
+
+
+@pytest.mark.parametrize(("b_from", "b_to"), [(10, 20), (20, 10), (1, 15), (15, 1), (18, 28)])
+def test_a_warped_blend_takes_the_longer_time_and_keeps_the_rest(make_walk, b_from, b_to):
+    source, destination = make_walk(100), make_walk(100, phase=2.0)
+    result = warped_blend(source, destination, 40, 60, b_from, b_to, weight="sigmoid")
+    assert result.blend_frames == max(b_from, b_to) == result.blend_stop - result.blend_start
+    assert result.source_frames == (40, 40 + b_from)
+    assert result.destination_frames == (61 - b_to, 61)
+    assert result.clip.frames == 40 + result.blend_frames + 39
+    np.testing.assert_array_equal(result.clip.rotations[:40], source.rotations[:40])
+    tail = moved(destination, result.alignment.yaw, np.array(result.alignment.translation))
+    np.testing.assert_allclose(result.clip.root_positions[result.blend_stop :], tail.root_positions[61:], atol=1e-12)
+    # A window played slower moves slower; the root never goes back or jumps.
+    speed = np.linalg.norm(np.diff(result.clip.root_positions[:, [0, 2]], axis=0), axis=1) * 30
+    assert speed.max() < 1.3
+    assert speed.min() > 0
+
+
+def test_frames_that_are_not_there_are_counted(pair):
+    with pytest.raises(TransitionError, match="the source lacks 1 frame before its first"):
+        warp_length(*pair, 0, 40, longest=5)
+    with pytest.raises(
+        TransitionError,
+        match=r"the source lacks 5 frames after its last; the destination lacks 5 frames before its first",
+    ):
+        warp_length(*pair, 45, 15, longest=20)
+    with pytest.raises(TransitionError, match="lacks 7 frames before its first"):
+        warped_blend(*pair, 20, 3, 5, 10)
+    with pytest.raises(TransitionError, match="at least 1 frame of each clip in a blend, got 0 and 4"):
+        warped_blend(*pair, 20, 40, 0, 4)
+    restricted = warp_length(*pair, 45, 15, longest=20, restrict=True)
+    assert restricted.costs.shape == (15, 15)
+    assert "up to 15 frames; 20 were asked for" in restricted.note
