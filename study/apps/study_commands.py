@@ -94,8 +94,8 @@ def analyse_results(folder: Path) -> dict[str, Any]:
 
 def headlines(analysis: dict[str, Any]) -> list[str]:
     """The answers of an analysis in sentences."""
-    sentences = [study["words"] for study in analysis["jnd"].values()]
-    sentences += [compared["words"] for study in analysis["preference"].values() for compared in study]
+    sentences = [study["answer"] for study in analysis["jnd"].values()]
+    sentences += [compared["answer"] for study in analysis["preference"].values() for compared in study]
     return sentences
 
 

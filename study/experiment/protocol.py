@@ -50,8 +50,10 @@ class StimulusSettings(_Part):
 
     width: int = Field(default=640, ge=64, le=3840, multiple_of=2, description="Width of the video; even. [pixels]")
     height: int = Field(default=480, ge=64, le=2160, multiple_of=2, description="Height of the video; even. [pixels]")
-    view: Literal["front", "side", "three-quarter"] = Field(
-        default="three-quarter", description="From where the fixed camera looks at the group's common heading."
+    view: Literal["clearest", "front", "side", "three-quarter"] = Field(
+        default="clearest",
+        description="From where the fixed camera looks at the group's common heading; `clearest` is the view in which "
+        "the group's figures are large and their limbs move most in the picture.",
     )
     style: Literal["stick", "points", "mannequin"] = Field(default="mannequin", description="How the figure is drawn.")
     camera_group: Literal["transition", "category", "study"] = Field(

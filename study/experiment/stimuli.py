@@ -244,6 +244,7 @@ def _with_cameras(protocol: Protocol, library: Library, drafts: dict[_Key, _Draf
     """Figures, one camera a group, and names."""
     from renderer.camera import frame_group
     from renderer.errors import RendererError
+    from renderer.viewpoint import best_view
 
     settings = protocol.stimuli
     groups: dict[str, list[_Key]] = {}
@@ -252,12 +253,9 @@ def _with_cameras(protocol: Protocol, library: Library, drafts: dict[_Key, _Draf
     stimuli: dict[_Key, Stimulus] = {}
     try:
         for group, keys in groups.items():
-            camera = frame_group(
-                [drafts[key].positions for key in keys],
-                size=(settings.width, settings.height),
-                view=settings.view,
-                heading=0.0,
-            )
+            moving, size = [drafts[key].positions for key in keys], (settings.width, settings.height)
+            view = settings.view if settings.view != "clearest" else best_view(moving, size=size, heading=0.0)
+            camera = frame_group(moving, size=size, view=view, heading=0.0)
             for key in keys:
                 stimuli[key] = _stimulus(protocol, library, drafts[key], group, camera)
     except RendererError as error:
