@@ -1,0 +1,125 @@
+"""The command line as a user meets it: exit statuses, one line for a refusal, JSON on standard output."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from study.apps.cli import VERBS, run
+
+ROOT = Path(__file__).parents[2]
+
+
+def ask(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, object]:
+    """A verb's JSON; nothing else may stand on standard output."""
+    status = run([*map(str, arguments), "--json"])
+    printed = capsys.readouterr()
+    assert status == 0, printed.err
+    answer = json.loads(printed.out)
+    assert isinstance(answer, dict)
+    return answer
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line with which bad input is refused, with exit status 2 and nothing on standard output."""
+    status = run([str(argument) for argument in arguments])
+    printed = capsys.readouterr()
+    assert status == 2, printed.err
+    assert printed.out == ""
+    lines = printed.err.splitlines()
+    assert len(lines) == 1, printed.err
+    assert lines[0].startswith("segue: ")
+    return lines[0]
+
+
+def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == 0
+    shown = capsys.readouterr().out
+    for verb in VERBS:
+        assert f"\n  {verb} " in shown
+
+
+def test_every_verb_is_in_the_readme_or_the_docs() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    for verb in VERBS:
+        assert f"segue {verb}" in text, f"`segue {verb}` is documented nowhere"
+
+
+def test_a_verb_that_is_not_there_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "Did you mean 'render'?" in refusal(capsys, "rendr", "x.toml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("check", "nosuch"), "Expected a protocol file or the name of one"),
+        (("motions", "inspect", "nosuch.bvh"), "nosuch.bvh"),
+        (("blend-length", "walk", "run", "--start", "1"), "--end"),
+        (("blend-length", "walk", "rum", "--start", "1", "--end", "70"), "run"),
+        (("blend-length", "walk", "run", "--start", "99999", "--end", "70"), "99999"),
+        (("transition", "walk", "run", "--start", "60", "--end", "80", "--out", "x.mp4"), "--method or --frames"),
+        (("preview", "walk", "--out", "x.gif"), "expected a name that ends in .mp4 or .png"),
+        (("preview", "walk", "--out", "x.mp4", "--size", "12"), "expected --size as WIDTHxHEIGHT"),
+        (("motions", "list", "--library", "nosuchfolder"), "nosuchfolder"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_bad_input_is_refused_in_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
+) -> None:
+    assert words in refusal(capsys, *arguments)
+
+
+def test_blend_length_gives_the_cost_of_every_length(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = ask(capsys, "blend-length", "walk", "run", "--start", 60, "--end", 80, "--method", "geodesic")
+    costs = answer["costs"]
+    assert isinstance(costs, list)
+    assert len(costs) == 60
+    assert answer["blend_frames"] == costs.index(min(costs)) + 1
+    assert answer["cost"] == min(costs)
+    assert answer["blend_s"] == pytest.approx(answer["blend_frames"] / 30)  # type: ignore[operator]
+
+
+def test_a_transition_is_written_and_read_again(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "joined.bvh"
+    made = ask(capsys, "transition", "walk", "run", "--start", 60, "--end", 80, "--frames", 10, "--out", out)
+    read = ask(capsys, "motions", "inspect", out)
+    assert read["frames"] == made["frames"]
+    assert read["fps"] == 30.0
+    assert {"seconds", "joints", "roles", "defects"} <= read.keys()
+
+
+def test_motions_are_listed_with_their_library(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = ask(capsys, "motions", "list")
+    assert answer["synthetic"] is True
+    names = [motion["name"] for motion in answer["motions"]]  # type: ignore[attr-defined]
+    assert {"walk", "run", "stand_to_walk", "box", "tai_chi"} <= set(names)
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("ending", ["png", "mp4"])
+def test_preview_draws_a_strip_or_a_video(capsys: pytest.CaptureFixture[str], tmp_path: Path, ending: str) -> None:
+    out = tmp_path / f"walk.{ending}"
+    answer = ask(capsys, "preview", "stand_to_walk", "--out", out, "--size", "160x120")
+    assert answer["file"] == str(out)
+    magic = out.read_bytes()[:12]
+    assert magic.startswith(b"\x89PNG") if ending == "png" else magic[4:8] == b"ftyp"
+
+
+@pytest.mark.gl
+def test_doctor_says_what_draws(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = ask(capsys, "doctor")
+    assert answer["able"] is True
+    assert answer["kind"]
+    assert "libx264" in str(answer["h264"])
+
+
+@pytest.mark.mocap
+def test_inspect_finds_what_is_wrong_with_a_real_file(capsys: pytest.CaptureFixture[str], mocap: Path) -> None:
+    answer = ask(capsys, "motions", "inspect", mocap / "cmu_bvh" / "05_05.bvh")
+    kinds = {defect["kind"] for defect in answer["defects"]}  # type: ignore[attr-defined]
+    assert len(kinds) >= 2, "the added T-pose frame and the flipping hips are both there"
+    assert answer["fps"] == 120.0
