@@ -121,8 +121,8 @@ def transition_contacts(transition: Transition, source: Clip, destination: Clip)
 def plant_feet(transition: Transition, source: Clip, destination: Clip) -> tuple[Transition, FootslideResult]:
     """A transition whose feet stand still in its blend while they are planted, and what that took.
 
-    `remove_foot_slide` with `transition_contacts` over the blended frames; frames before the blend are unchanged, and
-    so are those after it but for a foot that stays planted from before the blend until it lifts, and the easing out.
+    `remove_foot_slide` with `transition_contacts` over the blended frames. Frames before the blend are unchanged, and
+    so are those after it but for a foot that stays planted from early in the blend until it lifts, and the easing out.
     """
     if transition.blend_frames == 0:
         raise TransitionError("Expected a blended transition to plant the feet in; a cut has no blended frames.")
@@ -156,8 +156,9 @@ def remove_foot_slide(
         When the left and the right foot are planted; `find_contacts` by default.
     region
         Frames `(start, stop)` within which feet are held, as a slice counts them; all by default. For a transition,
-        its blend: a foot that was planted before the blend stays where it stood, one that stays planted after it
-        comes to stand where it will, and one that is planted throughout stays where it stood until it lifts.
+        its blend: no frame before it changes. A foot that was planted before the blend, or comes down within 0.2 s
+        of its start, stays where it stood until it lifts; one that comes down later and stays planted after the blend
+        comes to stand where it will.
 
     Returns
     -------
@@ -177,7 +178,7 @@ def remove_foot_slide(
         raise MotionError(f"Expected a region within frames 0 to {clip.frames}, got {start} to {stop}.")
     points = planted_points(clip)
     shifts = np.stack([_shifts(points[:, foot], contacts[:, foot], start, stop, clip.fps) for foot in range(2)], axis=1)
-    corrected = reach(clip, shifts) if shifts.any() else clip
+    corrected = reach(clip, shifts, start) if shifts.any() else clip
     # A margin of one frame, so that the steps into and out of the region count.
     margin = (max(0, start - 1), min(clip.frames, stop + 1))
     before, seconds = foot_slide(clip, contacts, margin)
@@ -207,11 +208,17 @@ class _Hold:
     ease_out: bool
 
 
-def _hold(point: FloatArray, first: int, last: int, start: int, stop: int) -> _Hold:
-    """How a contact is held: where the frames outside the region have the foot, or else at the contact's mean."""
+def _hold(point: FloatArray, contact: tuple[int, int], region: tuple[int, int], release: int) -> _Hold:
+    """How a contact is held, so that no frame before the region moves, and none after it without need.
+
+    A foot that comes down before the region, or too soon after its start to be led to a place, stays where it came
+    down, until it lifts. One that stays down after the region stands where it will stand. Any other has its mean place.
+    """
+    (first, last), (start, stop) = contact, region
     ease_in = ease_out = True
-    if first < start:
-        place, first, ease_in = point[start - 1], start, False
+    if first < start + release:
+        place, ease_in = point[max(first, start - 1)], False
+        first = max(first, start)
     elif last > stop:
         place, last, ease_out = point[stop], stop, False
     else:
@@ -221,9 +228,10 @@ def _hold(point: FloatArray, first: int, last: int, start: int, stop: int) -> _H
 
 def _shifts(point: FloatArray, contacts: BoolArray, start: int, stop: int, fps: float) -> FloatArray:
     """How far to move one foot in each frame, `(frames, 3)`, metres: to its place while planted, eased around."""
-    holds = [_hold(point, a, b, start, stop) for a, b in _runs(contacts) if b > start and a < stop]
-    shifts = np.zeros_like(point)
     release = max(1, round(RELEASE_S * fps))
+    runs = [run for run in _runs(contacts) if run[1] > start and run[0] < stop]
+    holds = [_hold(point, run, (start, stop), release) for run in runs]
+    shifts = np.zeros_like(point)
     for k, hold in enumerate(holds):
         shifts[hold.first : hold.last] = hold.shift
         # A contact that is nearer than the release takes over that much sooner.

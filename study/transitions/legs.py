@@ -28,15 +28,15 @@ _COME_ROUND_M = 0.01
 _PASSES = 3
 
 
-def reach(clip: Clip, shifts: FloatArray) -> Clip:
+def reach(clip: Clip, shifts: FloatArray, first: int = 0) -> Clip:
     """Move the feet by `shifts (frames, 2, 3)`, metres, left then right.
 
     Where a leg is too short the pelvis comes down, by at most 3 cm. Frames without a shift stay as they are, but for
-    the pelvis easing down and up around frames that need it.
+    the pelvis easing down and up around frames that need it, and frames before `first` stay in any case.
     """
     ankles = [clip.skeleton.role(f"ankle.{side}") for side in "LR"]
     targets = joint_positions(clip)[:, ankles] + shifts
-    lowered = _lowered(clip, targets, shifts)
+    lowered = _lowered(clip, targets, shifts, first)
     dropped = np.any(lowered.root_positions != clip.root_positions, axis=1)
     rotations = clip.rotations.copy()
     for foot, side in enumerate("LR"):
@@ -62,7 +62,7 @@ def _lengths(clip: Clip, side: str) -> tuple[FloatArray, FloatArray, FloatArray]
     return thigh, shank, np.linalg.norm(ankle - hip, axis=1)
 
 
-def _lowered(clip: Clip, targets: FloatArray, shifts: FloatArray) -> Clip:
+def _lowered(clip: Clip, targets: FloatArray, shifts: FloatArray, first: int) -> Clip:
     """The clip with its root let down, smoothly and by at most 3 cm, to where both feet are within reach."""
     drop = np.zeros(clip.frames)
     positions = joint_positions(clip)
@@ -78,7 +78,11 @@ def _lowered(clip: Clip, targets: FloatArray, shifts: FloatArray) -> Clip:
     if np.max(drop) < 1e-6:
         return clip
     half = max(1, round(0.1 * clip.fps))
-    return replace(clip, root_positions=clip.root_positions - np.outer(_envelope(drop, half), [0.0, 1.0, 0.0]))
+    drop = _envelope(drop, half)
+    if first > 0:
+        start = np.clip((np.arange(clip.frames) - first + 1) / (2 * half), 0.0, 1.0)
+        drop = drop * start * start * (3.0 - 2.0 * start)
+    return replace(clip, root_positions=clip.root_positions - np.outer(drop, [0.0, 1.0, 0.0]))
 
 
 def _envelope(values: FloatArray, half: int) -> FloatArray:

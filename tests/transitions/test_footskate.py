@@ -174,6 +174,16 @@ def test_feet_planted_before_the_region_stay_and_the_frames_before_it_are_untouc
     np.testing.assert_allclose(points[40:60, [0, 2]], np.tile(points[60, [0, 2]], (20, 1)), atol=2e-5)
 
 
+def test_a_foot_that_comes_down_just_after_the_start_stays_where_it_came_down(slider):
+    contacts = np.zeros((90, 2), dtype=bool)
+    contacts[32:70, 0] = True
+    result = remove_foot_slide(slider, contacts, (30, 60))
+    np.testing.assert_array_equal(result.clip.rotations[:33], slider.rotations[:33])
+    points = planted_points(result.clip)[:, 0]
+    np.testing.assert_allclose(points[32:70, [0, 2]], np.tile(points[32, [0, 2]], (38, 1)), atol=2e-5)
+    assert np.max(np.abs(np.diff(points[:, 2]))) * 30 < 3.0
+
+
 def test_where_the_clip_stands_does_not_matter(slider):
     contacts = np.zeros((90, 2), dtype=bool)
     contacts[20:50, 0] = True
