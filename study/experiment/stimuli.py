@@ -20,15 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import SegueError, StimulusError
+from study.experiment.drawing import figure_for
 from study.experiment.plan import Pair
 from study.experiment.points import Settled, Supply, settle
 from study.experiment.protocol import Protocol, StudySpec
-from study.experiment.rendering import Manifest, RenderSummary, read_manifest, render
+from study.experiment.rendering import Manifest, RenderSummary, read_manifest, record, render
 from study.experiment.stimulus_set import MotionUse, Stimulus, StimulusRecord, StimulusSet
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
 from study.transitions.blending import Transition, blend, cut, facing
-from study.transitions.footskate import remove_foot_slide
+from study.transitions.footskate import plant_feet
 
 if TYPE_CHECKING:
     from renderer.camera import Camera
@@ -44,6 +45,7 @@ __all__ = [
     "check",
     "prepare",
     "read_manifest",
+    "record",
     "render",
 ]
 
@@ -53,8 +55,6 @@ LOOK_VERSION = 1
 """Part of every stimulus's name: raised when the renderer comes to draw the same figure otherwise."""
 
 _TRAVELS_M = 0.5
-_LEG_SHARE = 0.491
-"""Hip to ankle over stature (Winter, Biomechanics and Motor Control of Human Movement, anthropometric table)."""
 
 
 @dataclass(frozen=True)
@@ -192,15 +192,12 @@ def _draft_pairs(
 def _draft(protocol: Protocol, settled: Settled, method: str, difference: int, blend_frames: int) -> _Draft:
     """Blend, cut to entry and exit, clean the feet, and place at the origin with the common heading."""
     made = _transition(protocol, settled, blend_frames)
+    if protocol.stimuli.clean_feet and blend_frames:
+        # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
+        made, _ = plant_feet(made, settled.source.clip, settled.destination.clip)
     entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
     clip = trim(made.clip, made.blend_start - entry, made.blend_stop + after)
     notes = [note for note in (made.note, settled.lengths[method].note) if note]
-    if protocol.stimuli.clean_feet and blend_frames:
-        cleaned = remove_foot_slide(clip, region=(entry, entry + blend_frames))
-        notes.append(
-            f"foot slide reduced from {100 * cleaned.slide_before_m:.1f} to {100 * cleaned.slide_after_m:.1f} cm"
-        )
-        clip = cleaned.clip
     positions = _placed(joint_positions(clip, ends=True), protocol, settled)
     return _Draft(
         settled, method, difference, blend_frames, clip, (entry, entry + blend_frames), positions, tuple(notes)
@@ -306,19 +303,9 @@ def _use(supply: Supply, frame: int) -> MotionUse:
 
 
 def _figure(protocol: Protocol, clip: Clip) -> Figure:
-    from renderer.figure import make_figure
-
-    skeleton, colours = clip.skeleton, protocol.stimuli.colours
+    style, colours = protocol.stimuli.style, protocol.stimuli.colours
     own = {side: _rgb(text) for side in ("left", "right", "centre") if (text := getattr(colours, side))}
-    return make_figure(
-        skeleton.bones,
-        skeleton.sides,
-        dict(skeleton.roles),
-        style=protocol.stimuli.style,
-        height_m=skeleton.leg_length / _LEG_SHARE,
-        colours=own,
-        background=_rgb(colours.background) if colours.background else None,
-    )
+    return figure_for(clip.skeleton, style, own, _rgb(colours.background) if colours.background else None)
 
 
 def _rgb(text: str) -> tuple[int, int, int]:
