@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions
+from study.motion.legs import reach
 from study.transitions.blending import Transition
-from study.transitions.legs import reach
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -8,6 +8,7 @@ import pytest
 from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import global_rotations, joint_positions, moved
+from study.motion.legs import reach
 from study.transitions.blending import blend, cut
 from study.transitions.footskate import (
     find_contacts,
@@ -17,7 +18,6 @@ from study.transitions.footskate import (
     remove_foot_slide,
     transition_contacts,
 )
-from study.transitions.legs import reach
 
 
 @pytest.fixture(scope="module")
