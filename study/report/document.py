@@ -1,0 +1,311 @@
+"""The report: a results folder in; one self-contained page, and every table as CSV and JSON, out.
+
+The page needs no network: styles, figures, strips and videos stand in it. It is the same, byte for byte, for the same
+folder and version of Segue. What participants or protocols wrote is escaped by the template.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.errors import AnalysisError
+from study.report import tables, words
+from study.report.media import Preview
+from study.report.sections import Drawing, Section
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.experiment.protocol import Protocol
+    from study.experiment.stimuli import Manifest
+
+Result = Mapping[str, Any]
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """What a report is made of."""
+
+    protocol: Protocol
+    manifest: Manifest
+    answers: pd.DataFrame
+    sessions: pd.DataFrame
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """What the template shows."""
+
+    title: str
+    source: str
+    facts: tuple[str, ...]
+    warnings: tuple[str, ...]
+    sections: tuple[Section, ...]
+    response: Drawing | None
+    quality: Result
+    quality_sentence: str
+    strips: tuple[Preview, ...]
+    videos: tuple[tuple[Preview, ...], ...]
+    stimuli: tables.Table
+    participants: tables.Table
+    shown_sentence: str
+    methods: tuple[str, ...]
+    versions: tuple[tuple[str, str], ...]
+    acknowledgement: str
+    mark: str
+
+
+def write_report(results_folder: str | Path, *, resamples: int = 1000) -> Path:
+    """Write `report.html` and `tables/` into a results folder.
+
+    Parameters
+    ----------
+    results_folder
+        With `protocol.toml`, `manifest.json` and `responses.sqlite`.
+    resamples
+        Bootstrap samples behind standard errors.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    AnalysisError
+        When there are no answers yet.
+    SegueError
+        When a part of the folder is missing or can't be read.
+    """
+    from study.analysis.summary import analyse
+
+    folder = Path(results_folder)
+    material = gather(folder)
+    settings = material.protocol.analysis
+    analysis = analyse(material.answers, threshold=settings.threshold, alpha=settings.alpha, resamples=resamples)
+    page = compose(material, analysis)
+    write_tables(folder / "tables", all_tables(page), analysis)
+    path = folder / "report.html"
+    _write_whole(path, to_html(page))
+    return path
+
+
+def gather(folder: Path) -> Material:
+    """Read a results folder.
+
+    Raises
+    ------
+    AnalysisError
+        When there are no answers yet.
+    SegueError
+        When a part of the folder is missing or can't be read.
+    """
+    from study.experiment.protocol import load_protocol
+    from study.experiment.responses import answers_frame, open_responses, session_table
+    from study.experiment.stimuli import read_manifest
+
+    protocol = load_protocol(folder / "protocol.toml")
+    manifest = read_manifest(folder)
+    database = folder / "responses.sqlite"
+    if not database.is_file():
+        raise AnalysisError(
+            f"{database}: expected answers, found no database; collect or simulate sessions for this folder first"
+        )
+    with open_responses(database) as responses:
+        answers, sessions = answers_frame(responses), session_table(responses)
+    if answers.empty:
+        raise AnalysisError(f"{database}: expected answers, found none; collect or simulate sessions first")
+    return Material(protocol, manifest, answers, sessions)
+
+
+def compose(material: Material, analysis: Result) -> Page:
+    """Turn material and analysis into what the page shows."""
+    from study.report import figures, media, sections
+
+    protocol, manifest, answers = material.protocol, material.manifest, material.answers
+    data, quality = str(analysis["data"]), analysis["quality"]
+    mark = words.mark_of(data, manifest.synthetic)
+    svg = figures.response_figure(answers, "response-times", mark)
+    response = None
+    if svg:
+        caption = "Response times: all answers with the median, and the median over the session."
+        response = Drawing(svg, caption)
+    return Page(
+        title=protocol.title,
+        source=protocol.source,
+        facts=_facts(material, analysis),
+        warnings=tuple(
+            words.warnings_of(data, manifest.synthetic, quality["simulated_participants"], quality["participants"])
+        ),
+        sections=tuple(_sections(material, analysis, mark)),
+        response=response,
+        quality=quality,
+        quality_sentence=_quality_sentence(quality),
+        strips=tuple(media.embed_strips(manifest)),
+        videos=tuple(tuple(pair) for pair in media.embed_videos(manifest)),
+        stimuli=sections.stimulus_table(manifest),
+        participants=sections.participant_table(analysis, material.sessions),
+        shown_sentence=_shown_sentence(manifest),
+        methods=tuple(words.methods_paragraph(protocol, manifest, analysis, _who(analysis))),
+        versions=_versions(material),
+        acknowledgement=manifest.acknowledgement,
+        mark=mark,
+    )
+
+
+def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
+    """One section a study, in the protocol's order."""
+    from study.report import sections
+
+    known = sections.known_truth(material.sessions)
+    found = []
+    for study in material.protocol.studies:
+        title = study.title or words.sentence(words.readable(study.name))
+        if study.name in analysis["jnd"]:
+            found.append(
+                sections.jnd_section(
+                    study.name,
+                    title,
+                    analysis["jnd"][study.name],
+                    fps=material.protocol.fps,
+                    data=str(analysis["data"]),
+                    mark=mark,
+                    known=known.get(study.name),
+                )
+            )
+        elif study.name in analysis["preference"]:
+            found.append(sections.preference_section(study.name, title, analysis["preference"][study.name], mark=mark))
+        elif study.name in analysis["ratings"]:
+            found.append(
+                sections.ratings_section(
+                    study.name, title, analysis["ratings"][study.name], mark=mark, points=study.scale_points
+                )
+            )
+    return found
+
+
+def _who(analysis: Result) -> str:
+    quality = analysis["quality"]
+    people, simulated = quality["participants"] - quality["simulated_participants"], quality["simulated_participants"]
+    parts = []
+    if people:
+        parts.append(words.number(people, "participant"))
+    if simulated:
+        parts.append(words.number(simulated, "simulated observer"))
+    return words.joined(parts)
+
+
+def _facts(material: Material, analysis: Result) -> tuple[str, ...]:
+    quality, manifest = analysis["quality"], material.manifest
+    motions = "synthetic motions" if manifest.synthetic else f"captured motions, {manifest.library}"
+    return (
+        _who(analysis),
+        f"{quality['answered']:,} answers, {quality['missed']:,} missed",
+        f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} at {manifest.fps:g} frames per second",
+        motions,
+    )
+
+
+def _quality_sentence(quality: Result) -> str:
+    times = quality["response_s"]
+    text = (
+        f"{quality['missed']:,} of {quality['trials']:,} questions were missed ({quality['missed_percent']:.1f}%), "
+        f"{quality['too_fast']:,} answered sooner than {quality['fastest_s']:g} s."
+    )
+    if times:
+        text += (
+            f" Half of the answers came within {times['50']:.2f} s, nine in ten between {times['5']:.2f} and "
+            f"{times['95']:.2f} s."
+        )
+    return text + f" {words.number(quality['flagged'], 'participant')} flagged; nobody was left out."
+
+
+def _shown_sentence(manifest: Manifest) -> str:
+    extended = sum(
+        any(use.added_before or use.added_after for use in (record.source, record.destination))
+        for record in manifest.records
+    )
+    motions = "a synthetic library" if manifest.synthetic else f"the library {manifest.library}"
+    text = (
+        f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} from {motions}, "
+        f"{manifest.size[0]} × {manifest.size[1]} pixels at {manifest.fps:g} frames per second."
+    )
+    if extended:
+        text += (
+            f" In {words.number(extended, 'stimulus', 'stimuli')} a motion was too short for what is shown before or "
+            "after the blend and was extended; the table says by how much."
+        )
+    return text
+
+
+def _versions(material: Material) -> tuple[tuple[str, str], ...]:
+    """Versions and hashes: of this program, of what made the stimuli, and of what was analysed."""
+    import numpy as np
+    import scipy
+
+    import study
+
+    table = hashlib.sha256(material.answers.to_csv(index=False).encode()).hexdigest()
+    rows = [
+        ("report by Segue", study.__version__),
+        ("Python, NumPy, SciPy", f"{platform.python_version()}, {np.__version__}, {scipy.__version__}"),
+        ("protocol", f"{material.protocol.name}, sha256 {material.protocol.sha256}"),
+        ("answers analysed", f"sha256 {table}"),
+    ]
+    rows += [(f"stimuli: {name}", str(version)) for name, version in sorted(material.manifest.versions.items())]
+    for column, label in (("segue_version", "sessions by Segue"), ("python_version", "sessions on Python")):
+        if column in material.sessions:
+            rows.append((label, ", ".join(sorted({str(value) for value in material.sessions[column].dropna()}))))
+    return tuple(rows)
+
+
+def all_tables(page: Page) -> list[tables.Table]:
+    """Every table of the page."""
+    found = [table for section in page.sections for table in (*section.tables, *section.folded)]
+    return [*found, page.stimuli, page.participants]
+
+
+def write_tables(folder: Path, chosen: Sequence[tables.Table], analysis: Result) -> None:
+    """Write every table as CSV and JSON, and the whole analysis as JSON."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for table in chosen:
+        _write_whole(folder / f"{table.name}.csv", tables.as_csv(table))
+        _write_whole(folder / f"{table.name}.json", tables.as_json(table))
+    _write_whole(folder / "analysis.json", json.dumps(analysis, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def to_html(page: Page) -> str:
+    """Return the page as one HTML text; everything but our own SVG and CSS is escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    markup: Callable[[str], Markup] = Markup
+    styles = (TEMPLATES / "report.css").read_text(encoding="utf-8")
+    return environment.get_template("report.html.jinja").render(page=page, styles=markup(styles), markup=markup)
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a file under another name and rename it, so that it is there whole or not at all."""
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(path)
+    except OSError as error:
+        raise AnalysisError(f"{path}: can't be written: {error.strerror}; free the place or name another") from error
+    finally:
+        unfinished.unlink(missing_ok=True)

@@ -1,0 +1,147 @@
+"""What participants saw, small enough to stand in the page: videos as data URIs, and strips of their frames.
+
+Strips are cut from the rendered videos themselves, so that they show what was shown.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from study.experiment.stimuli import Manifest
+    from study.experiment.stimulus_set import StimulusRecord
+
+MOST_VIDEO_BYTES = 1_800_000
+MOST_STRIPS = 12
+POSES = 10
+STRIP_HEIGHT = 150
+BLEND_COLOUR = (11, 95, 165)
+
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Preview:
+    """An embedded picture or video with its caption."""
+
+    uri: str
+    caption: str
+    alt: str = ""
+
+
+def data_uri(content: bytes, kind: str) -> str:
+    """Return bytes as a data URI."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def shown_pairs(manifest: Manifest) -> list[tuple[Any, Any]]:
+    """The pairs of records worth embedding: the widest difference, or both methods, one pair for each transition."""
+    best: dict[tuple[str, str], Any] = {}
+    for pair in manifest.pairs:
+        key = (pair.study, pair.motion)
+        if key not in best or (pair.difference_frames or 0) > (best[key].difference_frames or 0):
+            best[key] = pair
+    return [(manifest.record(pair.a), manifest.record(pair.b) if pair.b else None) for pair in best.values()]
+
+
+def embed_videos(manifest: Manifest, most_bytes: int = MOST_VIDEO_BYTES) -> list[list[Preview]]:
+    """Return pairs of embedded videos, one pair a transition, as many as fit."""
+    spent, found = 0, []
+    seen: set[str] = set()
+    for records in shown_pairs(manifest):
+        wanted = [record for record in records if record is not None and record.id in manifest.videos]
+        files = [manifest.folder / str(manifest.videos[record.id]["file"]) for record in wanted]
+        if not wanted or not all(file.is_file() for file in files) or all(record.id in seen for record in wanted):
+            continue
+        contents = [file.read_bytes() for file in files]
+        if spent + sum(map(len, contents)) > most_bytes:
+            continue
+        spent += sum(map(len, contents))
+        seen |= {record.id for record in wanted}
+        found.append([Preview(data_uri(c, "video/mp4"), _caption(r)) for c, r in zip(contents, wanted, strict=True)])
+    return found
+
+
+def _caption(record: StimulusRecord) -> str:
+    added = f" {record.difference_frames:+d}".replace("-", "− ").replace("+", "+ ") if record.difference_frames else ""
+    how = f"{record.method}{added}: {record.blend_frames} frames" if record.blend_frames else "cut, no blend"
+    return f"{record.transition.replace('_', ' ')}, {how}"
+
+
+def embed_strips(manifest: Manifest, most: int = MOST_STRIPS) -> list[Preview]:
+    """Return one strip a transition: evenly spaced frames of its first stimulus, those in the blend underlined."""
+    chosen: dict[str, StimulusRecord] = {}
+    for record in manifest.records:
+        if record.id in manifest.videos and (record.transition not in chosen or record.difference_frames == 0):
+            chosen.setdefault(record.transition, record)
+            if chosen[record.transition].difference_frames != 0:
+                chosen[record.transition] = record
+    strips = []
+    for record in list(chosen.values())[:most]:
+        path = manifest.folder / str(manifest.videos[record.id]["file"])
+        if not path.is_file():
+            continue
+        picture = strip_of_video(path, record.blend_start, record.blend_stop)
+        uri = data_uri(picture, "image/png")
+        alt = f"{POSES} moments of the transition {record.transition.replace('_', ' ')}, from left to right"
+        strips.append(Preview(uri, _caption(record), alt))
+    return strips
+
+
+def strip_of_video(path: Path, blend_start: int, blend_stop: int) -> bytes:
+    """Return a PNG of evenly spaced frames, each cropped about the figure, with a line under those of the blend."""
+    from PIL import Image
+
+    frames = _frames(path)
+    places = np.unique(np.linspace(0, len(frames) - 1, POSES).round().astype(int))
+    cells = _cropped([frames[place] for place in places])
+    blended = [blend_start <= place < blend_stop for place in places]
+    picture = np.concatenate([_underlined(cell, inside) for cell, inside in zip(cells, blended, strict=True)], axis=1)
+    image = Image.fromarray(picture)
+    width = round(image.width * STRIP_HEIGHT / image.height)
+    small = image.resize((width, STRIP_HEIGHT), Image.Resampling.LANCZOS).quantize(64, dither=Image.Dither.NONE)
+    buffer = io.BytesIO()
+    small.save(buffer, format="png", optimize=True)
+    return buffer.getvalue()
+
+
+def _frames(path: Path) -> list[Bytes]:
+    import av
+
+    with av.open(str(path)) as container:
+        return [np.asarray(frame.to_ndarray(format="rgb24"), dtype=np.uint8) for frame in container.decode(video=0)]
+
+
+def _cropped(frames: Sequence[Bytes]) -> list[Bytes]:
+    """Crop all frames to one size, each about its own figure: whatever differs from the corner's colour."""
+    boxes = []
+    for frame in frames:
+        figure = np.abs(frame.astype(int) - frame[0, 0].astype(int)).max(axis=2) > 40
+        rows, columns = np.flatnonzero(figure.any(axis=1)), np.flatnonzero(figure.any(axis=0))
+        if not len(rows):
+            rows, columns = np.array([0, frame.shape[0] - 1]), np.array([0, frame.shape[1] - 1])
+        boxes.append((rows[0], rows[-1] + 1, columns[0], columns[-1] + 1))
+    top, bottom = min(box[0] for box in boxes) - 6, max(box[1] for box in boxes) + 6
+    half = max(box[3] - box[2] for box in boxes) // 2 + 6
+    cells = []
+    for frame, box in zip(frames, boxes, strict=True):
+        pad = half + 8
+        padded = np.pad(frame, ((pad, pad), (pad, pad), (0, 0)), mode="edge")
+        middle = (box[2] + box[3]) // 2 + pad
+        cells.append(padded[top + pad : bottom + pad, middle - half : middle + half])
+    return cells
+
+
+def _underlined(cell: Bytes, inside: bool) -> Bytes:
+    """The cell over a band that is coloured within the blend."""
+    band = np.empty((max(cell.shape[0] // 40, 4), cell.shape[1], 3), dtype=np.uint8)
+    band[:] = BLEND_COLOUR if inside else cell[0, 0]
+    return np.concatenate([cell, band], axis=0)

@@ -1,0 +1,479 @@
+"""Sections of the page: the analysis, the manifest and the protocol in; headlines, figures, tables and notes out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from study.report import figures, tables, words
+from study.report.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.experiment.stimuli import Manifest
+
+Result = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure with its caption; `svg` is markup of our own making."""
+
+    svg: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """One study on the page.
+
+    `headline` and `detail` stand at the top of the page too; `tables` are shown, `folded` are there to open.
+    """
+
+    anchor: str
+    title: str
+    task: str
+    headlines: tuple[tuple[str, str], ...]
+    drawings: tuple[Drawing, ...]
+    tables: tuple[Table, ...]
+    notes: tuple[str, ...]
+    folded: tuple[Table, ...] = ()
+
+
+# Same-different
+
+
+def jnd_section(
+    name: str, title: str, result: Result, *, fps: float, data: str, mark: str, known: Result | None
+) -> Section:
+    """Return the section of a same-different study.
+
+    Parameters
+    ----------
+    name, title
+        Of the study.
+    result
+        From `analyse`.
+    fps
+        Frames per second, for seconds beside frames.
+    data, mark
+        Who answered, and what every figure says about it.
+    known
+        True thresholds of simulated observers; None otherwise.
+    """
+    anchor = f"study-{name}"
+    truth = _true_places(known)
+    drawings = [
+        Drawing(
+            figures.same_different_figure(result, f"{anchor}-curve", mark),
+            "Answers “different” by the difference in blend length from k, the length that the reference method gives. "
+            "Points are means over participants with one standard error; dashed lines join them, as in 2004. The blue "
+            "curve is the model, its drop lines the 75% points, the bars at their feet 95% intervals.",
+        ),
+        Drawing(
+            figures.thresholds_figure(result, f"{anchor}-thresholds", mark, truth),
+            "The just noticeable difference with 95% intervals, over participants. Where there is no bar, the interval "
+            "reaches beyond the levels shown.",
+        ),
+    ]
+    if len(result["motions"]) > 1:
+        drawings.append(
+            Drawing(figures.motions_figure(result, f"{anchor}-motions", mark), "The same for every motion by itself.")
+        )
+    shown = [threshold_table(name, result, fps)]
+    if known:
+        shown.append(recovery_table(name, result, known))
+    return Section(
+        anchor=anchor,
+        title=title,
+        task="same-different",
+        headlines=(words.jnd_headline(result, fps, data),),
+        drawings=tuple(drawings),
+        tables=tuple(shown),
+        notes=tuple(words.jnd_notes(result)),
+        folded=(percent_table(name, result), motion_threshold_table(name, result, fps), d_prime_table(name, result)),
+    )
+
+
+def _true_places(known: Result | None) -> dict[str, float]:
+    keys = ("threshold_shorter_frames", "threshold_longer_frames")
+    return {key: known[key] for key in keys if key in known} if known else {}
+
+
+_THRESHOLD_COLUMNS: tuple[tuple[str, str, tables.Kind], ...] = (
+    ("estimate", "estimate", "text"),
+    ("side", "blend is", "text"),
+    ("frames", "frames", "two"),
+    ("seconds", "seconds", "three"),
+    ("standard_error", "standard error", "two"),
+    ("low", "95% from", "two"),
+    ("high", "to", "two"),
+    ("remark", "remark", "text"),
+)
+
+
+def _threshold_rows(entry: Result, fps: float) -> list[dict[str, Any]]:
+    kinds = [("75% “different”, straight lines (as published)", entry["published"])]
+    if entry["model"]:
+        kinds.append(("75% “different”, model", entry["model"]["jnd"]))
+        kinds.append(("75% right, best criterion (model)", entry["model"]["corrected"]))
+    rows = []
+    for label, thresholds in kinds:
+        for side in ("longer", "shorter"):
+            if side not in thresholds:
+                continue
+            found = thresholds[side]
+            rows.append(
+                {
+                    "estimate": label,
+                    "side": side,
+                    "frames": found["frames"],
+                    "seconds": found["frames"] / fps if found["frames"] is not None else None,
+                    "standard_error": found["standard_error"],
+                    "low": found["interval"]["low"],
+                    "high": found["interval"]["high"],
+                    "remark": found["note"],
+                }
+            )
+    return rows
+
+
+def threshold_table(name: str, result: Result, fps: float) -> Table:
+    """Return the thresholds as published and corrected."""
+    caption = (
+        "The just noticeable difference, as published and corrected. The first reading moves with the rate of false "
+        "alarms "
+        "and cuts the corners of the curve; the second follows the curve; the third is the difference at which an "
+        "observer with the best criterion would be right in 75% of same and different pairs, whatever the criterion "
+        "people took. Intervals are over participants; a dash where they reach beyond the levels shown."
+    )
+    rows = _threshold_rows(result, fps)
+    columns = [column for column in _THRESHOLD_COLUMNS if column[0] != "remark" or any(row["remark"] for row in rows)]
+    return tables.make(f"{name}_thresholds", caption, columns, rows)
+
+
+def motion_threshold_table(name: str, result: Result, fps: float) -> Table:
+    """Return the thresholds for every motion."""
+    rows = []
+    for motion in result["motions"]:
+        base = {"motion": words.readable(motion["motion"]), "answers": motion["answers"]}
+        rows += [{**base, **row} for row in _threshold_rows(motion, fps)]
+    columns: list[tuple[str, str, tables.Kind]] = [
+        ("motion", "motion", "text"),
+        ("answers", "answers", "count"),
+        *_THRESHOLD_COLUMNS,
+    ]
+    return tables.make(f"{name}_thresholds_by_motion", "Thresholds for every motion by itself.", columns, rows)
+
+
+def percent_table(name: str, result: Result) -> Table:
+    """Return the percentages of Figure 6."""
+    return tables.make(
+        f"{name}_percent_different",
+        "Answers “different” by difference in blend length. Mean and standard error over participants; Wilson’s "
+        "interval "
+        "of the answers as if independent.",
+        [
+            ("difference_frames", "frames from k", "count"),
+            ("participants", "participants", "count"),
+            ("answers", "answers", "count"),
+            ("different", "different", "count"),
+            ("percent", "percent", "one"),
+            ("standard_error", "standard error", "one"),
+            ("low", "95% from", "one"),
+            ("high", "to", "one"),
+        ],
+        result["percent_different"],
+    )
+
+
+def d_prime_table(name: str, result: Result) -> Table:
+    """Return sensitivity at every level."""
+    return tables.make(
+        f"{name}_d_prime",
+        "Sensitivity at every level under the differencing rule, against the pairs without a difference. Answers "
+        "pooled, "
+        "taken as independent; one half added to each count.",
+        [
+            ("difference_frames", "frames from k", "count"),
+            ("d_prime", "d-prime", "two"),
+            ("standard_error", "standard error", "two"),
+            ("low", "95% from", "two"),
+            ("high", "to", "two"),
+            ("criterion", "criterion", "two"),
+        ],
+        result["d_prime"],
+    )
+
+
+def recovery_table(name: str, result: Result, known: Result) -> Table:
+    """Return the thresholds that the simulated observers had beside those that were found."""
+    rows = []
+    for side in ("longer", "shorter"):
+        for label, thresholds, key in (
+            ("differencing model", result["model"]["jnd"] if result["model"] else {}, f"threshold_{side}_frames"),
+            ("straight lines", result["published"], f"interpolated_{side}_frames"),
+        ):
+            truth = known.get(key)
+            found = thresholds.get(side)
+            if truth is None or found is None or found["frames"] is None:
+                continue
+            error = found["standard_error"]
+            away = found["frames"] - abs(truth)
+            rows.append(
+                {
+                    "estimate": label,
+                    "side": side,
+                    "known": abs(truth),
+                    "found": found["frames"],
+                    "standard_error": error,
+                    "distance": away,
+                    "standard_errors": away / error if error else None,
+                }
+            )
+    return tables.make(
+        f"{name}_recovery",
+        "What the simulated observers had and what was found, in frames. For straight lines the known value is "
+        "where they would cross with endless data.",
+        [
+            ("estimate", "estimate", "text"),
+            ("side", "blend is", "text"),
+            ("known", "known", "two"),
+            ("found", "found", "two"),
+            ("standard_error", "standard error", "two"),
+            ("distance", "off by", "two"),
+            ("standard_errors", "in standard errors", "two"),
+        ],
+        rows,
+    )
+
+
+# Preferences
+
+
+def preference_section(name: str, title: str, comparisons: Sequence[Result], *, mark: str) -> Section:
+    """Return the section of a preference study."""
+    anchor = f"study-{name}"
+    drawings, shown, folded, notes = [], [], [], []
+    for place, comparison in enumerate(comparisons):
+        suffix = f"_{place + 1}" if len(comparisons) > 1 else ""
+        svg = figures.preference_figure(comparison, f"{anchor}-forest{suffix}", mark)
+        drawings.append(
+            Drawing(
+                svg,
+                "Answers that favoured the first method, for every motion pair with Wilson’s 95% interval; below, all "
+                "answers "
+                "as if independent, and the mean over participants with its interval.",
+            )
+        )
+        shown.append(preference_table(name + suffix, comparison))
+        folded.append(preference_motion_table(name + suffix, comparison))
+        notes += words.preference_notes(comparison)
+    headlines = tuple(words.preference_headline(comparison) for comparison in comparisons)
+    return Section(anchor, title, "preference", headlines, tuple(drawings), tuple(shown), tuple(notes), tuple(folded))
+
+
+def preference_table(name: str, comparison: Result) -> Table:
+    """Return the tests of a preference, as published and with the participant as the unit."""
+    pooled, people, order = comparison["published"], comparison["participants"], comparison["order"]
+    rows: list[dict[str, Any]] = [
+        {
+            "reading": "as published, answers as independent",
+            "percent": pooled["percent"],
+            "low": 100 * pooled["interval"]["low"],
+            "high": 100 * pooled["interval"]["high"],
+            "test": f"chi-square(1, N = {pooled['answers']})",
+            "statistic": pooled["chi_square"],
+            "p_value": pooled["p_value"],
+        },
+        {"reading": "the same, exact", "test": "binomial", "p_value": pooled["exact_p_value"]},
+        {
+            "reading": "corrected, participants as independent",
+            "percent": people["mean_percent"],
+            "low": people["low"],
+            "high": people["high"],
+            "test": f"t({people['degrees_of_freedom']})" if people["t"] is not None else people["test"],
+            "statistic": people["t"],
+            "p_value": people["p_value"],
+        },
+        {"reading": "the same, by ranks", "test": "Wilcoxon", "p_value": people["wilcoxon_p_value"]},
+        {
+            "reading": "pooled, variance over participants",
+            "test": f"F(1, {people['participants'] - 1})",
+            "statistic": people["robust_chi_square"],
+            "p_value": people["robust_p_value"],
+        },
+        {"reading": "mean of both orders of presentation", "percent": order.get("balanced_percent")},
+    ]
+    return tables.make(
+        f"{name}_preference",
+        f"Percent favouring {words.readable(comparison['method_a'])} over {words.readable(comparison['method_b'])}, as "
+        "published and corrected. The published test takes all answers as independent; a participant’s answers are "
+        "not.",
+        [
+            ("reading", "reading", "text"),
+            ("percent", "percent", "one"),
+            ("low", "95% from", "one"),
+            ("high", "to", "one"),
+            ("test", "test", "text"),
+            ("statistic", "statistic", "two"),
+            ("p_value", "p", "p"),
+        ],
+        rows,
+    )
+
+
+def preference_motion_table(name: str, comparison: Result) -> Table:
+    """Return the preference for every motion."""
+    rows = [{**row, "motion": words.readable(row["motion"])} for row in comparison["motions"]]
+    return tables.make(
+        f"{name}_preference_by_motion",
+        "For every motion pair: Wilson’s 95% interval, chi-square(1) as published, exact binomial test, and the latter "
+        "adjusted over the motions by Holm’s method.",
+        [
+            ("motion", "motion", "text"),
+            ("favouring", "favouring", "count"),
+            ("answers", "answers", "count"),
+            ("percent", "percent", "one"),
+            ("low", "95% from", "one"),
+            ("high", "to", "one"),
+            ("chi_square", "chi-square", "two"),
+            ("p_value", "p", "p"),
+            ("exact_p_value", "exact p", "p"),
+            ("holm_p_value", "Holm p", "p"),
+        ],
+        rows,
+    )
+
+
+def ratings_section(name: str, title: str, rows: Sequence[Result], *, mark: str, points: int) -> Section:
+    """Return the section of a rating study: descriptive only."""
+    table = tables.make(
+        f"{name}_ratings",
+        "Ratings: mean over participants of their means, with its standard error and 95% interval.",
+        [
+            ("item", "question", "text"),
+            ("method", "method", "text"),
+            ("answers", "answers", "count"),
+            ("participants", "participants", "count"),
+            ("mean", "mean", "two"),
+            ("standard_error", "standard error", "two"),
+            ("low", "95% from", "two"),
+            ("high", "to", "two"),
+            ("median", "median", "one"),
+        ],
+        [{**row, "item": words.readable(row["item"])} for row in rows],
+    )
+    best = max(rows, key=lambda row: row["mean"]) if rows else None
+    headline = (
+        (f"{words.sentence(words.readable(best['method']))} was rated highest, {best['mean']:.2f} on average.", "")
+        if best
+        else None
+    )
+    drawing = Drawing(
+        figures.ratings_figure(rows, f"study-{name}-ratings", mark, points), "Mean ratings with 95% intervals."
+    )
+    return Section(
+        f"study-{name}", title, "rating", (headline,) if headline else (), (drawing,) if rows else (), (table,), ()
+    )
+
+
+# What was shown, and to whom
+
+
+def stimulus_table(manifest: Manifest) -> Table:
+    """Return every stimulus: method, lengths, motions and their files, extension, hash."""
+    rows = [
+        {
+            "id": record.id[:12],
+            "transition": words.readable(record.transition),
+            "category": record.category,
+            "method": record.method,
+            "optimal_frames": record.optimal_frames,
+            "difference_frames": record.difference_frames,
+            "blend_frames": record.blend_frames,
+            "frames": record.frames,
+            "source": _motion_in_words(record.source),
+            "destination": _motion_in_words(record.destination),
+            "extension": _extension(record),
+            "notes": "; ".join(record.notes),
+        }
+        for record in manifest.records
+    ]
+    return tables.make(
+        "stimuli",
+        "Every stimulus. k is the length that the method gives; the blend is k and the difference. Motions are named "
+        "with "
+        "their file and the frame at which the blend starts or ends.",
+        [
+            ("transition", "transition", "text"),
+            ("method", "method", "text"),
+            ("optimal_frames", "k", "count"),
+            ("difference_frames", "difference", "count"),
+            ("blend_frames", "blend", "count"),
+            ("frames", "frames", "count"),
+            ("source", "from", "text"),
+            ("destination", "to", "text"),
+            ("extension", "extended by", "text"),
+            ("notes", "notes", "text"),
+            ("id", "hash", "text"),
+        ],
+        rows,
+    )
+
+
+def _motion_in_words(use: Any) -> str:
+    place = f"{use.file}, " if use.file else ""
+    return f"{words.readable(use.motion)} ({place}frame {use.frame} of {use.frames})"
+
+
+def _extension(record: Any) -> str:
+    parts = []
+    for label, use in (("source", record.source), ("destination", record.destination)):
+        added = use.added_before + use.added_after
+        if added:
+            parts.append(f"{label} {added} frames" + (f" ({'; '.join(use.notes)})" if use.notes else ""))
+    return "; ".join(parts) or "–"
+
+
+def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
+    """Return one row a participant: when, how many answers, how fast, what was noticed."""
+    started = {}
+    if len(sessions) and "started_at" in sessions:
+        started = {str(row.participant): str(row.started_at)[:16] for row in sessions.itertuples()}
+    rows = [
+        {**row, "kind": "simulated" if row["simulated"] else "person", "started": started.get(row["participant"], "")}
+        for row in analysis["quality"]["table"]
+    ]
+    return tables.make(
+        "participants",
+        "Participants. Flags follow the rules above; nobody was left out.",
+        [
+            ("participant", "participant", "text"),
+            ("kind", "kind", "text"),
+            ("started", "started (UTC)", "text"),
+            ("trials", "asked", "count"),
+            ("answered", "answered", "count"),
+            ("missed", "missed", "count"),
+            ("median_response_s", "median response, s", "two"),
+            ("too_fast", "too fast", "count"),
+            ("false_alarms", "false alarms", "count"),
+            ("same_pairs", "of same pairs", "count"),
+            ("flags", "flags", "text"),
+        ],
+        rows,
+    )
+
+
+def known_truth(sessions: pd.DataFrame) -> dict[str, Any]:
+    """Return what is known of the simulated observers by study; empty where sessions disagree or people took part."""
+    if not len(sessions) or "truth_json" not in sessions or not sessions["simulated"].astype(bool).all():
+        return {}
+    texts = set(sessions["truth_json"].dropna())
+    if len(texts) != 1 or sessions["truth_json"].isna().any():
+        return {}
+    studies = json.loads(texts.pop()).get("studies", {})
+    return dict(studies)

@@ -1,0 +1,92 @@
+"""The report's tables: rows in; CSV, JSON and cells for the page out."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Kind = Literal["text", "count", "one", "two", "three", "percent", "p"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its key in the rows, its heading, and how its values are written."""
+
+    key: str
+    heading: str
+    kind: Kind = "text"
+
+    @property
+    def numeric(self) -> bool:
+        """Whether its cells are set to the right."""
+        return self.kind != "text"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a name (of its files) and a caption."""
+
+    name: str
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[Mapping[str, Any], ...]
+
+    @property
+    def cells(self) -> list[list[tuple[str, bool]]]:
+        """What the page shows: text, and whether it is a number."""
+        return [
+            [(written(row.get(column.key), column.kind), column.numeric) for column in self.columns]
+            for row in self.rows
+        ]
+
+
+def written(value: Any, kind: Kind) -> str:
+    """Return a value as the page shows it; a dash where there is none."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return "–"
+    if kind == "text":
+        return str(value)
+    if kind == "count":
+        return f"{value:,.0f}".replace("-", "−")
+    if kind == "percent":
+        return f"{value:.1f}%"
+    if kind == "p":
+        return p_value(value)
+    places = {"one": 1, "two": 2, "three": 3}[kind]
+    return f"{value:.{places}f}".replace("-", "−")
+
+
+def p_value(value: float) -> str:
+    """Return a p-value in the form of the field: < .001, .012, .24."""
+    if value < 0.001:
+        return "< .001"
+    text = f"{value:.3f}" if value < 0.1 else f"{value:.2f}"
+    return text.removeprefix("0") if value < 0.995 else "1.00"
+
+
+def as_csv(table: Table) -> str:
+    """Return the table as CSV with the keys as headings, numbers in full."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow([column.key for column in table.columns])
+    for row in table.rows:
+        writer.writerow(["" if row.get(column.key) is None else row[column.key] for column in table.columns])
+    return buffer.getvalue()
+
+
+def as_json(table: Table) -> str:
+    """Return the table as JSON: caption, headings by key, and rows."""
+    headings = {column.key: column.heading for column in table.columns}
+    rows = [{column.key: row.get(column.key) for column in table.columns} for row in table.rows]
+    content = {"name": table.name, "caption": table.caption, "columns": headings, "rows": rows}
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def make(name: str, caption: str, columns: Sequence[tuple[str, str, Kind]], rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return a table from plain column tuples (key, heading, kind)."""
+    return Table(name, caption, tuple(Column(*column) for column in columns), tuple(rows))
