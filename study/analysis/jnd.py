@@ -6,6 +6,7 @@ differ across motions. Beside it the differencing model, d-prime at each level, 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from study.analysis import differencing, estimates
 from study.analysis.same_different import (
     Counts,
+    Threshold,
     count_answers,
     crossings,
     percent_different,
@@ -71,20 +73,30 @@ def analyse_jnd(
         "across_motions": across_motions(given),
         "order": _by_order(given),
     }
-    return {**dict(estimates.plain(result)), "answer": in_words(published, level)}
+    return {**dict(estimates.plain(result)), "answer": in_words(published, fitted, level)}
 
 
-def in_words(thresholds: dict[str, Any], level: float) -> str:
-    """Return the thresholds as a sentence."""
+def in_words(published: Mapping[str, Threshold], fitted: ModelFit | str, level: float) -> str:
+    """Return the thresholds in two sentences: as published, and corrected."""
+    first = f"Read off straight lines, as published, {100 * level:.0f}% of the answers are “different” at "
+    first += _sides_in_words(published)
+    if isinstance(fitted, str):
+        return f"{first}. No model was fitted: {fitted}."
+    return f"{first}. By the differencing model the just noticeable difference is {_sides_in_words(fitted.jnd)}."
+
+
+def _sides_in_words(thresholds: Mapping[str, Threshold]) -> str:
     parts = []
     for side, sign in (("longer", "+"), ("shorter", "−")):
-        found = thresholds[side]
-        if found.frames is not None:
-            error = f" ± {found.standard_error:.1f}" if found.standard_error is not None else ""
-            parts.append(f"k {sign} {found.frames:.1f}{error} frames when the blend is {side}")
-        else:
-            parts.append(f"none found when it is {side} ({found.note})")
-    return f"{100 * level:.0f}% of the answers are “different” at " + ", and ".join(parts) + "."
+        found = thresholds.get(side)
+        if found is None:
+            continue
+        if found.frames is None:
+            parts.append(f"nothing where the blend is {side} ({found.note})")
+            continue
+        error = f" ± {found.standard_error:.1f}" if found.standard_error is not None else ""
+        parts.append(f"k {sign} {found.frames:.1f}{error} frames")
+    return " and ".join(parts)
 
 
 def _by_motion(
