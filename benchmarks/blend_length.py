@@ -1,9 +1,10 @@
-"""Time all 60 geodesic blend lengths of one transition, beside the plain implementation of 2004 Eqs. 1 and 2.
+"""Time geodesic blend lengths: of one transition, beside plainer implementations; warped; and by the hundred thousand.
 
-    python benchmarks/blend_length.py [--folder FOLDER_OF_CMU_BVH] [--repeats N]
+    python benchmarks/blend_length.py [--clips SOURCE DESTINATION] [--repeats N]
 
-The two take turns, and medians are printed. Without a folder the clips are random turns of the joints on a small rig,
-which cost the same to compare as captured ones. The plain implementation is also what the tests compare with.
+The first two take turns, and medians are printed. Without motion files the clips are random turns of the joints on a
+small rig, which cost the same to compare as captured ones. The plain implementation is also what the tests compare
+with.
 """
 
 from __future__ import annotations
@@ -11,15 +12,18 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, resample, trim
+from study.motion.clip import Clip, resample
 from study.motion.skeleton import Skeleton
+from study.transitions.batch import geodesic_lengths
 from study.transitions.blend_length import blend_length
+from study.transitions.timewarp import warp_costs
 from study.transitions.weights import joint_weights
 
 
@@ -51,7 +55,7 @@ def vectorised_costs(
     return costs
 
 
-def made_up_clips(seed: int = 0) -> tuple[Clip, Clip]:
+def made_up_clips() -> tuple[Clip, Clip]:
     names = ["Hips", "Spine", "Head"]
     parents = [-1, 0, 1]
     for side in ("Left", "Right"):
@@ -63,50 +67,61 @@ def made_up_clips(seed: int = 0) -> tuple[Clip, Clip]:
                 above = len(names) - 1
     offsets = np.full((len(names), 3), 0.2)
     rig = Skeleton(tuple(names), np.array(parents), offsets, np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     rotations = [quat.normalise(rng.normal(size=(200, len(names), 4))) for _ in range(2)]
     return tuple(Clip(rig, np.zeros((200, 3)), q, 30.0) for q in rotations)  # type: ignore[return-value]
 
 
-def captured_clips(folder: Path) -> tuple[Clip, Clip]:
+def captured_clips(paths: list[Path]) -> tuple[Clip, Clip]:
     from study.motion.files import read_clip
 
-    walks = [read_clip(folder / name) for name in ("16_15.bvh", "16_21.bvh")]
-    walks = [resample(trim(clip, 1, clip.frames), 30.0) for clip in walks]
-    return walks[0], walks[1]
+    source, destination = (resample(read_clip(path), 30.0) for path in paths)
+    return source, destination
 
 
-def milliseconds(work: object) -> float:
+def milliseconds(work: Callable[[], object]) -> float:
     started = time.perf_counter()
-    work()  # type: ignore[operator]
+    work()
     return 1000 * (time.perf_counter() - started)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, help="CMU trials as BVH; 16_15 and 16_21 are used")
+    parser.add_argument("--clips", type=Path, nargs=2, help="motion files of one rig")
     parser.add_argument("--repeats", type=int, default=200)
     options = parser.parse_args()
-    source, destination = captured_clips(options.folder) if options.folder else made_up_clips()
+    source, destination = captured_clips(options.clips) if options.clips else made_up_clips()
     longest = min(60, source.frames - 10, destination.frames - 10)
     i, j = 5, destination.frames - 6
     weights = joint_weights(source.skeleton)
+    times: dict[str, list[float]] = {"blend_length": [], "one length at a time": [], "plain loops": []}
+    for repeat in range(options.repeats + 1):
+        ours = milliseconds(lambda: blend_length(source, destination, i, j, longest=longest))
+        first_try = milliseconds(lambda: vectorised_costs(source, destination, i, j, longest, weights))
+        if repeat:  # the first round warms up
+            times["blend_length"].append(ours)
+            times["one length at a time"].append(first_try)
+    times["plain loops"].append(milliseconds(lambda: plain_costs(source, destination, i, j, longest, weights)))
+    print(f"all {longest} geodesic blend lengths of one transition, {source.skeleton.joints} joints")
+    show(times)
+    warped = [milliseconds(lambda: warp_costs(source, destination, i, j, longest, weights)) for _ in range(20)][1:]
+    print(f"all {longest} x {longest} time-warped costs of one transition")
+    show({"warp_costs": warped})
+    rng = np.random.default_rng(0)
+    starts = rng.integers(0, source.frames - longest + 1, 100_000)
+    ends = rng.integers(longest - 1, destination.frames, 100_000)
+    batch = [
+        milliseconds(lambda: geodesic_lengths(source, destination, starts, ends, longest=longest)) for _ in range(5)
+    ]
+    print(f"100,000 geodesic blend lengths between two clips, {source.frames} and {destination.frames} frames")
+    show({"geodesic_lengths": batch})
 
-    def ours() -> None:
-        blend_length(source, destination, i, j, longest=longest)
 
-    def first_try() -> None:
-        vectorised_costs(source, destination, i, j, longest, weights)
-
-    ours()
-    times: dict[str, list[float]] = {"blend_length": [], "one length at a time": []}
-    for _ in range(options.repeats):
-        times["blend_length"].append(milliseconds(ours))
-        times["one length at a time"].append(milliseconds(first_try))
-    times["plain loops"] = [milliseconds(lambda: plain_costs(source, destination, i, j, longest, weights))]
-    print(f"all {longest} geodesic blend lengths of one transition, {source.skeleton.joints} joints, median of runs")
+def show(times: dict[str, list[float]]) -> None:
     for label, values in times.items():
-        print(f"  {label:22s} {statistics.median(values):9.3f} ms  ({len(values)} runs)")
+        print(
+            f"  {label:22s} median {statistics.median(values):9.3f} ms, best {min(values):9.3f}  ({len(values)} runs)"
+        )
 
 
 if __name__ == "__main__":
