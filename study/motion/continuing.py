@@ -13,13 +13,15 @@ bear weight, and make up the difference while they swing.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved
-from study.motion.feet import heading
+from study.motion.feet import heading, stance
+from study.motion.legs import reach
 from study.motion.mirror import mirror
 
 FloatArray = NDArray[np.float64]
@@ -29,6 +31,8 @@ _SLOPE_S = 0.04
 # A difference in velocity dies away over this, or over the period where that is shorter: a slope carried on through a
 # whole cycle would swing a leg by tenths of a metre.
 _SETTLE_S = 0.2
+# A foot that is in the air for less than this is taken to stay on the floor.
+_SHORTEST_SWING_S = 0.1
 # The path is summed in so many steps a frame.
 _FINE = 8
 # Standing: the drawn-out part is gone through once in no less than this, and the last velocity dies away over this.
@@ -109,7 +113,7 @@ def carry_on(clip: Clip, period: float, frames: int, *, reflect: bool, turn: flo
     after = np.arange(1, frames + 1, dtype=np.float64)
     repeats = np.ceil(after / period - 1e-9).astype(np.int64)
     within = after - (repeats - 1) * period
-    added = base.at(within)
+    added = _with_planted_feet(base, within)
     shift = clip.root_positions[-1] - isometry.of_points(base.path[0])
     shift[1] = 0.0
     positions, rotations = added.root_positions.copy(), added.rotations.copy()
@@ -162,6 +166,86 @@ class _Period:
         yaw = fade * self.yaw[0] + slope * self.yaw[1]
         rotations[:, 0] = quat.multiply(quat.yaw(yaw), rotations[:, 0])
         return replace(template, root_positions=positions, rotations=quat.normalise(rotations))
+
+
+def _with_planted_feet(base: _Period, within: FloatArray) -> Clip:
+    """Frames of the period at times `(n,)`, with feet held in place by inverse kinematics while they bear weight.
+
+    What the corrections move an ankle by is known from the captured period: while the captured foot bears weight, that
+    is held constant, and it changes while the foot swings.
+    """
+    frames = base.at(within)
+    grid = np.linspace(0.0, base.period, 2 * int(np.ceil(base.period)) + 1)
+    times = base.clip.frames - 1.0 - base.period + grid
+    captured, corrected = joint_positions(smooth_sample(base.clip, times)), joint_positions(base.at(grid))
+    planted = stance(base.clip)[np.round(times).astype(np.int64)]
+    shortest = int(np.ceil(_SHORTEST_SWING_S * base.clip.fps * (len(grid) - 1) / base.period))
+    shifts = np.empty((len(within), 2, 3))
+    for foot, side in enumerate("LR"):
+        ankle = base.clip.skeleton.role(f"ankle.{side}")
+        shift = _held(corrected[:, ankle] - captured[:, ankle], _contacts(planted[:, foot], shortest), shortest)
+        shifts[:, foot] = np.stack([np.interp(within, grid, shift[:, axis]) for axis in range(3)], axis=1)
+    return reach(frames, shifts)
+
+
+def _contacts(planted: NDArray[np.bool_], shortest: int) -> list[tuple[int, int]]:
+    """Stretches of planted rows, as slices count them; shorter gaps between them are closed, shorter ones dropped."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], planted.astype(np.int8), [0]])))
+    contacts: list[tuple[int, int]] = []
+    for start, stop in edges.reshape(-1, 2).tolist():
+        if contacts and start - contacts[-1][1] < shortest:
+            contacts[-1] = (contacts[-1][0], stop)
+        else:
+            contacts.append((start, stop))
+    return [(start, stop) for start, stop in contacts if stop - start >= shortest or start == 0 or stop == len(planted)]
+
+
+def _held(change: FloatArray, contacts: list[tuple[int, int]], shortest: int) -> FloatArray:
+    """What to add to a change of a foot's place `(n, 3)` so that it is constant while the foot is planted.
+
+    Nothing at both ends. A foot planted at an end keeps what it has there; one planted all along, or again at once,
+    has to give way slowly.
+    """
+    last = len(change) - 1
+    added = np.zeros_like(change)
+    knots = [] if contacts and contacts[0][0] == 0 else [(0, 0)]
+    for start, stop in contacts:
+        part = change[start:stop]
+        rest = 1.0 - np.linspace(0.0, 1.0, len(part))[:, None]
+        giving_way = rest * rest * (3.0 - 2.0 * rest)
+        # Too little time to swing into place before, or after: then the foot comes down, or lifts, where it does.
+        first = part[0] if start < shortest else part.mean(axis=0)
+        final = part[-1] if last - stop < shortest else part.mean(axis=0)
+        if start < shortest and last - stop >= shortest:
+            final = first
+        if last - stop < shortest and start >= shortest:
+            first = final
+        keep = giving_way * first + (1.0 - giving_way) * final
+        # The height is not kept: where it has to differ, it comes to the captured one while the foot stands.
+        keep[:, 1] = giving_way[:, 0] * part[0, 1] if start < shortest else 0.0
+        added[start:stop] = keep - part
+        knots.append((start, stop - 1))
+    if not contacts or contacts[-1][1] <= last:
+        knots.append((last, last))
+    for (_, left), (right, _) in pairwise(knots):
+        _bridge(added, left, right)
+    return added
+
+
+def _bridge(values: FloatArray, left: int, right: int) -> None:
+    """Fill rows between two given ones by a cubic that leaves and meets them with the slope on their far sides."""
+    span = right - left
+    if span < 2:
+        return
+    last = len(values) - 1
+    slope_left = values[left] - values[left - 1] if left > 0 else np.zeros(values.shape[1])
+    slope_right = values[right + 1] - values[right] if right < last else np.zeros(values.shape[1])
+    t = (np.arange(1, span) / span)[:, None]
+    values[left + 1 : right] = (
+        (1 + 2 * t) * (1 - t) ** 2 * values[left]
+        + t**2 * (3 - 2 * t) * values[right]
+        + span * (t * (1 - t) ** 2 * slope_left - t**2 * (1 - t) * slope_right)
+    )
 
 
 def _fading(within: FloatArray, period: float, fps: float) -> tuple[FloatArray, FloatArray]:

@@ -41,8 +41,10 @@ _BETTER = 0.1
 # ... or where the cycle turns by more than the first of these, and it is no steady bend: a bend turns by no more than
 # the second, and by as much in the cycle before.
 _STRAIGHT, _TURNING = np.radians(12.0), np.radians(30.0)
-# Standing still: no joint faster than this, m/s, for at least so long; no more than so much of it is drawn out.
-_STILL_SPEED, _STILL_S, _LONGEST_STILL_S = 0.2, 0.2, 4.0
+# Standing still: feet, pelvis and everything else (hands sway) no faster than these, m/s, for at least so long; no more
+# than so much of it is drawn out.
+_STILL_FEET, _STILL_PELVIS, _STILL_SPEED = 0.15, 0.15, 0.5
+_STILL_S, _LONGEST_STILL_S = 0.2, 4.0
 
 _LIMBS = ("knee", "ankle", "toe", "shoulder", "elbow", "wrist")
 
@@ -297,15 +299,19 @@ def _end_speed(clip: Clip) -> float:
 
 
 def _still_frames(clip: Clip) -> int:
-    """Number of frames at the end of the clip in which no joint moves faster than one that stands."""
+    """Number of frames at the end of the clip in which feet, pelvis and all else move no faster than one who stands."""
     if clip.frames < 3:
         return 0
     positions = joint_positions(clip)
     # Over a twentieth of a second, so that the noise of single frames does not count as movement.
     span = min(clip.frames - 1, max(1, round(0.05 * clip.fps)))
-    moves = np.linalg.norm(positions[span:] - positions[:-span], axis=-1).max(axis=-1) * clip.fps / span
-    moving = np.flatnonzero(moves > _STILL_SPEED)
-    return clip.frames if len(moving) == 0 else int(len(moves) - 1 - moving[-1])
+    speeds = np.linalg.norm(positions[span:] - positions[:-span], axis=-1) * clip.fps / span
+    roles = clip.skeleton.roles
+    feet = [roles[role] for role in ("ankle.L", "ankle.R", "toe.L", "toe.R") if role in roles]
+    moving = (speeds > _STILL_SPEED).any(axis=1)
+    moving |= (speeds[:, [roles["pelvis"]]] > _STILL_PELVIS).any(axis=1) | (speeds[:, feet] > _STILL_FEET).any(axis=1)
+    last = np.flatnonzero(moving)
+    return clip.frames if len(last) == 0 else int(len(speeds) - 1 - last[-1])
 
 
 def _words(clip: Clip, cycle: Cycle, frames: int) -> str:
