@@ -1,7 +1,7 @@
 """The synthetic figure: one skeleton of 22 joints for a stature of 1.75 m.
 
 Segment lengths are shares of stature after Drillis & Contini 1966, as printed in Winter 2009, Figure 4.1: hip
-0.530, knee 0.285 and ankle 0.039 above the floor, upper arm 0.186, forearm 0.146, hand 0.108, foot 0.152, shoulder
+0.530, knee 0.285 and ankle 0.039 above the floor, upper arm 0.186, forearm 0.146, foot 0.152, shoulder
 0.818 above the floor. In rest (identity rotations) it stands upright, arms hanging, facing +Z, its left at +X.
 """
 
@@ -20,6 +20,8 @@ LEG = THIGH + SHANK
 ANKLE_HEIGHT = 0.039 * STATURE
 UPPER_ARM = 0.186 * STATURE
 FOREARM = 0.146 * STATURE
+# To the knuckles, half of the hand's 0.108: hands are half closed here.
+HAND = 0.054 * STATURE
 
 # Hip joint centres lie 0.17 m apart (Bell et al. 1990 by way of pelvic width), shoulder joints 0.36 m.
 HIP_HALF_WIDTH = 0.085
@@ -63,8 +65,8 @@ ENDS = (
     ("LeftToeBase", (0.0, 0.0, TOE_LENGTH)),
     ("RightToeBase", (0.0, 0.0, TOE_LENGTH)),
     ("Head", (0.0, 0.165, 0.0)),
-    ("LeftHand", (0.0, -0.108 * STATURE, 0.0)),
-    ("RightHand", (0.0, -0.108 * STATURE, 0.0)),
+    ("LeftHand", (0.0, -HAND, 0.0)),
+    ("RightHand", (0.0, -HAND, 0.0)),
 )
 
 INDEX = {name: index for index, (name, _, _) in enumerate(JOINTS)}

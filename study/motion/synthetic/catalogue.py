@@ -17,7 +17,7 @@ import numpy as np
 
 from study.errors import MotionError
 from study.motion.clip import Clip
-from study.motion.synthetic import courses, standing
+from study.motion.synthetic import boxing, courses, dancing, standing, tai_chi
 from study.motion.synthetic.targets import Targets, pose
 
 Generator = Callable[..., Targets]
@@ -96,6 +96,21 @@ _ENTRIES: dict[str, _Entry] = {
     "walk_turn_right": _turn("walking", 1.25, -90.0),
     "run_turn_left": _turn("running", 3.0, 90.0),
     "run_turn_right": _turn("running", 3.0, -90.0),
+    "box": _Entry(boxing.box, "boxing", (False, False), 24.0, "boxing: guard, steps, single punches"),
+    "box_combination": _Entry(
+        boxing.box_combination, "boxing", (False, False), 24.0, "boxing: combinations of three to five punches"
+    ),
+    "dance": _Entry(dancing.dance, "dancing", (False, False), 24.0, "dancing to a beat: steps, sways, twists, points"),
+    "dance_modern": _Entry(
+        dancing.dance_modern, "dancing", (False, False), 24.0, "modern dance: lunges, contractions, lifted knees"
+    ),
+    "dance_turns": _Entry(
+        dancing.dance_turns, "dancing", (False, False), 24.0, "dancing with whole turns in three steps"
+    ),
+    "tai_chi": _Entry(
+        tai_chi.tai_chi, "tai-chi", (False, False), 30.0, "a slow form: parting, brushing, pushing, clouds"
+    ),
+    "tai_chi_slow": _Entry(tai_chi.tai_chi_slow, "tai-chi", (False, False), 30.0, "a slower form: clouds and pushes"),
 }
 
 NAMES: tuple[str, ...] = tuple(_ENTRIES)

@@ -7,6 +7,7 @@ rates: a motion is planned on a fixed grid of `GRID_STEP` seconds and sampled fr
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,7 +71,7 @@ def clamped_spline(
     """Cubic spline through `values (knots, ...)`, with given slopes at both ends, at `share (n,)`."""
     from scipy.interpolate import CubicSpline
 
-    ends = ((1, np.asarray(rates[0])), (1, np.asarray(rates[1])))
+    ends: Any = ((1, rates[0]), (1, rates[1]))
     curve = CubicSpline(knots, np.asarray(values, dtype=np.float64), bc_type=ends)
     return np.asarray(curve(share))
 

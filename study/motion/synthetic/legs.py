@@ -62,6 +62,10 @@ class Contact:
     """Share of the swing at which the knee is bent most."""
     swing_reach: float = 0.0
     """How far beyond its landing angle the leg swings forward before it comes back to land."""
+    heel_up: float = 0.0
+    """By how much the heel stays off the floor all through the contact."""
+    turned: float = 0.0
+    """The pivot's yaw when the foot was set down; it turns by what comes on top."""
     running: float = 0.0
     """1 for a running step, 0 for a walking step."""
 
@@ -97,16 +101,18 @@ def progress(contact: Contact, times: FloatArray) -> FloatArray:
     return np.asarray((times - contact.start) / (contact.stop - contact.start))
 
 
-def stance_foot(contact: Contact, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Ankle `(n, 3)`, pitch `(n,)`, toes up, and bend of the toes `(n,)` of a foot in contact.
+def stance_foot(contact: Contact, times: FloatArray, pivot: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Ankle `(n, 3)`, yaw and pitch (toes up) `(n, 2)`, and bend of the toes `(n,)` of a foot in contact.
 
     The foot turns about the heel's contact point, then lies flat, then turns about the joint of the toes; as the
-    heel gets high the toes roll too, over their tip.
+    heel gets high the toes roll too, over their tip. `pivot (n, 2)` turns it on the spot besides: by a yaw about the
+    joint of the toes, and with the heel lifted.
     """
     share = progress(contact, times)
     heel_pitch = contact.strike_pitch * np.clip(1.0 - share / contact.flat_from, 0.0, None) ** 2.2
     rise = np.clip((share - contact.heel_off) / (1.0 - contact.heel_off), 0.0, None)
-    toe_pitch = contact.off_pitch * rise**2.4
+    lifted = contact.heel_up + pivot[:, 1]
+    toe_pitch = lifted + np.maximum(contact.off_pitch - lifted, 0.0) * rise**2.4
     tip_pitch = _TOE_ROLL * np.clip(toe_pitch - _TOE_ROLL_FROM, 0.0, None) ** 2
     # One of the two pitches is always zero, so the two rockers add up.
     across, along = body.HEEL_BACK, body.TOE_FORWARD
@@ -115,10 +121,13 @@ def stance_foot(contact: Contact, times: FloatArray) -> tuple[FloatArray, FloatA
     height = body.ANKLE_HEIGHT * np.cos(heel_pitch) + across * np.sin(heel_pitch)
     forward += along * (1.0 - np.cos(toe_pitch)) + drop * np.sin(toe_pitch) + toe * (1.0 - np.cos(tip_pitch))
     height += drop * (np.cos(toe_pitch) - 1.0) + along * np.sin(toe_pitch) + toe * np.sin(tip_pitch)
-    ankle = np.stack(
-        [contact.x + forward * np.sin(contact.yaw), height, contact.z + forward * np.cos(contact.yaw)], axis=1
-    )
-    return ankle, heel_pitch - toe_pitch, toe_pitch - tip_pitch
+    yaw = contact.yaw + pivot[:, 0] - contact.turned
+    behind = forward - along
+    ankle = np.empty((len(times), 3))
+    ankle[:, 0] = contact.x + along * np.sin(contact.yaw) + behind * np.sin(yaw)
+    ankle[:, 1] = height
+    ankle[:, 2] = contact.z + along * np.cos(contact.yaw) + behind * np.cos(yaw)
+    return ankle, np.column_stack([yaw, heel_pitch - toe_pitch]), toe_pitch - tip_pitch
 
 
 def stance_knee(contact: Contact, times: FloatArray) -> FloatArray:
@@ -149,6 +158,7 @@ def hip_height(
     times: FloatArray,
     pelvis_position: FloatArray,
     pelvis_angles: FloatArray,
+    pivots: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Height of the middle of the hips that gives the bearing legs the bend they are meant to have.
 
@@ -164,13 +174,14 @@ def hip_height(
     bearing = loads(sides, times)
     level = pelvis_position * np.array([1.0, 0.0, 1.0])
     offsets = hip_positions(level, pelvis_angles)
+    pivots = np.zeros((len(times), 2, 2)) if pivots is None else pivots
     total, limit = np.zeros(len(times)), np.full(len(times), 2.0)
     for side, contacts in enumerate(sides):
         for c in contacts:
             inside = np.flatnonzero((times > c.start - 1e-9) & (times < c.stop + 1e-9))
             if not len(inside):
                 continue
-            ankle, _, _ = stance_foot(c, times[inside])
+            ankle, _, _ = stance_foot(c, times[inside], pivots[inside, side])
             away = ankle - offsets[inside, side]
             flat_square = away[:, 0] ** 2 + away[:, 2] ** 2
             bend = np.maximum(stance_knee(c, times[inside]), _STRAIGHTEST_STANCE)
@@ -203,28 +214,36 @@ def solve_legs(
     pelvis_position: FloatArray,
     pelvis_angles: FloatArray,
     heading: FloatArray,
+    pivots: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Ankles `(n, 2, 3)`, feet angles `(n, 2, 3)` and toes `(n, 2)` for contacts and a pelvis (height included)."""
     n = len(times)
     ankles, feet, toes = np.zeros((n, 2, 3)), np.zeros((n, 2, 3)), np.zeros((n, 2))
     hips = hip_positions(pelvis_position, pelvis_angles)
+    pivots = np.zeros((n, 2, 2)) if pivots is None else pivots
     for side, contacts in enumerate(sides):
         for c in contacts:
             inside = (times > c.start - 1e-9) & (times < c.stop + 1e-9)
-            ankles[inside, side], feet[inside, side, 1], toes[inside, side] = stance_foot(c, times[inside])
-            feet[inside, side, 0] = c.yaw
+            found = stance_foot(c, times[inside], pivots[inside, side])
+            ankles[inside, side], feet[inside, side, :2], toes[inside, side] = found
         for before, after in pairwise(contacts):
             first, last = (round((t - times[0]) / GRID_STEP) for t in (before.stop, after.start))
             if first < 3 or last > n - 4:
                 continue
             part = slice(first, last + 1)
-            swing = _swing(before, after, times, hips[:, side], heading, (first, last))
+            swing = _swing(before, after, times, hips[:, side], heading, pivots[:, side], (first, last))
             ankles[part, side], feet[part, side], toes[part, side] = swing
     return ankles, feet, toes
 
 
 def _swing(
-    before: Contact, after: Contact, times: FloatArray, hip: FloatArray, heading: FloatArray, span: tuple[int, int]
+    before: Contact,
+    after: Contact,
+    times: FloatArray,
+    hip: FloatArray,
+    heading: FloatArray,
+    pivot: FloatArray,
+    span: tuple[int, int],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Ankle, foot angles and toes of one swing, on grid points `span[0] .. span[1]`."""
     first, last = span
@@ -232,23 +251,24 @@ def _swing(
     count = last - first
     share = np.linspace(0.0, 1.0, count + 1)
     per_share = count * GRID_STEP
-    ends, rates, toe_ends = [], [], []
+    ends, rates, toe_ends, yaws = [], [], [], []
     for contact, at in ((before, np.arange(first - 2, first + 1)), (after, np.arange(last, last + 3))):
-        ankle, pitch, bend = stance_foot(contact, times[at])
+        ankle, turned, bend = stance_foot(contact, times[at], pivot[at])
         polar = _leg_polar(ankle - hip[at], heading[at])
-        values = np.column_stack([polar, pitch - _shank_pitch(polar)])
+        values = np.column_stack([polar, turned[:, 1] - _shank_pitch(polar)])
         here = 2 if contact is before else 0
         sign = 1.0 if contact is before else -1.0
         away = values[::-1] if contact is before else values
         ends.append(values[here])
         toe_ends.append(bend[here])
+        yaws.append(turned[here, 0])
         rates.append(sign * (3.0 * away[0] - 4.0 * away[1] + away[2]) / (2.0 * GRID_STEP) * per_share)
-    peak, peak_at = before.swing_knee, before.swing_peak
-    knee_after = min(ends[1][0], 0.5 * peak)
+    peak_at = before.swing_peak
+    peak = max(before.swing_knee, ends[0][0] + 0.1, ends[1][0] + 0.1)
     late_at = 0.8 - 0.1 * before.running
     knots = (0.0, peak_at, peak_at + 0.33 * (1 - peak_at), peak_at + late_at * (1 - peak_at), 1.0)
-    middle = ends[1][0] + (peak - knee_after) * 0.62
-    late = ends[1][0] + 0.06 * (peak - knee_after)
+    middle = ends[1][0] + (peak - ends[1][0]) * 0.62
+    late = ends[1][0] + 0.06 * (peak - ends[1][0])
     knee = clamped_spline(share, knots, [ends[0][0], peak, middle, late, ends[1][0]], (rates[0][0], rates[1][0]))
     rest = hermite(share, (ends[0][1:], ends[1][1:]), (rates[0][1:], rates[1][1:]))
     angle, aside, ankle_bend = rest.T
@@ -257,10 +277,12 @@ def _swing(
     level = smooth_step(share, 0.0, 0.3) * (1.0 - smooth_step(share, 0.75, 1.0))
     polar = np.column_stack([np.clip(knee, 0.035, 2.4), angle, aside])
     ankle_bend = ankle_bend * (1.0 - level) + level * (0.02 - 0.12 * lifted)
-    yaw = before.yaw + np.angle(np.exp(1j * (after.yaw - before.yaw))) * smooth_step(share, 0.05, 0.95)
+    yaw = yaws[0] + (yaws[1] - yaws[0]) * smooth_step(share, 0.05, 0.95)
     angles = np.column_stack([yaw, ankle_bend + _shank_pitch(polar), np.zeros(count + 1)])
-    toes = toe_ends[0] * (1.0 - smooth_step(share, 0.0, 0.4)) + 0.12 * smooth_step(share, 0.3, 0.8) * (
-        1.0 - smooth_step(share, 0.85, 1.0)
+    toes = (
+        toe_ends[0] * (1.0 - smooth_step(share, 0.0, 0.4))
+        + toe_ends[1] * smooth_step(share, 0.5, 1.0)
+        + 0.12 * smooth_step(share, 0.3, 0.8) * (1.0 - smooth_step(share, 0.85, 1.0))
     )
     ankle = hip[part] + _from_polar(polar, heading[part])
     ankle[:, 1] += _clearing(ankle[:, 1], angles[:, 1], toes, share)

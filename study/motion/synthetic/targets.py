@@ -172,7 +172,8 @@ def _share_out(rotations: FloatArray, names: tuple[str, ...], whole: FloatArray)
 
 def _pose_leg(rotations: FloatArray, at: Targets, pelvis: FloatArray, side: int) -> None:
     hips = hip_positions(at.pelvis_position, at.pelvis_angles)[:, side]
-    difference = np.angle(np.exp(1j * (at.feet_angles[:, side, 0] - at.pelvis_angles[:, 0])))
+    # Yaws run on over whole turns, so their difference needs no wrapping; no hip turns much beyond 60 degrees.
+    difference = np.tanh(at.feet_angles[:, side, 0] - at.pelvis_angles[:, 0])
     yaw = at.pelvis_angles[:, 0] + 0.5 * difference + OUTWARD[side] * at.knees_out[:, side]
     pole = np.stack([np.sin(yaw), np.zeros_like(yaw), np.cos(yaw)], axis=-1)
     thigh, bend = two_bones(at.ankles[:, side] - hips, pole, body.THIGH, body.SHANK, 1.0)
@@ -185,15 +186,27 @@ def _pose_leg(rotations: FloatArray, at: Targets, pelvis: FloatArray, side: int)
     rotations[:, body.INDEX[f"{name}ToeBase"]] = quat.from_axis_angle(_X, -at.toes[:, side])
 
 
+def collar_rotation(collars: FloatArray, side: int) -> FloatArray:
+    """Rotation of the shoulder girdle for its lift and forward swing `(n, 2)`."""
+    lift, forward = collars.T
+    return quat.from_euler("YZ", OUTWARD[side] * np.stack([-forward, lift], axis=-1))
+
+
+def girdle_shift(collars: FloatArray, side: int) -> FloatArray:
+    """By how much the shoulder joint moves in the chest's frame with lift and swing of its girdle, `(n, 3)`."""
+    rest = np.array(body.skeleton().offsets[body.INDEX[f"{SIDE_NAMES[side]}Arm"]])
+    moved: FloatArray = quat.rotate(collar_rotation(collars, side), rest) - rest
+    return moved
+
+
 def _pose_arm(rotations: FloatArray, at: Targets, side: int) -> None:
     name, outward = SIDE_NAMES[side], OUTWARD[side]
-    lift, forward = at.collars[:, side].T
-    collar = quat.from_euler("YZ", np.stack([-outward * forward, outward * lift], axis=-1))
+    collar = collar_rotation(at.collars[:, side], side)
     if at.hands is None:
         flexion, abduction, rotation, elbow = at.arms[:, side].T
         upper = quat.from_euler("XZY", np.stack([-flexion, outward * abduction, outward * rotation], axis=-1))
     else:
-        upper, elbow = _reach(at.hands[:, side], collar, side)
+        upper, elbow = _reach(at.hands[:, side], at.collars[:, side], side)
     pronation, flexion = at.wrists[:, side].T
     rotations[:, body.INDEX[f"{name}Shoulder"]] = collar
     rotations[:, body.INDEX[f"{name}Arm"]] = upper
@@ -203,10 +216,10 @@ def _pose_arm(rotations: FloatArray, at: Targets, side: int) -> None:
     rotations[:, body.INDEX[f"{name}Hand"]] = quat.from_axis_angle(_X, -flexion)
 
 
-def _reach(hand: FloatArray, collar: FloatArray, side: int) -> tuple[FloatArray, FloatArray]:
+def _reach(hand: FloatArray, collars: FloatArray, side: int) -> tuple[FloatArray, FloatArray]:
     """Upper arm rotation against the collar, and elbow bend, to bring the wrist where it is wanted."""
-    rest = np.array(body.skeleton().offsets[body.INDEX[f"{SIDE_NAMES[side]}Arm"]])
-    wanted = quat.rotate(quat.conjugate(collar), hand[:, :3] + rest - quat.rotate(collar, rest))
+    to_collar = quat.conjugate(collar_rotation(collars, side))
+    wanted = quat.rotate(to_collar, hand[:, :3] - girdle_shift(collars, side))
     out = hand[:, 3]
     pole = np.stack([OUTWARD[side] * np.sin(out), -np.cos(out), np.full_like(out, -0.35)], axis=-1)
-    return two_bones(wanted, quat.rotate(quat.conjugate(collar), pole), body.UPPER_ARM, body.FOREARM, -1.0)
+    return two_bones(wanted, quat.rotate(to_collar, pole), body.UPPER_ARM, body.FOREARM, -1.0)
