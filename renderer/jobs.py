@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import Camera
+from renderer.capsules import Figure
 from renderer.context import os_environ_defaults
 from renderer.errors import RendererError
-from renderer.figure import Figure
 from renderer.files import discard_unfinished
 from renderer.video import VideoInfo, render_video
 

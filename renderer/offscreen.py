@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.camera import Camera, check_positions, check_size
+from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
 from renderer.context import Context, shared_context
 from renderer.errors import RendererError
-from renderer.figure import Figure
 from renderer.painter import Painter
 from renderer.shapes import Shapes, lay_out
 

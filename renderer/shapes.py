@@ -9,14 +9,14 @@ not by the middles of bones: else a long limb would jump before another while bo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import Camera, project, smooth_path
+from renderer.capsules import Figure, kept_capsules, place
 from renderer.colour import to_ycbcr
-from renderer.figure import Figure, place
 
 FloatArray = NDArray[np.float64]
 
@@ -34,9 +34,10 @@ class Shapes:
     Parameters
     ----------
     data : (frames, capsules, 16), float32
-        In the order to paint: start x, y and the way to the end x, y (pixels, y down); radius at the start,
-        growth of the radius, 1 / length squared, 1 / (2 mean radius); luma, blue chroma, red chroma (0..1 of the
-        8-bit range) and opacity; the shift into the picture that is drawn on (x, y), shading, stretch of y.
+        In the order to paint: start x, y and the way to the end x, y (pixels, y down); radius at the start, growth
+        of the radius, 1 / length squared, 1 / (2 mean radius); luma, blue chroma, red chroma (0..1 of the 8-bit
+        range) and opacity; the shift into the picture that is drawn on (x, y), shading (0 none, 1 straight on past
+        its ends, 2 round at the far end, 3 round at both), stretch of y.
     boxes : (frames, 4), int64
         Left, top, right and bottom edge of what may be touched, even numbers, not cut at the frame's edges.
     """
@@ -57,7 +58,7 @@ def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 
     ends = np.round(ends * 256.0) / 256.0
     radii = figure.radii * camera.focal_pixels * nearness
     radii = np.maximum(np.round(radii * 256.0) / 256.0, 0.5)
-    order = paint_order(ends, radii, nearness, joined(figure))
+    order = paint_order(ends, radii, nearness, figure.radii.mean(axis=1), joined(figure))
     data = _shader_numbers(ends, radii, figure)
     data = np.take_along_axis(data, order[..., None], axis=1)
     return Shapes(data, _boxes(ends, radii))
@@ -73,14 +74,15 @@ def _without_hidden(figure: Figure, placed: FloatArray) -> tuple[Figure, FloatAr
     hidden = ~long & (joined(figure) & long[None]).any(axis=1)
     if not hidden.any():
         return figure, placed
-    kept = {name: getattr(figure, name)[~hidden] for name in ("ends", "along", "beyond", "radii", "colours")}
-    return replace(figure, **kept), placed[:, ~hidden]
+    return kept_capsules(figure, ~hidden), placed[:, ~hidden]
 
 
 def joined(figure: Figure) -> NDArray[np.bool_]:
-    """Which capsules meet in a joint, `(capsules, capsules)`."""
-    first, second = figure.ends[:, None, :, None], figure.ends[None, :, None, :]
-    meets: NDArray[np.bool_] = (first == second).any(axis=(2, 3))
+    """Which capsules meet in a joint, `(capsules, capsules)`: they have one point in common, but not both."""
+    start, end = figure.ends[:, 0], figure.ends[:, 1]
+    on_start = (start[:, None] == start) | (start[:, None] == end)
+    on_end = (end[:, None] == start) | (end[:, None] == end)
+    meets: NDArray[np.bool_] = on_start != on_end
     return meets
 
 
@@ -99,7 +101,10 @@ def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure) -> NDAr
     data[..., 7] = 1.0 / (radii[..., 0] + radii[..., 1])
     data[..., 8:11] = colours
     data[..., 11] = 1.0
-    data[..., 14] = 1.0 if figure.lit else 0.0
+    if figure.lit:
+        rounded = np.zeros((count, 2), dtype=bool) if figure.rounded is None else figure.rounded
+        # 1: going straight on at both ends; 2: the far end is round; 3: both are.
+        data[..., 14] = 1.0 + rounded[:, 1] + (rounded[:, 0] & rounded[:, 1])
     data[..., 15] = 1.0
     return data
 
@@ -113,7 +118,7 @@ def _boxes(ends: FloatArray, radii: FloatArray) -> NDArray[np.int64]:
 
 
 def paint_order(
-    ends: FloatArray, radii: FloatArray, nearness: FloatArray, meets: NDArray[np.bool_]
+    ends: FloatArray, radii: FloatArray, nearness: FloatArray, thickness: FloatArray, meets: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Capsules from the back to the front, `(frames, capsules)`.
 
@@ -125,8 +130,11 @@ def paint_order(
         Pixels.
     nearness : (frames, capsules, 2)
         1 / distance of each end, which is linear along a line on the screen.
+    thickness : (capsules,)
+        Radius in metres.
     meets : (capsules, capsules)
-        Which capsules share a joint: at the joint neither is before the other, so their middles decide.
+        Which capsules share a joint: at the joint neither is before the other, so it counts whose surface comes
+        closer to the eye at its middle.
     """
     frames, count = ends.shape[:2]
     middle = nearness.sum(axis=2)
@@ -134,7 +142,8 @@ def paint_order(
     one, two = np.triu_indices(count, k=1)
     apart = ~meets[one, two]
     near, far = one[~apart], two[~apart]
-    behind[:, near, far] = middle[:, far] >= middle[:, near]
+    surface = thickness - 2.0 / middle
+    behind[:, near, far] = surface[:, far] >= surface[:, near]
     behind[:, far, near] = ~behind[:, near, far]
     one, two = one[apart], two[apart]
     frame, pair = np.nonzero(_boxes_overlap(ends, radii, one, two))

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.camera import Camera, check_positions, find_heading, frame_group, project
+from renderer.capsules import Figure
 from renderer.colour import RGB
 from renderer.context import Context
 from renderer.errors import RendererError
-from renderer.figure import Figure
 from renderer.files import whole_file
 from renderer.offscreen import render_layers
 

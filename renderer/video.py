@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.camera import Camera, check_size
+from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
 from renderer.context import Context
 from renderer.digest import Box, FramesHash
 from renderer.errors import RendererError
-from renderer.figure import Figure
 from renderer.files import whole_file
 from renderer.offscreen import BATCH, paste_frames
 
@@ -169,7 +169,7 @@ def _write(
     if target.suffix.lower() != ".mp4":
         raise RendererError(f"Expected a video's name to end in .mp4, got {target.name!r}.")
     digest = FramesHash((width, height))
-    with whole_file(target) as unfinished, _encoder(unfinished, (width, height), rate, preset, crf) as encode:
+    with whole_file(target) as unfinished, open_encoder(unfinished, (width, height), rate, preset, crf) as encode:
         for frame, touched in frames:
             if frame.shape != (height * 3 // 2, width) or frame.dtype != np.uint8:
                 raise RendererError(
@@ -193,7 +193,7 @@ def _write(
 
 
 @contextmanager
-def _encoder(path: Path, size: tuple[int, int], rate: Fraction, preset: str, crf: int) -> Iterator[Any]:
+def open_encoder(path: Path, size: tuple[int, int], rate: Fraction, preset: str, crf: int) -> Iterator[Any]:
     """A function that takes the next frame; the file is complete when the block ends without an error."""
     import av
 

@@ -19,7 +19,8 @@ void main() {
 #endif
     PRECISE vec2 from_start = pixel - f_line.xy;
     from_start.y *= f_extra.w;
-    PRECISE float share = clamp((from_start.x * f_line.z + from_start.y * f_line.w) * f_body.z, 0.0, 1.0);
+    PRECISE float on_line = (from_start.x * f_line.z + from_start.y * f_line.w) * f_body.z;
+    PRECISE float share = clamp(on_line, 0.0, 1.0);
     PRECISE vec2 out_of_axis = from_start - f_line.zw * share;
     PRECISE float radius = f_body.x + f_body.y * share;
     PRECISE float distance2 = out_of_axis.x * out_of_axis.x + out_of_axis.y * out_of_axis.y;
@@ -29,11 +30,15 @@ void main() {
     painted = vec4(f_colour.yz, 0.0, cover);
 #else
     float cover = clamp(inside + 0.5, 0.0, 1.0) * f_colour.w;
-    // A soft light from above left: brighter where the surface faces it, darker towards the rim.
+    // A soft light from above left: brighter where the surface faces it, darker towards the rim. Past a joint the
+    // surface counts as going straight on, so that two bones meet without a seam; a free end is round.
+    float round_end = on_line > 0.5 ? step(1.5, f_extra.z) : step(2.5, f_extra.z);
+    PRECISE vec2 straight_on = from_start - f_line.zw * on_line;
+    vec2 side = round_end > 0.5 ? out_of_axis : straight_on;
     PRECISE float across = f_body.w * 2.0;
-    PRECISE float slope = (out_of_axis.x * LIGHT_X + out_of_axis.y * LIGHT_Y) * across;
-    PRECISE float rim = distance2 * across * across;
-    PRECISE float light = 1.0 + f_extra.z * (LIGHT_BASE + slope - rim * LIGHT_RIM);
+    PRECISE float slope = (side.x * LIGHT_X + side.y * LIGHT_Y) * across;
+    PRECISE float rim = (side.x * side.x + side.y * side.y) * across * across;
+    PRECISE float light = 1.0 + min(f_extra.z, 1.0) * (LIGHT_BASE + slope - rim * LIGHT_RIM);
     PRECISE float luma = (f_colour.x - BLACK) * light;
 #ifdef RGB
     // BT.709, limited range; the same colours as in a video.
