@@ -31,7 +31,7 @@ IntArray = NDArray[np.int32]
 
 # A cost as a whole number: so many 2^-24 square metres (0.06 square millimetres). Sums of them are exact.
 COUNTS_PER_SQUARE_METRE = 2.0**24
-LARGEST_COUNT = 2**28 - 1  # 16 square metres
+LARGEST_COUNT = 2**26  # 4 square metres; what is further apart counts as that
 
 # A tile of about 400 kB, so that the five in use stay in cache.
 _TILE_ROWS, _TILE_COLUMNS = 256, 320
@@ -151,13 +151,13 @@ def window_counts(
 
     Returns
     -------
-    (len(rows), len(columns)) int32, at most `LARGEST_COUNT` (16 square metres). Windows of the same clip at the same
+    (len(rows), len(columns)) int32, at most `LARGEST_COUNT` (4 square metres). Windows of the same clip at the same
     frame are 0 apart.
     """
     rows, columns = _ranges(a, b, window, rows, columns)
     out = np.empty((len(rows), len(columns)), dtype=np.int32)
     for down, across, tile in _tiles(a, b, window, rows, columns, np.float32, COUNTS_PER_SQUARE_METRE):
-        np.minimum(tile, LARGEST_COUNT - 64, out=tile)  # float32 has steps of 16 there
+        np.minimum(tile, LARGEST_COUNT, out=tile)
         tile += 0.5
         np.copyto(out[down, across], tile, casting="unsafe")
     np.maximum(out, 0, out=out)
@@ -311,7 +311,7 @@ def _tiles(
 
 
 def _diagonal_sums(work: AnyFloat, stride: int, window: int) -> AnyFloat:
-    """Sums of `window` entries of the first row of `work (3, size)` that lie `stride` apart; `(size,)`, its end unfilled.
+    """Sums of `window` entries of the first row of `work (3, size)` that lie `stride` apart; the end is not filled.
 
     By doubling: a sum of 2m entries is the sum of m entries plus the same m entries later, so a sum takes
     `2 log2(window)` additions at most, and rounding errors grow as slowly. Returns one of the rows.

@@ -1,0 +1,312 @@
+"""One job of a search: everything that one stretch of one hop clip contributes to every transition.
+
+In: a problem and a job. Out: for each transition of the state machine the best with this hop, by triggered frame. Jobs
+don't depend on each other, so they run in any order, on any number of cores or machines, and give the same table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.transitions.one_hop import search
+from study.transitions.one_hop.problem import FORBIDDEN, Alignment, IntArray, OffsetArray, Problem, Switch
+from study.transitions.one_hop.search import Best, Table
+
+
+@dataclass(frozen=True)
+class Job:
+    """The frames `start .. stop - 1` of a hop clip, as starts of the first blend."""
+
+    hop: int
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a job found for one switch.
+
+    Parameters
+    ----------
+    where : (n,)
+        Triggers, counted from the switch's first.
+    best
+        An entry for each of them.
+    direct_where, direct : (m,)
+        The cost in counts of the direct transition, where this job knows it.
+    """
+
+    where: NDArray[np.int64]
+    best: Best
+    direct_where: NDArray[np.int64]
+    direct: IntArray
+
+
+def make_jobs(problem: Problem, memory_bytes: int) -> tuple[Job, ...]:
+    """All jobs, hops that are destinations first; each takes about `memory_bytes` at most.
+
+    The cost of the direct transition, known from the destination as hop, leaves out much of the work of the others.
+    """
+    blend = problem.settings.blend_frames
+    rows = sum(max(clip.frames - blend + 1, 0) for clip in _used_clips(problem))
+    longest = max((clip.frames for clip in problem.clips), default=0)
+    overhang = blend + problem.settings.longest_stay_hop
+    # Matrices of all clips in use, then a second leg, a masked first leg, and what sums and bounds take.
+    width = max(16, memory_bytes // (4 * (rows + 4 * longest)) - overhang)
+    jobs = []
+    destinations = {switch.destination for switch in problem.switches}
+    for hop in sorted(problem.hop_numbers, key=lambda number: (number not in destinations, number)):
+        starts = problem.clips[hop].frames - blend + 1
+        pieces = -(-starts // width) if starts > 0 else 0
+        edges = [starts * piece // pieces for piece in range(pieces + 1)] if pieces else []
+        jobs += [Job(hop, start, stop) for start, stop in pairwise(edges)]
+    return tuple(jobs)
+
+
+def _used_clips(problem: Problem) -> list[Any]:
+    numbers = {number for switch in problem.switches for number in (switch.source, switch.destination)}
+    return [problem.clips[number] for number in sorted(numbers)]
+
+
+def run_job(problem: Problem, prepared: Sequence[Any], job: Job, limits: Mapping[int, Best]) -> dict[int, Found]:
+    """What a job finds, by switch.
+
+    Parameters
+    ----------
+    problem, job
+        What to do.
+    prepared
+        `distance.prepare` of each clip.
+    limits
+        The best known so far, by switch: only what may beat it needs to be found. Older knowledge does no harm.
+    """
+    blend, stay_hop = problem.settings.blend_frames, problem.settings.longest_stay_hop
+    hop_windows = problem.clips[job.hop].frames - blend + 1
+    columns = range(job.start, min(job.stop + blend + stay_hop, hop_windows))
+    needed = _needed_rows(problem)
+    legs = {
+        number: Table(
+            problem.distance.counts(prepared[number], prepared[job.hop], blend, rows, columns),
+            rows.start,
+            columns.start,
+        )
+        for number, rows in needed.items()
+    }
+    found: dict[int, Found] = {}
+    for alignment, numbers in _by_destination(problem).items():
+        to_hop = legs[alignment[0]]
+        second = _SecondLegs(problem, job, to_hop, [problem.switches[number] for number in numbers])
+        for number in numbers:
+            switch = problem.switches[number]
+            found[number] = _search(problem, job, switch, legs[switch.source], second, limits[number])
+    return found
+
+
+def _by_destination(problem: Problem) -> dict[tuple[int, Alignment], list[int]]:
+    """The switches that share their second legs."""
+    groups: dict[tuple[int, Alignment], list[int]] = {}
+    for number, switch in enumerate(problem.switches):
+        groups.setdefault((switch.destination, switch.alignment), []).append(number)
+    return groups
+
+
+def _needed_rows(problem: Problem) -> dict[int, range]:
+    """Which windows of each clip the switches need, as a source or as a destination."""
+    blend, settings = problem.settings.blend_frames, problem.settings
+    needed: dict[int, range] = {}
+    for switch in problem.switches:
+        frames = _source_frames(problem, switch)
+        times = _times(problem, switch)
+        for clip, rows in (
+            (switch.source, frames),
+            (switch.destination, range(times.start, times.stop + settings.longest_stay_hop)),
+        ):
+            windows = max(problem.clips[clip].frames - blend + 1, 0)
+            rows = range(min(max(rows.start, 0), windows), max(min(rows.stop, windows), 0))
+            before = needed.get(clip, rows)
+            if len(rows):
+                both = (before, rows) if len(before) else (rows,)
+                needed[clip] = range(min(r.start for r in both), max(r.stop for r in both))
+            else:
+                needed[clip] = before
+    return needed
+
+
+def _source_frames(problem: Problem, switch: Switch) -> range:
+    """Source frames at which the first blend may start."""
+    triggers = problem.triggers(switch)
+    windows = max(problem.clips[switch.source].frames - problem.settings.blend_frames + 1, 0)
+    stop = min(triggers.stop + problem.settings.longest_stay_source, windows)
+    return range(min(triggers.start, stop), stop)
+
+
+def _times(problem: Problem, switch: Switch) -> range:
+    """The destination's frames at which the first blend may end."""
+    blend, settings = problem.settings.blend_frames, problem.settings
+    if switch.alignment.destination_frame is not None:
+        first = switch.alignment.destination_frame + blend
+        return range(first, first + settings.longest_stay_source + 1)
+    frames = _source_frames(problem, switch)
+    shift = blend - switch.alignment.offset_at(0)
+    last = problem.clips[switch.destination].frames + 1
+    start = max(frames.start + shift, -settings.longest_stay_hop)
+    return range(start, max(start, min(frames.stop + shift, last)))
+
+
+class _SecondLegs:
+    """The second legs of a job into one destination, for all sources and triggers.
+
+    `by_time` holds them by the destination's frame at the end of the first blend, where the alignment is fixed and
+    stays don't bound each other; `by_stay` by the stay in the source, where the destination's frame at the trigger
+    is fixed. Where both stays share a bound and the alignment is fixed, they are made when asked for.
+    """
+
+    def __init__(self, problem: Problem, job: Job, to_hop: Table, switches: Sequence[Switch]) -> None:
+        settings = problem.settings
+        self.problem, self.job, self.to_hop = problem, job, to_hop
+        self.destination, self.alignment = switches[0].destination, switches[0].alignment
+        self.ends = range(job.start + settings.blend_frames, job.stop + settings.blend_frames)
+        self.stays = np.arange(settings.longest_stay_source + 1)
+        self.bounds = np.minimum(settings.longest_stay_hop, settings.stay_both - self.stays)
+        spans = [_times(problem, switch) for switch in switches]
+        self.times = range(min(span.start for span in spans), max(span.stop for span in spans))
+        self.by_time: Table | None = None
+        self.by_stay: IntArray | None = None
+        if self.alignment.destination_frame is not None:
+            times = self.alignment.destination_frame + settings.blend_frames + self.stays
+            self.by_stay = self._rows(times, self.bounds)
+        elif (self.bounds == settings.longest_stay_hop).all():
+            self.by_time = self.bounded_by(settings.longest_stay_hop)
+
+    def bounded_by(self, longest: int) -> Table:
+        """All second legs with one longest stay, by the destination's frame."""
+        table = search.second_leg(self.to_hop, self.times, self.ends, longest, self.problem.weight)
+        self._mend(table.counts, np.arange(self.times.start, self.times.stop))
+        return table
+
+    def of(self, times: OffsetArray, stays: IntArray) -> IntArray:
+        """Single rows: `(n, hop frames)` for n destination frames and stays in the source that go with them."""
+        if self.by_stay is not None:
+            return self.by_stay[stays]
+        if self.by_time is not None:
+            return self.by_time.counts[times - self.by_time.first_row]
+        return self._rows(times, self.bounds[stays])
+
+    def _rows(self, times: OffsetArray, longest: OffsetArray) -> IntArray:
+        rows = search.second_rows(self.to_hop, times, self.ends, longest, self.problem.weight)
+        self._mend(rows, times)
+        rows[longest < 0] = FORBIDDEN
+        return rows
+
+    def _mend(self, rows: IntArray, times: OffsetArray) -> None:
+        """What a second leg has beyond its costs: the destination as its own hop, and hops kept near to direct.
+
+        Where the hop is the destination at its own place, nothing is left to blend: the second leg costs nothing and
+        needs no more frames. So the direct transition is among the one-hop ones wherever it exists.
+        """
+        if self.job.hop == self.destination:
+            frames = self.problem.clips[self.destination].frames
+            own = np.flatnonzero((times >= max(self.ends.start, 0)) & (times < self.ends.stop) & (times <= frames))
+            rows[own, times[own] - self.ends.start] = 0
+        if self.problem.nearest_to_direct is not None:
+            apart = np.abs(np.arange(self.ends.start, self.ends.stop) - times[:, None])
+            rows[apart > self.problem.nearest_to_direct] = FORBIDDEN
+
+
+def _search(problem: Problem, job: Job, switch: Switch, leg: Table, second: _SecondLegs, limit: Best) -> Found:
+    """What a job finds for one switch."""
+    triggers = problem.triggers(switch)
+    extra = np.int32(problem.hop_costs.get(job.hop, 0))
+    own = Table(leg.counts[:, : job.stop - job.start], leg.first_row, job.start)
+    first = _allowed(problem, job, switch, own)
+    paid = (second.stays * problem.weight).astype(np.int32)
+    if second.by_stay is not None:
+        sums = search.minima_by_stay(first, second.by_stay, triggers, problem.weight, limit.cost - extra)
+    else:
+        sums = _sums_with_fixed_alignment(problem, switch, first, second)
+    sums += paid
+    sums[:, second.bounds < 0] = FORBIDDEN
+    stay = sums.argmin(axis=1).astype(np.int32)
+    cost = np.take_along_axis(sums, stay[:, None], axis=1)[:, 0] + extra
+    where = np.flatnonzero((cost < FORBIDDEN) & limit.beaten_by(cost, stay, job.hop))
+    best = _entries(problem, job, switch, first, second, where, cost[where], stay[where])
+    direct_where, direct = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)
+    if job.hop == switch.destination:
+        every = np.arange(triggers.start, triggers.stop)
+        costs = own.at(every, every - _offsets(switch, every))
+        direct_where = np.flatnonzero(costs < FORBIDDEN)
+        direct = costs[direct_where]
+    return Found(where, best, direct_where, direct)
+
+
+def _offsets(switch: Switch, triggers: OffsetArray) -> OffsetArray:
+    """The destination's offset for each triggered frame."""
+    if switch.alignment.offset is not None:
+        return np.full(len(triggers), switch.alignment.offset, dtype=np.int64)
+    return triggers + switch.alignment.offset_at(0)
+
+
+def _allowed(problem: Problem, job: Job, switch: Switch, leg: Table) -> Table:
+    """First legs without the offsets that the hop may not have."""
+    allowed = problem.offsets.get((switch.source, job.hop))
+    if allowed is None or not len(leg.counts):
+        return leg
+    rows, columns = leg.counts.shape
+    first = leg.first_row - leg.first_column
+    # Offsets are row less column: the same along each diagonal, so a row of the mask is a stretch of one list.
+    listed = np.isin(np.arange(first - columns + 1, first + rows), allowed)
+    mask = np.lib.stride_tricks.sliding_window_view(listed, columns)[:rows, ::-1]
+    return Table(np.where(mask, leg.counts, np.int32(FORBIDDEN)), leg.first_row, leg.first_column)
+
+
+def _sums_with_fixed_alignment(problem: Problem, switch: Switch, first: Table, second: _SecondLegs) -> IntArray:
+    """The least sum of both legs by trigger and stay in the source, `(triggers, stays)`, stays not yet paid for.
+
+    It depends on the source's frame alone: trigger plus stay. Only a bound on both stays makes a difference by stay.
+    """
+    triggers, frames = problem.triggers(switch), _source_frames(problem, switch)
+    shift = problem.settings.blend_frames - switch.alignment.offset_at(0)
+    sums = np.full((len(triggers), len(second.stays)), FORBIDDEN, dtype=np.int32)
+    for bound in sorted({int(bound) for bound in second.bounds if bound >= 0}):
+        table = second.by_time or second.bounded_by(bound)
+        minima = search.minima_with_fixed_alignment(first, table, frames, shift)
+        padded = np.concatenate([minima, np.full(sum(sums.shape), FORBIDDEN, dtype=np.int32)])
+        windows = np.lib.stride_tricks.sliding_window_view(padded, len(second.stays))[: len(triggers)]
+        here = second.bounds == bound
+        sums[:, here] = windows[:, here]
+    return sums
+
+
+def _entries(
+    problem: Problem,
+    job: Job,
+    switch: Switch,
+    first: Table,
+    second: _SecondLegs,
+    where: OffsetArray,
+    cost: IntArray,
+    stay: IntArray,
+) -> Best:
+    """Whole entries for the triggers in `where`, from the least cost and the stay in the source that has it."""
+    blend = problem.settings.blend_frames
+    trigger = problem.triggers(switch).start + where
+    source = trigger + stay
+    times = source + blend - _offsets(switch, trigger)
+    frame = np.zeros(len(where), dtype=np.int64)
+    for part in range(0, len(where), 256):
+        some = slice(part, part + 256)
+        total = first.counts[source[some] - first.first_row] + second.of(times[some], stay[some])
+        frame[some] = total.argmin(axis=1)
+    frame += job.start
+    longest = second.bounds[stay]
+    stay_hop = search.stays_in_hop(second.to_hop, times, frame + blend, longest, problem.weight)
+    if job.hop == switch.destination:
+        stay_hop[frame + blend == times] = 0
+    hop = np.full(len(where), job.hop, dtype=np.int32)
+    return Best(cost, hop, frame.astype(np.int32), stay, stay_hop)

@@ -1,0 +1,277 @@
+"""The exact one-hop search for one hop clip, without looking at every combination.
+
+In: costs in counts of blends from the source to the hop and from the hop to the destination. Out: for every triggered
+frame the best start, stays and cost with this hop. Koyama & Goto 2019, Eqs. 1 to 4.
+
+The paper tries every (hop frame, stay in the source, stay in the hop). But the best stay in the hop depends only on
+the hop's frame and the destination's frame at the end of the first blend, so `second_leg` finds it once for all
+sources and triggers, by a running minimum along diagonals. What is left is, for a source frame and a destination
+frame, the minimum over the hop's frames of a sum of two rows. With the alignment fixed (music) there is one such pair
+for each source frame; with a fixed frame of the destination at the trigger there is one for each stay, and lower
+bounds leave most of them out.
+
+Ties: of transitions that cost the same, the one with the least stay in the source, then the first hop clip, then the
+first frame of the hop, then the least stay in the hop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.transitions.one_hop.problem import FORBIDDEN, IntArray
+
+_ROWS = 128
+_SEGMENT = 64
+
+
+@dataclass(eq=False)
+class Best:
+    """The best transition found so far for each of a range of triggered frames; `offer` improves it in place.
+
+    Parameters
+    ----------
+    cost, hop, frame, stay_source, stay_hop : (triggers,)
+        Cost in counts (`FORBIDDEN` or more where there is none), hop clip (-1 where there is none), the hop's frame at
+        the start of the first blend, and both stays.
+    """
+
+    cost: IntArray
+    hop: IntArray
+    frame: IntArray
+    stay_source: IntArray
+    stay_hop: IntArray
+
+    @staticmethod
+    def none(triggers: int) -> Best:
+        """Nothing found yet."""
+        cost = np.full(triggers, FORBIDDEN, dtype=np.int32)
+        return Best(
+            cost, np.full(triggers, -1, dtype=np.int32), *(np.zeros(triggers, dtype=np.int32) for _ in range(3))
+        )
+
+    def beaten_by(self, cost: IntArray, stay_source: IntArray, hop: int) -> NDArray[np.bool_]:
+        """Where a cost, with its stay in the source, is better by the rule for ties, or may be by the hop's frame."""
+        same = (cost == self.cost) & (self.hop >= 0)
+        sooner = (stay_source < self.stay_source) | ((stay_source == self.stay_source) & (hop <= self.hop))
+        return np.asarray((cost < self.cost) | (same & sooner))
+
+    def offer(self, where: NDArray[np.int64], other: Best) -> None:
+        """Take over `other`'s entries (one for each trigger in `where`) wherever they are better."""
+        ours, theirs = self._keys(where), other._keys(slice(None))
+        better, tied = np.zeros(len(where), dtype=bool), np.ones(len(where), dtype=bool)
+        for old, new in zip(ours, theirs, strict=True):
+            better |= tied & (new < old)
+            tied &= new == old
+        chosen = where[better]
+        for name in ("cost", "hop", "frame", "stay_source", "stay_hop"):
+            getattr(self, name)[chosen] = getattr(other, name)[better]
+
+    def _keys(self, where: NDArray[np.int64] | slice) -> tuple[IntArray, ...]:
+        names = (self.cost, self.stay_source, self.hop, self.frame, self.stay_hop)
+        return tuple(values[where] for values in names)
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A block of a cost matrix with its place: entry `[r, c]` is for row `first_row + r`, column `first_column + c`."""
+
+    counts: IntArray
+    first_row: int
+    first_column: int
+
+    def block(self, rows: range, columns: range) -> IntArray:
+        """A copy of any stretch of rows and columns, `FORBIDDEN` outside of what is known."""
+        out = np.full((len(rows), len(columns)), FORBIDDEN, dtype=np.int32)
+        top, bottom = max(rows.start, self.first_row), min(rows.stop, self.first_row + self.counts.shape[0])
+        left, right = max(columns.start, self.first_column), min(columns.stop, self.first_column + self.counts.shape[1])
+        if top < bottom and left < right:
+            known = self.counts[
+                top - self.first_row : bottom - self.first_row, left - self.first_column : right - self.first_column
+            ]
+            out[top - rows.start : bottom - rows.start, left - columns.start : right - columns.start] = known
+        return out
+
+    def at(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> IntArray:
+        """Single entries, `FORBIDDEN` outside of what is known."""
+        r, c = rows - self.first_row, columns - self.first_column
+        known = (r >= 0) & (c >= 0) & (r < self.counts.shape[0]) & (c < self.counts.shape[1])
+        out = np.full(np.shape(r), FORBIDDEN, dtype=np.int32)
+        out[known] = self.counts[r[known], c[known]]
+        return out
+
+
+def second_leg(to_hop: Table, times: range, frames: range, longest_stay: int, weight: int) -> Table:
+    """The best stay in the hop and blend into the destination, from every (destination frame, hop frame).
+
+    Parameters
+    ----------
+    to_hop
+        Costs of blends between the destination (rows) and the hop (columns), by the frames where they start.
+    times, frames
+        The destination's and the hop's frames at the end of the first blend.
+    longest_stay
+        The most frames to stay.
+    weight
+        Counts a frame of stay.
+
+    Returns
+    -------
+    For each pair `(e, v)` the least of `to_hop[e + s, v + s] + weight * s` over the stays `s`.
+
+    Notes
+    -----
+    By doubling: the least over 2m stays is the lesser of the least over m stays here, and over m stays m frames
+    on, plus the weight of these m frames. The frames further on lie on a diagonal: a fixed stride in flat memory.
+    """
+    out = np.empty((len(times), len(frames)), dtype=np.int32)
+    wide = range(frames.start, frames.stop + longest_stay)
+    for top in range(0, len(times), _ROWS):
+        bottom = min(top + _ROWS, len(times))
+        block = to_hop.block(range(times.start + top, times.start + bottom + longest_stay), wide)
+        least, stride, done = block.reshape(-1), len(wide) + 1, 1
+        spare = np.empty_like(least)
+        while done <= longest_stay:
+            step = min(done, longest_stay + 1 - done)
+            here = len(least) - step * stride
+            further = np.add(least[step * stride :], np.int32(step * weight), out=spare[:here])
+            np.minimum(least[:here], further, out=least[:here])
+            done += step
+        out[top:bottom] = block[: bottom - top, : len(frames)]
+    return Table(out, times.start, frames.start)
+
+
+def second_rows(
+    to_hop: Table, times: NDArray[np.int64], frames: range, longest: NDArray[np.int64], weight: int
+) -> IntArray:
+    """Single rows of `second_leg`, each with its own longest stay: `(len(times), len(frames))`."""
+    out = np.full((len(times), len(frames)), FORBIDDEN, dtype=np.int32)
+    counts = to_hop.counts
+    for stay in range(int(longest.max(initial=-1)) + 1):
+        rows = times + stay - to_hop.first_row
+        used = np.flatnonzero((rows >= 0) & (rows < counts.shape[0]) & (stay <= longest))
+        left = max(frames.start + stay, to_hop.first_column)
+        right = min(frames.stop + stay, to_hop.first_column + counts.shape[1])
+        if len(used) and left < right:
+            cost = counts[rows[used], left - to_hop.first_column : right - to_hop.first_column]
+            cost += np.int32(stay * weight)
+            here = slice(left - stay - frames.start, right - stay - frames.start)
+            out[used, here] = np.minimum(out[used, here], cost)
+    return out
+
+
+def stays_in_hop(
+    to_hop: Table, times: NDArray[np.int64], frames: NDArray[np.int64], longest: NDArray[np.int64], weight: int
+) -> IntArray:
+    """The shortest stay in the hop of least cost, for single pairs, each with its own longest stay."""
+    least = np.full(len(times), FORBIDDEN, dtype=np.int32)
+    stays = np.zeros(len(times), dtype=np.int32)
+    for stay in range(int(longest.max(initial=-1)) + 1):
+        cost = to_hop.at(times + stay, frames + stay) + np.int32(stay * weight)
+        better = (cost < least) & (stay <= longest)
+        least[better], stays[better] = cost[better], stay
+    return stays
+
+
+def row_minima(first: IntArray, second: IntArray) -> IntArray:
+    """`min(first + second)` along the rows, in blocks that stay in cache; `second` may be a single row."""
+    out = np.empty(len(first), dtype=np.int32)
+    work = np.empty((min(_ROWS, len(first)), first.shape[1]), dtype=np.int32)
+    for top in range(0, len(first), _ROWS):
+        rows = slice(top, min(top + _ROWS, len(first)))
+        total = np.add(first[rows], second[rows] if len(second) > 1 else second, out=work[: rows.stop - top])
+        total.min(axis=1, out=out[rows])
+    return out
+
+
+def minima_with_fixed_alignment(first: Table, second: Table, frames: range, shift: int) -> IntArray:
+    """For each source frame the least sum of both legs over the hop's frames.
+
+    Parameters
+    ----------
+    first
+        First legs by (source frame, hop frame) where the first blend starts.
+    second
+        Second legs by (destination frame, hop frame) where it ends.
+    frames
+        Source frames at which the first blend may start.
+    shift
+        The destination's frame at the end of the first blend, less the source's frame at its start.
+
+    Returns
+    -------
+    (len(frames),) counts.
+    """
+    top = max(frames.start, first.first_row, second.first_row - shift)
+    bottom = min(first.first_row + len(first.counts), second.first_row + len(second.counts) - shift, frames.stop)
+    out = np.full(len(frames), FORBIDDEN, dtype=np.int32)
+    if top < bottom:
+        left = first.counts[top - first.first_row : bottom - first.first_row]
+        right = second.counts[top + shift - second.first_row : bottom + shift - second.first_row]
+        out[top - frames.start : bottom - frames.start] = row_minima(left, right)
+    return out
+
+
+def minima_by_stay(first: Table, second: IntArray, triggers: range, weight: int, limit: IntArray) -> IntArray:
+    """For each triggered frame and stay in the source the least sum of both legs, where it may matter.
+
+    Parameters
+    ----------
+    first
+        First legs by (source frame, hop frame).
+    second : (stays, hop frames)
+        Second legs by stay in the source, which gives the destination's frame.
+    triggers
+        Triggered frames.
+    weight
+        Counts a frame of stay.
+    limit : (triggers,)
+        The best cost known so far; what costs more is left out.
+
+    Returns
+    -------
+    (triggers, stays) counts, stays not yet paid for; `FORBIDDEN` where the sum with its stay exceeds the best.
+
+    Notes
+    -----
+    The hop's frames are cut into segments. The sum of the least first leg and the least second leg of a segment bounds
+    all of its sums from below, so a segment whose bound exceeds the best known cost is never added up. Equal
+    costs are kept, for the rule for ties.
+    """
+    stays, width = second.shape
+    out = np.full((len(triggers), stays), FORBIDDEN, dtype=np.int32)
+    if not len(first.counts):
+        return out
+    starts = np.arange(0, width, _SEGMENT)
+    low_first = np.minimum.reduceat(first.counts[:, :width], starts, axis=1)
+    low_second = np.minimum.reduceat(second, starts, axis=1)
+    source = np.arange(len(triggers))[:, None] + np.arange(stays) + (triggers.start - first.first_row)
+    outside = (source < 0) | (source >= len(first.counts))
+    source[outside] = 0
+    paid = (np.arange(stays) * weight).astype(np.int32)
+    limit = limit.copy()
+    bounds = low_first[source] + low_second + paid[:, None]
+    bounds[outside] = FORBIDDEN
+
+    def add_up(trigger: NDArray[np.int64], stay: NDArray[np.int64], segment: int) -> None:
+        here = slice(segment * _SEGMENT, min((segment + 1) * _SEGMENT, width))
+        for part in range(0, len(trigger), 8192):
+            t, s = trigger[part : part + 8192], stay[part : part + 8192]
+            least = (first.counts[source[t, s], here] + second[s, here]).min(axis=1)
+            out[t, s] = np.minimum(out[t, s], least)
+
+    # The most promising segment of each trigger first: it sets a limit that leaves out most of the others.
+    flat = bounds.reshape(len(triggers), -1)
+    promising = flat.argmin(axis=1)
+    possible = np.take_along_axis(flat, promising[:, None], axis=1)[:, 0] < FORBIDDEN
+    for segment in range(len(starts)):
+        trigger = np.flatnonzero(possible & (promising % len(starts) == segment))
+        add_up(trigger, promising[trigger] // len(starts), segment)
+    np.minimum(limit, (out + paid).min(axis=1), out=limit)
+    for segment in range(len(starts)):
+        trigger, stay = np.nonzero(bounds[:, :, segment] <= np.minimum(limit, FORBIDDEN - 1)[:, None])
+        add_up(trigger, stay, segment)
+        np.minimum(limit, (out + paid).min(axis=1), out=limit)
+    return out

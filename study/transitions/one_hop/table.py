@@ -1,0 +1,277 @@
+"""The table that a runtime looks up: for every triggered frame four integers, in memory and in two kinds of file.
+
+An entry is (hop clip, temporal alignment offset of the hop, stay in the source, stay in the hop), Koyama & Goto 2019,
+Eq. 1; the hop is -1 where no transition fits in the clips. 50 transitions of 1,000 frames are 800,000 bytes.
+
+Files: `NAME.npz` (arrays for NumPy, costs too) and `NAME.bin` with `NAME.json` (little-endian 32-bit integers that a
+game engine reads without us); `docs/one_hop.md` describes both.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import TransitionError
+from study.transitions.one_hop.problem import FORBIDDEN, Alignment, IntArray, Problem
+from study.transitions.one_hop.search import Best
+
+FORMAT, VERSION = "segue one-hop table", 1
+COLUMNS = ("hop", "offset", "stay_source", "stay_hop")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One transition (2019, Eq. 1); frames.
+
+    Parameters
+    ----------
+    hop
+        The hop clip's number.
+    offset
+        The source's frame at which the hop's frame 0 stands.
+    stay_source, stay_hop
+        Frames to wait before the first and before the second blend.
+    """
+
+    hop: int
+    offset: int
+    stay_source: int
+    stay_hop: int
+
+
+@dataclass(frozen=True)
+class Row:
+    """One transition of the state machine in the table.
+
+    Parameters
+    ----------
+    source, destination
+        Clip numbers.
+    alignment
+        Where the destination stands on the source's timeline.
+    first_trigger, triggers
+        The first triggered frame, and how many there are.
+    first_entry
+        Where its entries start.
+    """
+
+    source: int
+    destination: int
+    alignment: Alignment
+    first_trigger: int
+    triggers: int
+    first_entry: int
+
+
+@dataclass(frozen=True, eq=False)
+class OneHopTable:
+    """Optimal one-hop transitions.
+
+    Parameters
+    ----------
+    clips, frames
+        Name and number of frames of each clip, in the order of their numbers.
+    fps
+        Frame rate of all clips.
+    blend_frames
+        Frames of each blend.
+    rows
+        The transitions.
+    entries : (n, 4) int32
+        All entries, row after row; see `COLUMNS`.
+    costs, direct_costs : (n,)
+        Eq. 2 for each entry, and the distance of the direct transition; infinite where there is none.
+    weight
+        `w` of Eq. 2, cost a frame of stay.
+    words
+        What the cost is, with its unit.
+    """
+
+    clips: tuple[str, ...]
+    frames: tuple[int, ...]
+    fps: float
+    blend_frames: int
+    rows: tuple[Row, ...]
+    entries: IntArray
+    costs: NDArray[np.float64]
+    direct_costs: NDArray[np.float64]
+    weight: float
+    words: str
+
+    def row(self, source: int, destination: int) -> Row:
+        """The transition between two clips; `TransitionError` where the table has none."""
+        for row in self.rows:
+            if (row.source, row.destination) == (source, destination):
+                return row
+        known = ", ".join(f"{self.clips[row.source]} to {self.clips[row.destination]}" for row in self.rows[:8])
+        raise TransitionError(
+            f"Expected a transition of the table, which has {known}{', ...' if len(self.rows) > 8 else ''}; got "
+            f"{self._name(source)} to {self._name(destination)}."
+        )
+
+    def position(self, source: int, destination: int, trigger: int) -> int:
+        """Where the entry for a triggered frame stands in `entries`."""
+        row = self.row(source, destination)
+        last = row.first_trigger + row.triggers - 1
+        if not row.first_trigger <= trigger <= last:
+            raise TransitionError(
+                f"Expected a triggered frame from {row.first_trigger} to {last} of {self._name(source)}, got {trigger}."
+            )
+        return row.first_entry + trigger - row.first_trigger
+
+    def look_up(self, source: int, destination: int, trigger: int) -> Entry | None:
+        """The transition for a triggered frame, None where none fits in the clips."""
+        hop, *rest = (int(number) for number in self.entries[self.position(source, destination, trigger)])
+        return None if hop < 0 else Entry(hop, *rest)
+
+    def number(self, name: str) -> int:
+        """A clip's number by its name."""
+        if name not in self.clips:
+            raise TransitionError(f"Expected a clip of the table ({', '.join(self.clips)}), got {name!r}.")
+        return self.clips.index(name)
+
+    def _name(self, number: int) -> str:
+        return self.clips[number] if 0 <= number < len(self.clips) else f"clip {number}"
+
+
+def table_of(problem: Problem, best: Mapping[int, Best], direct: Mapping[int, IntArray]) -> OneHopTable:
+    """The table of what a search found, by the switches' numbers."""
+    rows, entries, costs, directs = [], [], [], []
+    first_entry = 0
+    for number, switch in enumerate(problem.switches):
+        triggers, found = problem.triggers(switch), best[number]
+        offset = np.arange(triggers.start, triggers.stop) + found.stay_source - found.frame
+        entry = np.stack([found.hop, offset, found.stay_source, found.stay_hop], axis=1)
+        entry[found.hop < 0] = (-1, 0, 0, 0)
+        entries.append(entry.astype(np.int32))
+        costs.append(_in_units(found.cost, problem.distance.unit))
+        directs.append(_in_units(direct[number], problem.distance.unit))
+        rows.append(
+            Row(switch.source, switch.destination, switch.alignment, triggers.start, len(triggers), first_entry)
+        )
+        first_entry += len(triggers)
+    return OneHopTable(
+        tuple(clip.name or f"clip {k}" for k, clip in enumerate(problem.clips)),
+        tuple(clip.frames for clip in problem.clips),
+        problem.clips[0].fps,
+        problem.settings.blend_frames,
+        tuple(rows),
+        np.concatenate(entries) if entries else np.zeros((0, 4), dtype=np.int32),
+        np.concatenate(costs) if costs else np.zeros(0),
+        np.concatenate(directs) if directs else np.zeros(0),
+        problem.weight * problem.distance.unit,
+        problem.distance.words,
+    )
+
+
+def _in_units(counts: IntArray, unit: float) -> NDArray[np.float64]:
+    return np.where(counts >= FORBIDDEN, np.inf, counts * unit)
+
+
+def header(table: OneHopTable) -> dict[str, Any]:
+    """What a file says besides its integers."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "columns": list(COLUMNS),
+        "type": "little-endian 32-bit signed integers",
+        "bytes": int(table.entries.size * 4),
+        "entries": len(table.entries),
+        "fps": table.fps,
+        "blend_frames": table.blend_frames,
+        "weight": table.weight,
+        "cost": table.words,
+        "clips": [{"name": name, "frames": frames} for name, frames in zip(table.clips, table.frames, strict=True)],
+        "transitions": [asdict(row) for row in table.rows],
+    }
+
+
+def write_table(table: OneHopTable, path: Path) -> tuple[Path, ...]:
+    """Writes `path` by its suffix: `.npz`, or `.bin` (or `.json`) for the flat file and its header; all at once.
+
+    Returns
+    -------
+    The files written.
+    """
+    text = json.dumps(header(table), indent=2)
+    if path.suffix == ".npz":
+        arrays: dict[str, Any] = {"entries": table.entries, "costs": table.costs, "direct_costs": table.direct_costs}
+        temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
+        with temporary.open("wb") as file:
+            np.savez(file, header=np.array(text), **arrays)
+        temporary.replace(path)
+        return (path,)
+    if path.suffix not in (".bin", ".json"):
+        raise TransitionError(f"Expected a file name that ends in .npz, .bin or .json, got {path.name!r}.")
+    flat, words = path.with_suffix(".bin"), path.with_suffix(".json")
+    for file_path, content in ((flat, table.entries.astype("<i4").tobytes()), (words, text.encode())):
+        temporary = file_path.with_name(f"{file_path.name}.{os.getpid()}.part")
+        temporary.write_bytes(content)
+        temporary.replace(file_path)
+    return flat, words
+
+
+def read_table(path: Path) -> OneHopTable:
+    """A table from a file; costs come only with `.npz` and are infinite otherwise.
+
+    Raises
+    ------
+    TransitionError
+        For a file that is not such a table, of another version, or cut short.
+    """
+    if path.suffix == ".npz":
+        with np.load(path) as arrays:
+            if "header" not in arrays:
+                raise TransitionError(f"{path}: expected a one-hop table, found arrays {', '.join(arrays)}.")
+            return _table(
+                json.loads(str(arrays["header"])), arrays["entries"], path, arrays["costs"], arrays["direct_costs"]
+            )
+    flat, words = path.with_suffix(".bin"), path.with_suffix(".json")
+    for needed in (flat, words):
+        if not needed.exists():
+            raise TransitionError(
+                f"{path}: expected {flat.name} and {words.name} side by side; {needed.name} is missing."
+            )
+    content = flat.read_bytes()
+    said = json.loads(words.read_text(encoding="utf-8"))
+    if len(content) != said.get("bytes", -1):
+        raise TransitionError(
+            f"{flat}: expected {said.get('bytes', 'no')} bytes, as {words.name} says, found {len(content)}. "
+            "Build it again."
+        )
+    return _table(said, np.frombuffer(content, dtype="<i4").astype(np.int32).reshape(-1, len(COLUMNS)), path)
+
+
+def _table(
+    said: Mapping[str, Any],
+    entries: IntArray,
+    path: Path,
+    costs: NDArray[np.float64] | None = None,
+    direct_costs: NDArray[np.float64] | None = None,
+) -> OneHopTable:
+    if said.get("format") != FORMAT or said.get("version") != VERSION or tuple(said["columns"]) != COLUMNS:
+        raise TransitionError(
+            f"{path}: expected a {FORMAT} of version {VERSION} with columns {', '.join(COLUMNS)}, found "
+            f"{said.get('format')} {said.get('version')} {said.get('columns')}. Build it again."
+        )
+    unknown = np.full(len(entries), np.inf)
+    return OneHopTable(
+        tuple(clip["name"] for clip in said["clips"]),
+        tuple(clip["frames"] for clip in said["clips"]),
+        said["fps"],
+        said["blend_frames"],
+        tuple(Row(**{**row, "alignment": Alignment(**row["alignment"])}) for row in said["transitions"]),
+        entries,
+        unknown if costs is None else costs,
+        unknown if direct_costs is None else direct_costs,
+        said["weight"],
+        said["cost"],
+    )
