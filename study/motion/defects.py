@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ _LONGEST_GAP_S = 0.3
 _BRIDGE_RAD_PER_S = 20.0
 _FLOOR_M = 0.03
 _FLOATING_M = 0.10
+# An ankle stands about this high; toes that point through the floor don't make the floor lower.
+_ANKLE_M = 0.09
 
 _TRUNK = ("pelvis", "spine", "chest", "neck", "head")
 _LIMBS = tuple(f"{part}.{side}" for part in ("hip", "knee", "ankle", "shoulder", "elbow") for side in "LR")
@@ -121,7 +123,12 @@ def mend(clip: Clip, defects: Sequence[Defect] | None = None, *, policy: Policy 
         )
     if policy == "drop":
         return _longest_clean(clip, [(d.frame_start, d.frame_stop) for d in major])
-    return _mend_all(clip, defects)
+    mended = _mend_all(clip, defects)
+    # Turning a leg back can leave a step in its foot that stood hidden among larger ones.
+    left = []
+    if any(d.kind == "joint-flip" for d in defects):
+        left = [d for d in find_defects(mended) if d.kind == "joint-jump" and d.severity == "major"]
+    return _mend_all(mended, left) if left else mended
 
 
 # -- Finding --------------------------------------------------------------------------------------------------------
@@ -295,30 +302,46 @@ def _clusters(jumps: IntArray, gap: int) -> list[IntArray]:
 
 
 def _floor_defects(found: _Findings) -> list[Defect]:
-    """The height at which the lower foot stands: its twentieth part of lowest frames, for feet that roll or hop."""
     clip = found.clip
-    level = floor_height(trim(clip, found.start, max(found.stop, found.start + 1)))
-    if level is None or -_FLOOR_M <= level <= _FLOATING_M:
+    feet = _foot_heights(trim(clip, found.start, max(found.stop, found.start + 1)))
+    if not feet:
         return []
-    below = level < 0.0
-    message = f"the feet stand {abs(level) * 100:.0f} cm {'below' if below else 'above'} the floor"
-    return [Defect("below-floor" if below else "floating", 0, clip.frames, "", abs(level), "m", message, "minor")]
+    defects = []
+    level = max(max(foot.tip, foot.ankle - _ANKLE_M) for foot in feet)
+    if not -_FLOOR_M <= level <= _FLOATING_M:
+        below = level < 0.0
+        message = f"the feet stand {abs(level) * 100:.0f} cm {'below' if below else 'above'} the floor"
+        kind: Kind = "below-floor" if below else "floating"
+        defects.append(Defect(kind, 0, clip.frames, "", abs(level), "m", message, "minor"))
+    for foot in feet:
+        depth = min(level, 0.0) - foot.tip
+        if depth > 2.0 * _FLOOR_M:
+            message = f"{foot.name} points through the floor, up to {depth * 100:.0f} cm deep"
+            defects.append(Defect("below-floor", 0, clip.frames, foot.name, depth, "m", message, "minor"))
+    return defects
 
 
-def floor_height(clip: Clip) -> float | None:
-    """The height of the lowest joint or tip of a foot while it stands, metres; None for a rig without feet.
+class _Foot(NamedTuple):
+    """How high a foot is while it stands, metres: its ankle, and its lowest joint or tip."""
 
-    Of both feet the higher counts, as a foot that was captured badly can point through the floor for seconds.
-    """
+    name: str
+    ankle: float
+    tip: float
+
+
+def _foot_heights(clip: Clip) -> list[_Foot]:
+    """The twentieth part of each foot's lowest frames, as feet roll, hop and are captured badly now and then."""
     skeleton = clip.skeleton
     heights = joint_positions(clip, ends=True)[..., 1]
-    levels = []
+    feet = []
     for side in "LR":
-        foot = [skeleton.roles[r] for r in (f"ankle.{side}", f"toe.{side}") if r in skeleton.roles]
-        tips = [skeleton.joints + e for e, parent in enumerate(skeleton.end_parents) if parent in foot]
-        if foot:
-            levels.append(float(np.quantile(heights[:, [*foot, *tips]].min(axis=1), 0.05)))
-    return max(levels) if levels else None
+        parts = [skeleton.roles[role] for role in (f"ankle.{side}", f"toe.{side}") if role in skeleton.roles]
+        tips = [skeleton.joints + e for e, parent in enumerate(skeleton.end_parents) if parent in parts]
+        if f"ankle.{side}" in skeleton.roles:
+            ankle = float(np.quantile(heights[:, parts[0]], 0.05))
+            lowest = float(np.quantile(heights[:, [*parts, *tips]].min(axis=1), 0.05))
+            feet.append(_Foot(skeleton.names[parts[0]], ankle, lowest))
+    return feet
 
 
 # -- Mending --------------------------------------------------------------------------------------------------------
@@ -373,7 +396,7 @@ def _mend_all(clip: Clip, defects: Sequence[Defect]) -> Clip:
             "frames between jumps of the root. Use another clip."
         )
     mended = trim(mended, start, stop)
-    floor = next((d for d in defects if d.kind in ("below-floor", "floating")), None)
+    floor = next((d for d in defects if d.kind in ("below-floor", "floating") and not d.joint), None)
     if floor is None:
         return mended
     shift = floor.size if floor.kind == "below-floor" else -floor.size
