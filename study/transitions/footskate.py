@@ -103,12 +103,18 @@ def transition_contacts(transition: Transition, source: Clip, destination: Clip)
     is still low. Outside the blend the clips' own contacts hold.
     """
     first, last = transition.blend_start, transition.blend_stop
-    frames = transition.clip.frames
+    frames, count = transition.clip.frames, transition.blend_frames
     from_source, from_destination = np.zeros((2, frames, 2), dtype=bool)
-    before = find_contacts(source)[: transition.source_frames[1]]
-    after = find_contacts(destination)[transition.destination_frames[0] :]
-    from_source[: len(before)] = before
-    from_destination[frames - len(after) :] = after
+    before, after = find_contacts(source), find_contacts(destination)
+    from_source[:first] = before[:first]
+    from_destination[last:] = after[transition.destination_frames[1] :]
+    # In a time-warped blend a clip has fewer frames than the blend, and each of them serves several times.
+    share = (np.arange(count) + 0.5) / max(count, 1)
+    for contacts, known, (start, stop) in (
+        (from_source, before, transition.source_frames),
+        (from_destination, after, transition.destination_frames),
+    ):
+        contacts[first:last] = known[start + np.floor(share * (stop - start)).astype(np.int64)]
     half = (first + last) // 2
     larger = np.where(np.arange(frames)[:, None] < half, from_source, from_destination)
     height = planted_points(transition.clip)[..., 1]

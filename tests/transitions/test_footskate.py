@@ -18,6 +18,7 @@ from study.transitions.footskate import (
     remove_foot_slide,
     transition_contacts,
 )
+from study.transitions.timewarp import warped_blend
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +157,19 @@ def test_a_transition_keeps_the_feet_where_source_and_destination_had_them(make_
     np.testing.assert_array_equal(contacts[: raw.blend_start], find_contacts(source)[: raw.blend_start])
     after = find_contacts(destination)[raw.destination_frames[1] :]
     np.testing.assert_array_equal(contacts[raw.blend_stop :], after)
+
+
+@pytest.mark.parametrize("lengths", [(12, 24), (24, 12)])
+def test_a_time_warped_blend_knows_its_clips_contacts(make_walk, lengths):
+    source, destination = make_walk(120, speed=0.9), make_walk(120, speed=0.9, phase=1.0)
+    raw = warped_blend(source, destination, 50, 80, *lengths)
+    contacts = transition_contacts(raw, source, destination)
+    own = find_contacts(source)[50 : 50 + lengths[0]], find_contacts(destination)[81 - lengths[1] : 81]
+    slowed = [np.repeat(known, 24 // len(known), axis=0) for known in own]
+    assert np.all(contacts[50:74] >= (slowed[0] & slowed[1]))
+    planted, result = plant_feet(raw, source, destination)
+    assert result.slide_after_m <= 0.2 * result.slide_before_m
+    assert planted.source_frames == (50, 50 + lengths[0])
 
 
 def test_feet_planted_before_the_region_stay_and_the_frames_before_it_are_untouched(slider):
