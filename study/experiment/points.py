@@ -8,7 +8,7 @@ extended by whole cycles; points are always drawn within the part that the libra
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,13 +17,13 @@ import numpy as np
 from study.errors import MotionError, StimulusError, TransitionError
 from study.experiment.plan import generator
 from study.experiment.protocol import Points, Protocol, StudySpec, TransitionSpec
-from study.motion.clip import Clip
+from study.motion.clip import Clip, resample
 from study.transitions.blend_length import BlendLength, blend_length
 
 if TYPE_CHECKING:
     from study.motion.library import Library
 
-CANDIDATES = 3000
+CANDIDATES = 2000
 """So many pairs of frames are tried before a transition is refused."""
 
 LONGEST_BLEND_S = 2.0
@@ -136,51 +136,94 @@ def _supply(
     except MotionError as error:
         raise StimulusError(f"motion {name!r}: {error}") from error
     span = within or (0.0, 1.0)
-    wanted = (int(np.ceil(span[0] * clip.frames)), max(int(span[1] * clip.frames), 1))
-    ends = (bool(entry.cyclic_start), bool(entry.cyclic_end))
+    low = min(int(np.ceil(span[0] * clip.frames)), clip.frames - 1)
+    motion = _Motion(
+        clip,
+        lambda: library.clip(name, min_seconds=seconds),
+        (low, max(int(span[1] * clip.frames), low + 1)),
+        (bool(entry.cyclic_start), bool(entry.cyclic_end)),
+    )
+    why = ""
     for before, after in ((needs.before, needs.after), (needs.least_before, needs.least_after)):
-        found = _extended(clip, wanted, before, after, freedom, ends)
-        if found is not None:
-            longer, added, window, notes = found
-            return Supply(name, longer, added, added + clip.frames, window, str(entry.file or ""), notes)
-    total = needs.least_before + needs.least_after
-    missing = max(total - clip.frames, total - 1 - (wanted[1] - wanted[0]), 1)
+        try:
+            longer, first, window, notes = _extended(motion, before, after, freedom)
+        except MotionError as error:
+            why = str(error)
+            continue
+        return Supply(name, longer, first, first + clip.frames, window, str(entry.file or ""), notes)
+    missing = _missing(motion, needs.least_before, needs.least_after)
     raise StimulusError(
-        f"motion {name!r}: expected {total} frames at {protocol.fps:g} fps ({needs.words}), found {clip.frames} in "
-        f"{library.name}, and it can't be extended{_why(ends)}: {missing} frames are missing. Use a longer motion, "
-        "or lower entry_s, exit_s or longest_frames."
+        f"motion {name!r}: expected {needs.least_before + needs.least_after} frames at {protocol.fps:g} fps around a "
+        f"transition point ({needs.words}), found {clip.frames} in {library.name}: {missing} frames are missing. {why} "
+        "Or lower entry_s, exit_s or longest_frames."
     )
 
 
-def _why(ends: tuple[bool, bool]) -> str:
-    sides = [side for side, cyclic in zip(("start", "end"), ends, strict=True) if not cyclic]
-    return f" (not cyclic at its {' or '.join(sides)})" if sides else ""
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A motion as the library has it: at the protocol's frame rate, at its own, and what may be done with it.
+
+    `wanted` are the frames in which a point may lie, `cyclic` whether it can be continued before its start and after
+    its end.
+    """
+
+    clip: Clip
+    captured: Callable[[], Clip]
+    wanted: tuple[int, int]
+    cyclic: tuple[bool, bool]
+
+
+def _missing(motion: _Motion, before: int, after: int) -> int:
+    """Frames that lack around the best point."""
+    points = np.arange(*motion.wanted)
+    lacking = np.maximum(before - points, 0) + np.maximum(points + after - motion.clip.frames, 0)
+    return int(lacking.min())
 
 
 def _extended(
-    clip: Clip, wanted: tuple[int, int], before: int, after: int, freedom: int, ends: tuple[bool, bool]
-) -> tuple[Clip, int, tuple[int, int], tuple[str, ...]] | None:
-    """The clip with room around its points: clip, frames added before, the points' window, notes; or None."""
-    low, high = wanted
+    motion: _Motion, before: int, after: int, freedom: int
+) -> tuple[Clip, int, tuple[int, int], tuple[str, ...]]:
+    """The clip with room around its points: the clip, its first captured frame, the points' window, notes.
+
+    `MotionError` where it has no room and can't be given any.
+    """
+    clip, (low, high) = motion.clip, motion.wanted
     enough = min(freedom, high - low)
     legal = (max(low, before), min(high, clip.frames - after + 1))
     if legal[1] - legal[0] >= enough:
         return clip, 0, legal, ()
-    target = _target(clip.frames, wanted, before, after, enough, ends)
+    target = _target(clip.frames, motion.wanted, before, after, enough, motion.cyclic)
     if target is None:
-        return None
+        raise MotionError(f"It can't be continued{_where(motion.cyclic)}: use a longer motion.")
     missing_before = max(0, before - target[0])
     missing_after = max(0, target[1] - 1 + after - clip.frames)
     if missing_before == missing_after == 0:
         return clip, 0, target, ()
+    return _continued(motion, target, missing_before, missing_after)
+
+
+def _continued(
+    motion: _Motion, target: tuple[int, int], before: int, after: int
+) -> tuple[Clip, int, tuple[int, int], tuple[str, ...]]:
+    """Extended at the motion's own frame rate, which shows its cycles best, then at the protocol's."""
     from study.motion.cycles import extend
 
-    try:
-        extension = extend(clip, frames_before=missing_before, frames_after=missing_after)
-    except MotionError:
-        return None
-    added = extension.added_before
-    return extension.clip, added, (target[0] + added, target[1] + added), (extension.note,)
+    captured = motion.captured()
+    ratio = captured.fps / motion.clip.fps
+    # One frame more behind, since the last one may fall between two.
+    extension = extend(
+        captured,
+        frames_before=int(np.ceil(before * ratio)),
+        frames_after=int(np.ceil((after + 1) * ratio)) if after else 0,
+    )
+    clip = resample(extension.clip, motion.clip.fps)
+    first = int(np.ceil(extension.added_before / ratio - 1e-6))
+    return clip, first, (target[0] + first, target[1] + first), (extension.note,)
+
+
+def _where(cyclic: tuple[bool, bool]) -> str:
+    sides = [side for side, can in zip(("before its start", "after its end"), cyclic, strict=True) if not can]
+    return f" {' or '.join(sides)}" if sides else ""
 
 
 def _target(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -246,17 +245,14 @@ def _write_manifest(folder: Path, stimulus_set: StimulusSet, videos: Mapping[str
 
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that it is there whole, or not at all, at every moment."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    from renderer.errors import RendererError
+    from renderer.files import whole_file
+
     try:
-        with unfinished.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-    except OSError as error:
-        raise StimulusError(f"{path}: can't be written: {error.strerror}.") from error
-    finally:
-        unfinished.unlink(missing_ok=True)
+        with whole_file(path) as unfinished:
+            unfinished.write_bytes(content)
+    except RendererError as error:
+        raise StimulusError(str(error)) from error
 
 
 def read_manifest(folder: str | Path) -> Manifest:

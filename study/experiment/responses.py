@@ -359,8 +359,7 @@ def answers_frame(
 
 def export_csv(responses: Responses, path: str | Path) -> Path:
     """Write all answers, every showing, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
-    path = Path(path)
-    whole = path.with_name(path.name + ".part")
-    answers_frame(responses, all_attempts=True).to_csv(whole, index=False)
-    whole.replace(path)
-    return path
+    from study.experiment.rendering import write_whole
+
+    write_whole(Path(path), answers_frame(responses, all_attempts=True).to_csv(index=False).encode())
+    return Path(path)

@@ -1,99 +1,18 @@
-"""A toy library: a small figure whose motions are simple and exactly as long as a test wants them."""
+"""Fixtures of the experiment's tests; the toys themselves are in `toys.py`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from study.errors import MotionError
-from study.experiment.plan import Pair
 from study.experiment.protocol import Protocol, parse_protocol
-from study.motion import quaternions as quat
-from study.motion.clip import Clip
-from study.motion.library import Entry, Library
-from study.motion.skeleton import Skeleton
 
-_JOINTS = (
-    ("Hips", -1, (0.0, 0.9, 0.0)),
-    ("LeftUpLeg", 0, (0.1, 0.0, 0.0)),
-    ("LeftLeg", 1, (0.0, -0.42, 0.0)),
-    ("LeftFoot", 2, (0.0, -0.42, 0.0)),
-    ("RightUpLeg", 0, (-0.1, 0.0, 0.0)),
-    ("RightLeg", 4, (0.0, -0.42, 0.0)),
-    ("RightFoot", 5, (0.0, -0.42, 0.0)),
-    ("Spine", 0, (0.0, 0.2, 0.0)),
-    ("Chest", 7, (0.0, 0.2, 0.0)),
-    ("LeftArm", 8, (0.2, 0.1, 0.0)),
-    ("LeftForeArm", 9, (0.0, -0.28, 0.0)),
-    ("LeftHand", 10, (0.0, -0.25, 0.0)),
-    ("RightArm", 8, (-0.2, 0.1, 0.0)),
-    ("RightForeArm", 12, (0.0, -0.28, 0.0)),
-    ("RightHand", 13, (0.0, -0.25, 0.0)),
-    ("Neck", 8, (0.0, 0.15, 0.0)),
-    ("Head", 15, (0.0, 0.1, 0.0)),
-)
+# Tests are imported by path, without packages: this makes `toys` importable, here and in the processes they start.
+sys.path.insert(0, str(Path(__file__).parent))
 
-
-def toy_skeleton() -> Skeleton:
-    names, parents, offsets = zip(*_JOINTS, strict=True)
-    ends = [3, 6, 11, 14, 16]
-    tips = [(0.0, -0.04, 0.15), (0.0, -0.04, 0.15), (0.0, -0.1, 0.0), (0.0, -0.1, 0.0), (0.0, 0.2, 0.0)]
-    return Skeleton(names, np.array(parents), np.array(offsets), np.array(ends), np.array(tips))
-
-
-_SKELETON = toy_skeleton()
-
-
-def toy_clip(name: str, frames: int, fps: float, speed: float, period_s: float) -> Clip:
-    """Arms and legs that swing against each other while the hips go along +Z."""
-    time = np.arange(frames) / fps
-    rotations = np.zeros((frames, len(_JOINTS), 4))
-    rotations[..., 0] = 1.0
-    swing = np.sin(2 * np.pi * time / period_s)
-    for joint, share in ((1, 0.5), (4, -0.5), (9, -0.4), (12, 0.4)):
-        rotations[:, joint] = quat.from_axis_angle([1.0, 0.0, 0.0], share * swing)
-    bend = 0.4 * (1 - np.cos(2 * np.pi * time / period_s))
-    for joint, phase in ((2, bend), (5, bend[::-1])):
-        rotations[:, joint] = quat.from_axis_angle([1.0, 0.0, 0.0], phase)
-    root = np.stack([0 * time, 0.9 + 0 * time, speed * time], axis=-1)
-    return Clip(_SKELETON, root, rotations, fps, name=name, synthetic=True)
-
-
-@dataclass(frozen=True)
-class Toy:
-    """A motion of the toy library: hips' speed, period of the swing, and its length where it is limited."""
-
-    speed: float
-    period_s: float
-    seconds: float | None = None
-    end: str = ""
-
-
-class ToyLibrary(Library):
-    name = "toy"
-    synthetic = True
-    acknowledgement = "made up for tests"
-
-    def __init__(self, motions: dict[str, Toy], synthetic: bool = True) -> None:
-        super().__init__()
-        self.motions = motions
-        self.synthetic = synthetic
-
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.motions)
-
-    def entry(self, name: str) -> Entry:
-        if name not in self.motions:
-            raise MotionError(f"Expected a motion of toy, found {name!r}. It has {', '.join(self.motions)}.")
-        return Entry(name, "toy")
-
-    def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
-        toy = self.motions[entry.name]
-        seconds = toy.seconds or min_seconds or 8.0
-        return toy_clip(entry.name, round(seconds * (fps or 30.0)), fps or 30.0, toy.speed, toy.period_s)
+from toys import TOY_PROTOCOL, TOY_RATING, FakeStimuli, Toy, ToyLibrary, pairs_of
 
 
 @pytest.fixture
@@ -101,77 +20,6 @@ def toy_library() -> ToyLibrary:
     return ToyLibrary(
         {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0), "short": Toy(1.0, 1.0, 2.0)}
     )
-
-
-TOY_PROTOCOL = """\
-name = "toy"
-title = "A toy"
-fps = 30
-seed = 5
-
-[stimuli]
-width = 96
-height = 64
-entry_s = 0.3
-exit_s = 0.3
-
-[points]
-shortest_frames = 4
-longest_frames = 30
-
-[texts]
-welcome = "Welcome."
-debrief = "Thank you."
-
-[[transitions]]
-name = "slow_quick"
-category = "walking"
-source = "slow"
-destination = "quick"
-
-[[transitions]]
-name = "still_slow"
-category = "standing"
-source = "still"
-destination = "slow"
-
-[[studies]]
-name = "jnd"
-task = "same-different"
-transitions = ["slow_quick"]
-reference = "geodesic"
-differences_frames = [-3, 0, 5]
-order = "both"
-question = "Same or different?"
-instructions = "Some pairs are the same."
-
-[[studies]]
-name = "liking"
-task = "preference"
-reference = "geodesic"
-comparison = "fixed"
-question = "Which is more natural?"
-"""
-
-TOY_RATING = """
-[[studies]]
-name = "rating"
-task = "rating"
-reference = "geodesic"
-comparison = "cut"
-order = "by-group"
-question = "How was it?"
-
-[[studies.items]]
-name = "natural"
-question = "How natural was it?"
-low = "not at all"
-high = "very"
-
-[[studies.items]]
-name = "noticeable"
-question = "How noticeable was the passage?"
-"""
 
 
 @pytest.fixture
@@ -182,44 +30,6 @@ def toy_protocol() -> Protocol:
 @pytest.fixture
 def rating_protocol() -> Protocol:
     return parse_protocol(TOY_PROTOCOL + TOY_RATING)
-
-
-def pairs_of(protocol: Protocol) -> tuple[Pair, ...]:
-    """Pairs with made-up stimulus ids, as `prepare` would name and order them."""
-    pairs = []
-    for study in protocol.studies:
-        for transition in protocol.transitions_of(study):
-            base = Pair(
-                f"{study.name}/{transition.name}",
-                study.name,
-                study.task,
-                transition.name,
-                transition.category,
-                f"{transition.name}-k",
-                f"{transition.name}-fixed",
-                study.reference,
-                study.comparison or study.reference,
-            )
-            if study.task == "same-different":
-                for d in study.differences_frames:
-                    b = f"{transition.name}{d:+d}" if d else base.a
-                    pairs.append(replace(base, name=f"{base.name}/{d:+d}", b=b, difference_frames=d))
-            elif study.task == "preference":
-                pairs.append(base)
-            else:
-                for m in study.methods:
-                    a = f"{transition.name}-{m}"
-                    pairs.append(replace(base, name=f"{base.name}/{m}", a=a, b="", method_a=m, method_b=""))
-    return tuple(pairs)
-
-
-@dataclass(frozen=True)
-class FakeStimuli:
-    """Pairs without pictures: all that a simulation needs."""
-
-    pairs: tuple[Pair, ...]
-    library: str = "toy"
-    synthetic: bool = True
 
 
 @pytest.fixture

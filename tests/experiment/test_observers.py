@@ -182,7 +182,7 @@ def test_an_interrupted_simulation_ends_as_an_uninterrupted_one(tmp_path, toy_pr
 KILLED = """
 import sys
 sys.path.insert(0, "tests/experiment")
-import conftest as c
+import toys as c
 from study.experiment.observers import simulate
 from study.experiment.protocol import find_protocol, load_protocol
 from study.experiment.responses import open_responses

@@ -55,7 +55,7 @@ def test_another_process_draws_the_same_plan(jnd_protocol, make_stimuli, reposit
     """Nothing hangs on hash randomisation, on the clock or on anything else outside seed and name."""
     code = (
         "import sys; sys.path.insert(0, 'tests/experiment');"
-        "import conftest as c;"
+        "import toys as c;"
         "from study.experiment.plan import draw_plan;"
         "from study.experiment.protocol import find_protocol, load_protocol;"
         "p = load_protocol(find_protocol('blend_length_jnd'));"

@@ -246,7 +246,7 @@ def test_csv_holds_every_showing(responses, toy_protocol, plan, tmp_path):
 KILLED = """
 import sys
 sys.path.insert(0, "tests/experiment")
-import conftest as c
+import toys as c
 from study.experiment.plan import draw_plan
 from study.experiment.protocol import parse_protocol
 from study.experiment.responses import begin_session, open_responses, record_answer

@@ -1,0 +1,225 @@
+"""Rendering: videos once, a manifest that says what they are, and work that is taken up after any interruption."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+from toys import TOY_PROTOCOL, Toy, ToyLibrary
+
+from study.errors import StimulusError
+from study.experiment.protocol import load_protocol, parse_protocol
+from study.experiment.rendering import read_manifest, record, render, write_whole
+from study.experiment.stimuli import prepare
+
+MOTIONS = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="module")
+def prepared():
+    return prepare(parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS))
+
+
+@pytest.fixture(scope="module")
+def rendered(prepared, tmp_path_factory):
+    """A results folder that is complete; tests copy what they change."""
+    folder = tmp_path_factory.mktemp("rendered")
+    summary = render(prepared, folder, workers=1)
+    return folder, summary
+
+
+def files(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def copied(rendered, tmp_path):
+    for name, content in files(rendered[0]).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    return tmp_path
+
+
+def test_everything_is_rendered_once(prepared, rendered):
+    folder, summary = rendered
+    count = len(prepared.stimuli)
+    assert (summary.videos, summary.rendered, summary.reused) == (count, count, 0)
+    assert summary.frames == sum(record.frames for record in prepared.records)
+    assert summary.seconds == pytest.approx(summary.frames / 30.0)
+    assert sorted(path.name for path in (folder / "stimuli").iterdir()) == sorted(
+        f"{s.id}.mp4" for s in prepared.stimuli
+    )
+
+
+def test_the_folder_holds_the_protocol_as_run(prepared, rendered):
+    stored = load_protocol(rendered[0] / "protocol.toml")
+    assert stored.text == prepared.protocol.text
+    assert stored.sha256 == prepared.protocol.sha256
+
+
+def test_the_manifest_says_what_each_stimulus_is(prepared, rendered):
+    folder, _ = rendered
+    manifest = read_manifest(folder)
+    assert manifest.complete
+    assert manifest.records == prepared.records
+    assert manifest.pairs == prepared.pairs
+    assert (manifest.library, manifest.synthetic, manifest.acknowledgement) == ("toy", True, "made up for tests")
+    assert (manifest.protocol, manifest.protocol_sha256) == ("toy", prepared.protocol.sha256)
+    assert (manifest.fps, manifest.size) == (30.0, (96, 64))
+    for stimulus in prepared.stimuli:
+        video, path = manifest.videos[stimulus.id], manifest.video(stimulus.id)
+        assert hashlib.sha256(path.read_bytes()).hexdigest() == video["file_sha256"]
+        assert path.stat().st_size == video["bytes"]
+        assert video["frames"] == stimulus.record.frames
+        assert len(video["frames_sha256"]) == 64
+    data = json.loads((folder / "manifest.json").read_text())
+    assert set(data["versions"]) >= {"segue", "python", "numpy"}
+    assert set(data["cameras"]) == {"slow_quick", "still_slow"}
+
+
+def test_videos_hold_their_frames(prepared, rendered):
+    import av
+
+    stimulus = prepared.stimuli[0]
+    with av.open(str(read_manifest(rendered[0]).video(stimulus.id))) as container:
+        frames = [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
+    assert len(frames) == stimulus.record.frames
+    assert frames[0].shape == (64, 96)
+    # A figure stands before a plain ground.
+    assert len({int(value) for value in frames[0].ravel()}) > 10
+
+
+def test_running_again_reuses_all(prepared, rendered, tmp_path):
+    folder = copied(rendered, tmp_path)
+    before = files(folder)
+    summary = render(prepared, folder, workers=1)
+    assert (summary.rendered, summary.reused) == (0, len(prepared.stimuli))
+    assert files(folder) == before
+
+
+@pytest.mark.parametrize("damage", ["missing", "short", "changed"])
+def test_damaged_videos_are_rendered_again(prepared, rendered, tmp_path, damage):
+    folder = copied(rendered, tmp_path)
+    before = files(folder)
+    victim = folder / "stimuli" / f"{prepared.stimuli[1].id}.mp4"
+    content = victim.read_bytes()
+    if damage == "missing":
+        victim.unlink()
+    elif damage == "short":
+        victim.write_bytes(content[:-100])
+    else:
+        victim.write_bytes(content[:200] + bytes([content[200] ^ 1]) + content[201:])
+    summary = render(prepared, folder, workers=1)
+    assert (summary.rendered, summary.reused) == (1, len(prepared.stimuli) - 1)
+    assert files(folder) == before
+
+
+def test_recording_makes_the_manifest_without_videos(prepared, tmp_path):
+    assert record(prepared, tmp_path) == {}
+    manifest = read_manifest(tmp_path)
+    assert not manifest.complete
+    assert manifest.pairs == prepared.pairs
+    with pytest.raises(StimulusError, match=r"Expected a video of .* found none yet; render first"):
+        manifest.video(prepared.stimuli[0].id)
+
+
+def test_progress_tells_what_is_done_and_left(prepared, tmp_path):
+    seen = []
+    render(prepared, tmp_path, workers=1, progress=seen.append)
+    assert [state.videos for state in seen] == list(range(1, len(prepared.stimuli) + 1))
+    assert seen[-1].frames == seen[-1].frames_total
+    assert seen[0].frames_per_second > 0
+    assert seen[0].seconds_left > 0
+
+
+class StopHereError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("after", [1, 3])
+def test_an_interrupted_rendering_is_finished_by_running_it_again(prepared, rendered, tmp_path, after):
+    def stop(state):
+        if state.videos == after:
+            raise StopHereError
+
+    with pytest.raises(StopHereError):
+        render(prepared, tmp_path, workers=1, progress=stop)
+    assert len(read_manifest(tmp_path).videos) == after
+    summary = render(prepared, tmp_path, workers=1)
+    assert summary.reused == after
+    assert files(tmp_path) == files(rendered[0])
+
+
+KILLED = """
+import sys
+sys.path.insert(0, "tests/experiment")
+from toys import TOY_PROTOCOL, Toy, ToyLibrary
+from study.experiment.protocol import parse_protocol
+from study.experiment.stimuli import prepare, render
+motions = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
+prepared = prepare(parse_protocol(TOY_PROTOCOL), ToyLibrary(motions))
+print("ready", flush=True)
+render(prepared, sys.argv[1], 1, lambda state: print(state.videos, flush=True))
+"""
+
+
+def test_a_killed_rendering_is_finished_by_running_it_again(prepared, rendered, tmp_path, repository):
+    """SIGKILL before the first video and in the midst of others: nothing half written, no doubles."""
+    for lines, delay in ((1, 0.02), (2, 0.05)):
+        child = subprocess.Popen(
+            [sys.executable, "-c", KILLED, str(tmp_path)], cwd=repository, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(lines):
+            child.stdout.readline()
+        time.sleep(delay)
+        os.kill(child.pid, signal.SIGKILL)
+        child.stdout.read()
+        child.stdout.close()
+        child.wait()
+        whole = files(rendered[0])
+        for name, content in files(tmp_path).items():
+            if name.startswith("stimuli/") and name.endswith(".mp4"):
+                assert content == whole[name], name
+        if (tmp_path / "manifest.json").exists():
+            read_manifest(tmp_path)
+    render(prepared, tmp_path, workers=1)
+    assert files(tmp_path) == whole
+
+
+def test_a_folder_of_another_protocol_or_library_is_refused(prepared, rendered):
+    folder = rendered[0]
+    other = replace(prepared, protocol=parse_protocol(TOY_PROTOCOL + "# changed\n"))
+    with pytest.raises(StimulusError, match=r"expected the results of 'toy' with sha256 \w+, found a\s+protocol.toml"):
+        render(other, folder)
+    with pytest.raises(StimulusError, match="expected stimuli from the library 'mine', found some from 'toy'"):
+        render(replace(prepared, library="mine"), folder)
+
+
+def test_what_is_no_results_folder_is_refused(prepared, tmp_path):
+    with pytest.raises(StimulusError, match="expected the manifest of a results folder, found none; render first"):
+        read_manifest(tmp_path)
+    (tmp_path / "manifest.json").write_text("{")
+    with pytest.raises(StimulusError, match="expected JSON"):
+        read_manifest(tmp_path)
+    (tmp_path / "manifest.json").write_text('{"version": 99}')
+    with pytest.raises(StimulusError, match="expected a manifest of version 1, found 99"):
+        read_manifest(tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StimulusError, match="expected a folder to write to"):
+        render(prepared, tmp_path / "file")
+
+
+def test_whole_files_leave_nothing_behind(tmp_path):
+    write_whole(tmp_path / "a.txt", b"one")
+    write_whole(tmp_path / "a.txt", b"two")
+    assert files(tmp_path) == {"a.txt": b"two"}
+    with pytest.raises(StimulusError, match="can't be written"):
+        write_whole(tmp_path / "a.txt" / "b.txt", b"x")

@@ -1,0 +1,306 @@
+"""Stimuli: what they hold, what they are called, what is refused; on a toy library with motions of known length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toys import TOY_PROTOCOL, Toy, ToyLibrary
+
+from renderer.camera import project
+from study.errors import StimulusError
+from study.experiment.plan import draw_plan
+from study.experiment.protocol import parse_protocol
+from study.experiment.stimuli import check, prepare
+from study.transitions.blend_length import blend_length
+
+
+def changed(*pairs: tuple[str, str], base: str = TOY_PROTOCOL):
+    text = base
+    for old, new in pairs:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    return parse_protocol(text)
+
+
+@pytest.fixture(scope="module")
+def toys():
+    return ToyLibrary(
+        {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0), "short": Toy(1.0, 1.0, seconds=2.0)}
+    )
+
+
+@pytest.fixture(scope="module")
+def prepared(toys):
+    return prepare(parse_protocol(TOY_PROTOCOL), toys)
+
+
+def test_every_pair_has_its_stimuli(prepared):
+    assert [pair.name for pair in prepared.pairs] == [
+        "jnd/slow_quick/-3",
+        "jnd/slow_quick/+0",
+        "jnd/slow_quick/+5",
+        "liking/slow_quick",
+        "liking/still_slow",
+    ]
+    for pair in prepared.pairs:
+        assert prepared.stimulus(pair.a).record.transition == pair.motion
+        assert prepared.stimulus(pair.b).record.transition == pair.motion
+    draw_plan(prepared.protocol, prepared.pairs, "p01")
+
+
+def test_levels_are_the_optimal_length_and_what_was_added(prepared):
+    for pair in prepared.pairs[:3]:
+        reference, comparison = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
+        assert reference.blend_frames == reference.optimal_frames
+        assert comparison.blend_frames == reference.optimal_frames + pair.difference_frames
+        assert comparison.frames == 9 + comparison.blend_frames + 9
+        assert (comparison.blend_start, comparison.blend_stop) == (9, 9 + comparison.blend_frames)
+    for pair in prepared.pairs[3:]:
+        assert prepared.stimulus(pair.b).record.blend_frames == 10
+        assert pair.method_b == "fixed"
+
+
+def test_no_difference_is_the_very_same_stimulus(prepared):
+    same = prepared.pairs[1]
+    assert same.difference_frames == 0
+    assert same.a == same.b
+
+
+def test_identical_stimuli_are_there_once_and_studies_share_them(prepared):
+    ids = [stimulus.id for stimulus in prepared.stimuli]
+    assert len(set(ids)) == len(ids)
+    # The preference study's geodesic stimulus is the reference of the other study: same transition and conditions.
+    assert prepared.pairs[3].a == prepared.pairs[0].a
+    assert len(ids) == 3 + 1 + 2
+
+
+def test_entries_are_the_same_for_all_lengths_but_for_the_feet(toys):
+    """Up to the blend all lengths show the same frames in the same place."""
+    made = prepare(changed(("exit_s = 0.3", "exit_s = 0.3\nclean_feet = false")), toys)
+    entries = [made.stimulus(pair.b).positions[:9] for pair in made.pairs[:3]]
+    for entry in entries[1:]:
+        np.testing.assert_array_equal(entry, entries[0])
+
+
+def test_transitions_start_over_the_origin_along_z(prepared):
+    for stimulus in prepared.stimuli:
+        hips = stimulus.positions[:, 0]
+        # Where the blend begins, the first blended frame is one step on from the origin at most.
+        assert np.hypot(hips[9, 0], hips[9, 2]) < 0.1
+        way = hips[-1] - hips[0]
+        assert abs(np.arctan2(way[0], way[2])) < np.radians(15)
+
+
+def test_nothing_leaves_the_frame_and_a_group_shares_its_camera(prepared):
+    cameras = {}
+    for stimulus in prepared.stimuli:
+        pixels, _ = project(stimulus.camera, stimulus.positions)
+        assert pixels.min() >= 0
+        assert pixels[..., 0].max() <= 96
+        assert pixels[..., 1].max() <= 64
+        cameras.setdefault(stimulus.record.group, set()).add(id(stimulus.camera))
+    assert {group: len(seen) for group, seen in cameras.items()} == {"slow_quick": 1, "still_slow": 1}
+
+
+@pytest.mark.parametrize(("group", "cameras"), [("study", 1), ("category", 2), ("transition", 2)])
+def test_the_protocol_says_what_shares_a_camera(toys, group, cameras):
+    made = prepare(changed(("exit_s", f'camera_group = "{group}"\nexit_s')), toys)
+    assert len({id(stimulus.camera) for stimulus in made.stimuli}) == cameras
+
+
+def test_the_same_protocol_gives_the_same_stimuli(prepared, toys):
+    again = prepare(parse_protocol(TOY_PROTOCOL), toys)
+    assert [stimulus.id for stimulus in again.stimuli] == [stimulus.id for stimulus in prepared.stimuli]
+    assert again.pairs == prepared.pairs
+    assert again.records == prepared.records
+
+
+def test_points_do_not_hang_on_the_order_of_transitions(prepared, toys):
+    first, rest = TOY_PROTOCOL.split("[[transitions]]", 1)
+    one, two = rest.split("[[transitions]]", 1)
+    two, studies = two.split("[[studies]]", 1)
+    swapped = parse_protocol(f"{first}[[transitions]]{two}[[transitions]]{one}[[studies]]{studies}")
+    assert {stimulus.id for stimulus in prepare(swapped, toys).stimuli} == {s.id for s in prepared.stimuli}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ('title = "A toy"', 'title = "Another"', True),
+        ("seed = 5", "seed = 6", False),
+        ("width = 96", "width = 98", False),
+        ("exit_s = 0.3", 'exit_s = 0.3\nstyle = "points"', False),
+        ("exit_s = 0.3", 'exit_s = 0.3\nview = "front"', False),
+        ("exit_s = 0.3", 'exit_s = 0.3\nweight = "sigmoid"', False),
+        ("exit_s = 0.3", "exit_s = 0.4", False),
+        ("[points]", '[stimuli.colours]\nleft = "#102030"\n\n[points]', False),
+        ("fps = 30", "fps = 60", False),
+    ],
+)
+def test_names_follow_what_is_seen_and_nothing_else(prepared, toys, old, new, same):
+    ids = {stimulus.id for stimulus in prepared.stimuli}
+    others = {stimulus.id for stimulus in prepare(changed((old, new)), toys).stimuli}
+    assert (others == ids) if same else not (others & ids)
+
+
+def test_lengths_are_those_of_the_methods(prepared, toys):
+    """What the record says is what `blend_length` gives at the recorded points."""
+    for pair in prepared.pairs:
+        record = prepared.stimulus(pair.a).record
+        clips = [
+            toys.clip(use.motion, fps=30.0, min_seconds=use.frames / 30.0)
+            for use in (record.source, record.destination)
+        ]
+        assert [clip.frames for clip in clips] == [record.source.frames, record.destination.frames]
+        found = blend_length(*clips, record.source.frame, record.destination.frame, method="geodesic", restrict=True)
+        assert found.blend_frames == record.optimal_frames
+        assert 4 <= found.blend_frames <= 30
+
+
+def test_conditions_are_kept(toys):
+    text = TOY_PROTOCOL.replace(
+        "longest_frames = 30", "longest_frames = 30\navoid_frames = 10\navoid_within_frames = 5"
+    )
+    for seed in range(4):
+        made = prepare(parse_protocol(text.replace("seed = 5", f"seed = {seed}")), toys)
+        lengths = [made.stimulus(pair.a).record.optimal_frames for pair in made.pairs]
+        assert all(4 <= length <= 30 and abs(length - 10) > 5 for length in lengths)
+
+
+def test_given_points_are_taken(toys):
+    given = 'points = { choose = "given", source_s = 1.0, destination_frame = 77 }'
+    made = prepare(changed(('destination = "quick"', f'destination = "quick"\n{given}')), toys)
+    record = made.stimulus(made.pairs[0].a).record
+    assert (record.source.frame, record.destination.frame) == (30, 77)
+
+
+def test_a_cut_has_no_blend(toys):
+    made = prepare(changed(('comparison = "fixed"', 'comparison = "cut"')), toys)
+    record = made.stimulus(made.pairs[3].b).record
+    assert (record.blend_frames, record.frames, record.method) == (0, 18, "cut")
+
+
+def test_rating_pairs_hold_one_stimulus_each(rating_protocol, toys):
+    made = prepare(rating_protocol, toys)
+    rated = [pair for pair in made.pairs if pair.study == "rating"]
+    assert [(pair.name, pair.method_a, pair.b) for pair in rated] == [
+        ("rating/slow_quick/geodesic", "geodesic", ""),
+        ("rating/slow_quick/cut", "cut", ""),
+        ("rating/still_slow/geodesic", "geodesic", ""),
+        ("rating/still_slow/cut", "cut", ""),
+    ]
+
+
+# --- refusals ------------------------------------------------------------------------------------------------------
+
+
+def test_a_clip_that_is_too_short_says_how_many_frames_are_missing(toys):
+    """Two seconds are 60 frames; 60 of entry and blends of up to 35 need 95."""
+    protocol = changed(('source = "slow"', 'source = "short"'), ("entry_s = 0.3", "entry_s = 2.0"))
+    message = check(protocol, toys)[0]
+    assert "motion 'short': expected 95 frames at 30 fps" in message
+    assert "60 frames of entry and blends of up to 35 frames" in message
+    assert "found 60 in toy: 35 frames are missing" in message
+    assert "can't be continued before its start or after its end" in message
+    with pytest.raises(StimulusError, match="35 frames are missing"):
+        prepare(protocol, toys)
+
+
+def test_a_clip_that_is_just_long_enough_is_taken():
+    for frames, enough in ((94, False), (95, True)):
+        library = ToyLibrary({"slow": Toy(0.8, 1.4, seconds=frames / 30), "quick": Toy(1.6, 0.9), "still": Toy(0, 3.0)})
+        protocol = changed(("entry_s = 0.3", "entry_s = 2.0"), ('["slow_quick"]', '["slow_quick"]\npoints = {}'))
+        problems = [problem for problem in check(protocol, library) if "'slow'" in problem and "missing" in problem]
+        assert (not problems) == enough, problems
+
+
+def test_a_level_below_one_frame_is_refused(toys):
+    """The given points make a blend of some length k; a difference of -k leaves nothing."""
+    given = 'points = { choose = "given", source_s = 1.0, destination_frame = 77 }'
+    at = ('destination = "quick"', f'destination = "quick"\n{given}')
+    made = prepare(changed(at), toys)
+    length = made.stimulus(made.pairs[0].a).record.optimal_frames
+    assert check(changed(at, ("[-3, 0, 5]", f"[{1 - length}, 5]")), toys) == []
+    (problem,) = check(changed(at, ("[-3, 0, 5]", f"[{-length}, 5]")), toys)
+    assert f"a level below one frame: the geodesic blend here takes {length} frames" in problem
+    assert f"the difference {-length} leaves 0" in problem
+
+
+def test_given_points_without_room_are_refused(toys):
+    def problems(source_s: str) -> str:
+        given = f'points = {{ choose = "given", source_s = {source_s}, destination_s = 2 }}'
+        return "\n".join(check(changed(('destination = "quick"', f'destination = "quick"\n{given}')), toys))
+
+    assert "expected 9 frames for entry, found 3 in 'slow': 6 are missing" in problems("0.1")
+    assert "expected source_frame from 0 to" in problems("99")
+    assert "found 2970; choose another point" in problems("99")
+
+
+def test_conditions_that_nothing_meets_are_refused_with_what_was_found(toys):
+    protocol = changed(("shortest_frames = 4\nlongest_frames = 30", "shortest_frames = 58\nlongest_frames = 58"))
+    problems = check(protocol, toys)
+    assert len(problems) == 3
+    assert (
+        "expected points whose geodesic blend meets the conditions of the study 'jnd', found none among" in problems[0]
+    )
+    assert "shorter than 58 frames" in problems[0]
+
+
+def test_a_motion_that_is_missing_is_named_once(toys):
+    problems = check(changed(('source = "slow"', 'source = "slwo"')), toys)
+    assert problems == ["motion 'slwo': Expected a motion of toy, found 'slwo'. It has slow, quick, still, short."]
+
+
+def test_all_problems_are_named_at_once(toys):
+    protocol = changed(('source = "slow"', 'source = "slwo"'), ('source = "still"', 'source = "stil"'))
+    assert len(check(protocol, toys)) == 2
+    with pytest.raises(StimulusError) as caught:
+        prepare(protocol, toys)
+    assert str(caught.value).splitlines() == check(protocol, toys)
+
+
+def test_what_can_be_shown_has_no_problems(toys):
+    assert check(parse_protocol(TOY_PROTOCOL), toys) == []
+
+
+def test_an_unknown_stimulus_is_refused(prepared):
+    with pytest.raises(StimulusError, match="Expected the id of a stimulus of 'toy', found 'nothing'"):
+        prepared.stimulus("nothing")
+
+
+def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypatch):
+    """A clip that walks but is too short is continued by cycles; points stay within what was captured."""
+
+    class Captured(ToyLibrary):
+        def entry(self, name):
+            return replace(super().entry(name), start="gait", end="gait")
+
+    library = Captured(
+        {"slow": Toy(0.8, 1.4, seconds=3.0), "quick": Toy(1.6, 0.9, seconds=2.0), "still": Toy(0.0, 3.0, seconds=9.0)},
+        synthetic=False,
+    )
+    calls = []
+    from study.motion import cycles
+
+    def extend(clip, *, frames_before=0, frames_after=0):
+        calls.append((clip.name, frames_before, frames_after))
+        path = np.arange(-frames_before, clip.frames + frames_after) % clip.frames
+        speed = clip.root_positions[1, 2] - clip.root_positions[0, 2]
+        root = clip.root_positions[path].copy()
+        root[:, 2] = speed * np.arange(-frames_before, clip.frames + frames_after)
+        longer = replace(clip, root_positions=root, rotations=clip.rotations[path])
+        return cycles.Extension(longer, frames_before, frames_after, 1.0, 1.0, "extended by the test")
+
+    monkeypatch.setattr(cycles, "extend", extend)
+    made = prepare(changed(("entry_s = 0.3", "entry_s = 2.0"), ("exit_s = 0.3", "exit_s = 2.0")), library)
+    assert {name for name, _, _ in calls} == {"slow", "quick"}
+    record = made.stimulus(made.pairs[0].a).record
+    for use, frames in ((record.source, 90), (record.destination, 60)):
+        assert use.frames == frames
+        assert 0 <= use.frame < frames
+        assert use.added_before + use.added_after > 0
+        assert "extended by the test" in use.notes
+    assert not record.synthetic
+    assert record.frames == 120 + record.blend_frames
