@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from renderer.errors import RendererError
 
 RGB = tuple[int, int, int]
+FloatArray = NDArray[np.float64]
 
 _RED, _GREEN, _BLUE = 0.2126, 0.7152, 0.0722
 _RED_SPAN, _BLUE_SPAN = 2.0 * (1.0 - _RED), 2.0 * (1.0 - _BLUE)
@@ -42,11 +43,16 @@ def nv12_to_rgb(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """An NV12 frame `(height * 3 / 2, width)` as RGB `(height, width, 3)`; chroma is repeated, not smoothed."""
     height = frame.shape[0] * 2 // 3
     width = frame.shape[1]
-    luma = (frame[:height].astype(np.float64) - 16.0) / 219.0
     chroma = frame[height:].reshape(height // 2, width // 2, 2).astype(np.float64)
-    chroma = np.repeat(np.repeat((chroma - 128.0) / 224.0, 2, axis=0), 2, axis=1)
-    red = luma + _RED_SPAN * chroma[..., 1]
-    blue = luma + _BLUE_SPAN * chroma[..., 0]
+    chroma = np.repeat(np.repeat(chroma, 2, axis=0), 2, axis=1)
+    return to_rgb(frame[:height].astype(np.float64), chroma[..., 0], chroma[..., 1])
+
+
+def to_rgb(luma: FloatArray, blue: FloatArray, red: FloatArray) -> NDArray[np.uint8]:
+    """Planes of luma and both chromas, limited 8-bit range, as RGB `(..., 3)`."""
+    luma, blue, red = (luma - 16.0) / 219.0, (blue - 128.0) / 224.0, (red - 128.0) / 224.0
+    red = luma + _RED_SPAN * red
+    blue = luma + _BLUE_SPAN * blue
     green = (luma - _RED * red - _BLUE * blue) / _GREEN
     rgb = np.stack([red, green, blue], axis=-1)
     return np.clip(np.round(rgb * 255.0), 0, 255).astype(np.uint8)

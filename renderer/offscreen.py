@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.camera import Camera, check_positions, check_size
+from renderer.camera import Camera, check_positions, check_size, smooth_path
 from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
 from renderer.context import Context, shared_context
 from renderer.errors import RendererError
+from renderer.floor import floor_nv12, floor_rgb
 from renderer.painter import Painter
 from renderer.shapes import Shapes, lay_out
 
@@ -86,7 +87,7 @@ def render_rgb(
     shapes = lay_out(check_positions(positions), figure, camera, fps)
     with _rgb_target(camera.size, context) as (target, painter):
         for data in shapes.data:
-            target.clear(*(value / 255.0 for value in figure.background))
+            _start_rgb(target, figure, camera)
             yield _painted_rgb(target, painter, data, camera.size)
 
 
@@ -95,7 +96,7 @@ def render_layers(layers: Sequence[tuple[ArrayLike, Figure]], camera: Camera, co
     if not layers:
         raise RendererError("Expected at least one pose to draw, got none.")
     with _rgb_target(camera.size, context) as (target, painter):
-        target.clear(*(value / 255.0 for value in layers[0][1].background))
+        _start_rgb(target, layers[0][1], camera)
         for pose, figure in layers:
             shapes = lay_out(check_positions(np.asarray(pose)[None], "a pose"), figure, camera)
             picture = _painted_rgb(target, painter, shapes.data[0], camera.size)
@@ -112,6 +113,13 @@ def _rgb_target(size: tuple[int, int], context: Context | None) -> Iterator[tupl
         for attachment in target.color_attachments:
             attachment.release()
         target.release()
+
+
+def _start_rgb(target: Any, figure: Figure, camera: Camera) -> None:
+    if figure.floor_m is None:
+        target.clear(*(value / 255.0 for value in figure.background))
+    else:
+        target.color_attachments[0].write(floor_rgb(figure, camera).tobytes(), alignment=1)
 
 
 def _painted_rgb(target: Any, painter: Painter, data: NDArray[np.float32], size: tuple[int, int]) -> Bytes:
@@ -140,19 +148,45 @@ def paste_frames(
     if batch < 1:
         raise RendererError(f"Expected a batch of at least one frame, got {batch}.")
     shapes = lay_out(points, figure, camera, fps)
-    background = plain_frame(camera.size, figure.background)
+    backdrop = _Backdrop(figure, camera, points, fps)
     gl = (context or shared_context()).gl
-    canvas = background.copy()
-    atlas = Atlas(gl, painter_of(gl), shapes, camera.size, background, batch)
+    canvas = backdrop.frame(0).copy()
+    atlas = Atlas(gl, painter_of(gl), shapes, camera.size, backdrop, batch)
     try:
         for first in range(0, len(points), batch):
-            tiles = atlas.draw(first, min(first + batch, len(points)))
-            for tile in tiles:
+            for number, tile in enumerate(atlas.draw(first, min(first + batch, len(points))), start=first):
+                background = backdrop.frame(number)
+                if backdrop.moves:
+                    canvas[:] = background
                 _put(canvas, camera.size[1], tile)
-                yield canvas, tile.box
+                yield canvas, tile.box if backdrop.plain else (0, 0, *camera.size)
                 _put_back(canvas, background, camera.size[1], tile)
     finally:
         atlas.release()
+
+
+class _Backdrop:
+    """What stands behind the figure: one colour, or a floor, which moves under a tracking camera."""
+
+    def __init__(self, figure: Figure, camera: Camera, positions: NDArray[np.float64], fps: float) -> None:
+        self._figure, self._camera = figure, camera
+        self.plain = figure.floor_m is None
+        self.moves = not self.plain and camera.track_seconds is not None
+        self._path = np.zeros((len(positions), 3))
+        if self.moves and camera.track_seconds is not None:
+            self._path = smooth_path(positions, camera.track_seconds, fps)
+        self._known: tuple[int, Bytes] | None = None
+
+    def frame(self, number: int) -> Bytes:
+        """The NV12 frame without the figure; not to be written to."""
+        key = number if self.moves else 0
+        if self._known is None or self._known[0] != key:
+            if self.plain:
+                made = plain_frame(self._camera.size, self._figure.background)
+            else:
+                made = floor_nv12(self._figure, self._camera, self._path[number])
+            self._known = (key, made)
+        return self._known[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +224,7 @@ class Atlas:
     """A picture that holds the boxes of several frames side by side."""
 
     def __init__(
-        self, gl: Any, painter: Painter, shapes: Shapes, size: tuple[int, int], background: Bytes, batch: int
+        self, gl: Any, painter: Painter, shapes: Shapes, size: tuple[int, int], backdrop: _Backdrop, batch: int
     ) -> None:
         self._gl, self._painter, self._shapes, self._size = gl, painter, shapes, size
         self._boxes = _cut(shapes.boxes, size)
@@ -207,8 +241,7 @@ class Atlas:
         self._chroma = gl.framebuffer([gl.texture((width // 2, height // 2), 2)])
         self._luma_bytes = np.empty((height, width), dtype=np.uint8)
         self._chroma_bytes = np.empty((height // 2, width), dtype=np.uint8)
-        self._clear_luma = float(background[0, 0]) / 255.0
-        self._clear_chroma = tuple(float(v) / 255.0 for v in background[size[1], :2])
+        self._backdrop = backdrop
 
     def draw(self, first: int, stop: int) -> Iterator[Tile]:
         """The tiles of frames `first .. stop - 1`, each to be used up before the next is asked for."""
@@ -228,14 +261,13 @@ class Atlas:
         data = self._shapes.data[first:stop].copy()
         data[..., 12:14] = (place - self._boxes[first:stop, :2])[:, None]
         capsules = self._painter.load(data)
+        self._start(first, place)
         scissor = (0, 0, *self._tile) if self._loose[first] else None
         self._luma.scissor = scissor
         self._luma.use()
-        self._luma.clear(self._clear_luma)
         self._painter.paint("luma", capsules, self._extent)
         self._chroma.scissor = scissor and (0, 0, width // 2, height // 2)
         self._chroma.use()
-        self._chroma.clear(*self._clear_chroma)
         self._painter.paint("chroma", capsules, self._extent)
         rows = (-(-count // self._across)) * height
         self._luma.read_into(self._luma_bytes, (0, 0, self._extent[0], rows), components=1, alignment=1)
@@ -249,6 +281,24 @@ class Atlas:
                 self._luma_bytes[y : y + bottom - top, x : x + right - left],
                 self._chroma_bytes[y // 2 : (y + bottom - top) // 2, x : x + right - left],
             )
+
+    def _start(self, first: int, place: NDArray[np.int64]) -> None:
+        """The background of each tile."""
+        height = self._size[1]
+        if self._backdrop.plain:
+            ground = self._backdrop.frame(first)
+            self._luma.clear(float(ground[0, 0]) / 255.0)
+            self._chroma.clear(*(float(value) / 255.0 for value in ground[height, :2]))
+            return
+        for i, (x, y) in enumerate(place.tolist()):
+            ground = self._backdrop.frame(first + i)
+            left, top, right, bottom = self._boxes[first + i].tolist()
+            self._luma_bytes[y : y + bottom - top, x : x + right - left] = ground[top:bottom, left:right]
+            self._chroma_bytes[y // 2 : (y + bottom - top) // 2, x : x + right - left] = ground[
+                height + top // 2 : height + bottom // 2, left:right
+            ]
+        self._luma.color_attachments[0].write(self._luma_bytes, alignment=1)
+        self._chroma.color_attachments[0].write(self._chroma_bytes, alignment=1)
 
     def release(self) -> None:
         """Free what it holds of the context."""

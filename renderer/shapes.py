@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from renderer.camera import Camera, project, smooth_path
 from renderer.capsules import Figure, kept_capsules, place
 from renderer.colour import to_ycbcr
+from renderer.floor import shadow_capsules
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +62,32 @@ def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 
     order = paint_order(ends, radii, nearness, figure.radii.mean(axis=1), joined(figure))
     data = _shader_numbers(ends, radii, figure)
     data = np.take_along_axis(data, order[..., None], axis=1)
-    return Shapes(data, _boxes(ends, radii))
+    boxes = _boxes(ends, radii)
+    if figure.floor_m is not None:
+        shadows, shadow_boxes = _shadows(placed, figure, camera)
+        data = np.concatenate([shadows, data], axis=1)
+        boxes = np.concatenate(
+            [np.minimum(boxes[:, :2], shadow_boxes[:, :2]), np.maximum(boxes[:, 2:], shadow_boxes[:, 2:])], axis=1
+        )
+    return Shapes(data, boxes)
+
+
+def _shadows(placed: FloatArray, figure: Figure, camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """The shadows' numbers and boxes; they cover fully in their middle and fade out towards their radius."""
+    ends, radii, opacity, stretch, luma = shadow_capsules(placed, figure, camera)
+    ends, radii = np.round(ends * 256.0) / 256.0, np.maximum(np.round(radii * 256.0) / 256.0, 0.5)
+    boxes = _boxes(ends, radii)
+    round_ends = ends.copy()
+    round_ends[..., 1] = ends[..., :1, 1] + (ends[..., 1] - ends[..., :1, 1]) * stretch[..., None]
+    data = _shader_numbers(round_ends, radii, None)
+    # cover = (r^2 - d^2) w + 1/2 is 1 in the middle and 0 at the radius R where r^2 = R^2 / 2 and w = 1 / R^2.
+    data[..., 4:6] *= np.sqrt(0.5)
+    data[..., 7] = 4.0 / (radii[..., 0] + radii[..., 1]) ** 2
+    _, blue, red = to_ycbcr(figure.background)
+    data[..., 8:11] = np.array([luma, round(blue), round(red)]) / 255.0
+    data[..., 11] = opacity
+    data[..., 15] = stretch
+    return data, boxes
 
 
 def _without_hidden(figure: Figure, placed: FloatArray) -> tuple[Figure, FloatArray]:
@@ -86,12 +112,11 @@ def joined(figure: Figure) -> NDArray[np.bool_]:
     return meets
 
 
-def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure) -> NDArray[np.float32]:
+def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure | None) -> NDArray[np.float32]:
     frames, count = ends.shape[:2]
     start = ends[:, :, 0]
     way = ends[:, :, 1] - start
     length2 = way[..., 0] ** 2 + way[..., 1] ** 2
-    colours = np.array([to_ycbcr(c) for c in figure.colours]) / 255.0
     data = np.zeros((frames, count, FLOATS), dtype=np.float32)
     data[..., 0:2] = start
     data[..., 2:4] = way
@@ -99,13 +124,15 @@ def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure) -> NDAr
     data[..., 5] = radii[..., 1] - radii[..., 0]
     data[..., 6] = np.where(length2 > 1e-3, 1.0 / np.maximum(length2, 1e-3), 0.0)
     data[..., 7] = 1.0 / (radii[..., 0] + radii[..., 1])
-    data[..., 8:11] = colours
     data[..., 11] = 1.0
+    data[..., 15] = 1.0
+    if figure is None:
+        return data
+    data[..., 8:11] = np.array([to_ycbcr(colour) for colour in figure.colours]) / 255.0
     if figure.lit:
         rounded = np.zeros((count, 2), dtype=bool) if figure.rounded is None else figure.rounded
         # 1: going straight on at both ends; 2: the far end is round; 3: both are.
         data[..., 14] = 1.0 + rounded[:, 1] + (rounded[:, 0] & rounded[:, 1])
-    data[..., 15] = 1.0
     return data
 
 

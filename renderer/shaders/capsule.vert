@@ -15,6 +15,10 @@ uniform vec2 origin;
 void main() {
     vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
     float radius = max(body.x, body.x + body.y) + EDGE;
+    // What is flattened onto the floor (stretch above 1) is soft, and fades out at sqrt(2) times its radius.
+    if (extra.w > 1.0) {
+        radius *= 1.5;
+    }
     float length2 = dot(line.zw, line.zw);
     vec2 along = length2 > 1e-3 ? line.zw * inversesqrt(length2) : vec2(1.0, 0.0);
     vec2 base = corner.x < 0.0 ? line.xy : line.xy + line.zw;

@@ -1,0 +1,103 @@
+"""A floor to stand on: a plane that fades into the background, with a faint grid of metres, and soft contact shadows.
+
+The plane is computed once for a camera that stands still, here and not on the GPU: it is the same for all frames.
+Shadows are capsules like any other, flattened onto the floor: dark and narrow under a foot that stands, wide and faint
+under one that is lifted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import Camera, project
+from renderer.capsules import Figure
+from renderer.colour import to_rgb, to_ycbcr
+
+FloatArray = NDArray[np.float64]
+
+_FLOOR_SHADE = 0.90
+"""Luma of the floor before the camera, as a share of the background's."""
+_GRID_SHADE = 0.90
+_GRID_HALF_WIDTH_M = 0.009
+_SHADOW_SHADE = 0.30
+_CONTACT_OPACITY, _CONTACT_HEIGHT_M = 0.34, 0.16
+_BODY_OPACITY, _BODY_RADIUS_M = 0.20, 0.42
+
+
+def floor_nv12(figure: Figure, camera: Camera, shift: FloatArray) -> NDArray[np.uint8]:
+    """The floor and the background as an NV12 frame; `shift (3,)` is how far a tracking camera has come, metres."""
+    width, height = camera.size
+    luma = _luma(figure, camera, shift)
+    _, blue, red = to_ycbcr(figure.background)
+    frame = np.empty((height * 3 // 2, width), dtype=np.uint8)
+    frame[:height] = np.round(luma)
+    frame[height:, 0::2] = round(blue)
+    frame[height:, 1::2] = round(red)
+    return frame
+
+
+def floor_rgb(figure: Figure, camera: Camera) -> NDArray[np.uint8]:
+    """The same as RGB `(height, width, 3)`."""
+    luma = _luma(figure, camera, np.zeros(3))
+    _, blue, red = to_ycbcr(figure.background)
+    return to_rgb(luma, np.full_like(luma, blue), np.full_like(luma, red))
+
+
+def _luma(figure: Figure, camera: Camera, shift: FloatArray) -> FloatArray:
+    width, height = camera.size
+    ground = to_ycbcr(figure.background)[0]
+    floor = 0.0 if figure.floor_m is None else figure.floor_m
+    across = ((np.arange(width) + 0.5 - 0.5 * width) / camera.focal_pixels)[None, :]
+    up = ((0.5 * height - np.arange(height) - 0.5) / camera.focal_pixels)[:, None]
+    right, above, back = camera.axes
+    way = [across * right[i] + up * above[i] - back[i] for i in range(3)]
+    falls = (way[1] < -1e-6) & (camera.eye[1] > floor)
+    far = np.where(falls, (floor - camera.eye[1]) / np.where(falls, way[1], -1.0), 0.0)
+    reach = far * np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+    # Half way faded at twice the distance to where the camera looks at the floor.
+    scale = 2.0 * float(np.hypot(*camera.eye[[0, 2]])) + 2.0 * abs(float(camera.eye[1] - floor)) + 1.0
+    seen = np.where(falls, np.exp(-np.log(2.0) * (reach / scale) ** 2), 0.0)
+    grid = np.zeros_like(seen)
+    for axis in (0, 2):
+        metres = camera.eye[axis] + shift[axis] + far * way[axis]
+        footprint = np.maximum(np.abs(np.gradient(metres, axis=0)) + np.abs(np.gradient(metres, axis=1)), 1e-6)
+        off = np.abs(metres - np.round(metres))
+        line = np.clip(0.5 + (_GRID_HALF_WIDTH_M - off) / footprint, 0.0, 1.0)
+        thin = np.minimum(1.0, 2.0 * _GRID_HALF_WIDTH_M / footprint)
+        grid = np.maximum(grid, line * thin * np.clip(1.5 - 3.0 * footprint, 0.0, 1.0))
+    shade = 1.0 - seen * (1.0 - _FLOOR_SHADE * (1.0 - grid * (1.0 - _GRID_SHADE)))
+    return np.asarray((ground - 16.0) * shade + 16.0)
+
+
+def shadow_capsules(
+    placed: FloatArray, figure: Figure, camera: Camera
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
+    """Shadows of capsules `placed (frames, capsules, 2, 3)`, in pixels.
+
+    Returns
+    -------
+    tuple
+        Ends `(frames, shadows, 2, 2)`, radii `(frames, shadows, 2)`, opacity and stretch of y `(frames, shadows)`, and
+        the luma to paint them in. A shadow is a circle on the floor, so on the screen it is flat: stretched by
+        that much in y it is round again.
+    """
+    floor = 0.0 if figure.floor_m is None else figure.floor_m
+    heights = np.maximum(placed[..., 1] - figure.radii - floor, 0.0)
+    opacity = _CONTACT_OPACITY * np.exp(-heights.mean(axis=2) / _CONTACT_HEIGHT_M)
+    opacity = np.where(opacity > 0.01, opacity, 0.0)
+    on_floor = placed.copy()
+    on_floor[..., 1] = floor
+    radii = figure.radii * 1.5 + 0.25 * heights
+    middle = on_floor.mean(axis=(1, 2))[:, None, None, :]
+    on_floor = np.concatenate([np.broadcast_to(middle, (len(placed), 1, 2, 3)), on_floor], axis=1)
+    opacity = np.concatenate([np.full((len(placed), 1), _BODY_OPACITY), opacity], axis=1)
+    radii = np.concatenate([np.full((len(placed), 1, 2), _BODY_RADIUS_M), radii], axis=1)
+    pixels, nearness = project(camera, on_floor)
+    from_eye = on_floor.mean(axis=2) - camera.eye
+    distance = np.sqrt(from_eye[..., 0] ** 2 + from_eye[..., 1] ** 2 + from_eye[..., 2] ** 2)
+    stretch = np.clip(distance / np.maximum(-from_eye[..., 1], 1e-3), 1.001, 25.0)
+    # A floor seen from below casts no shadow that anyone sees.
+    opacity = np.where(from_eye[..., 1] < 0.0, opacity, 0.0)
+    luma = 16.0 + (to_ycbcr(figure.background)[0] - 16.0) * _SHADOW_SHADE
+    return pixels, radii * camera.focal_pixels * nearness, opacity, stretch, luma
