@@ -22,10 +22,10 @@ WALK_TO_RUN = (1.95, 2.25)
 # Each row: value at the knots of SPEEDS. Angles in degrees, lengths in metres.
 _TABLES = {
     # Stance as a share of the stride: Murray et al. 1966 (65, 61, 57 % slow, free and fast); running: Novacheck 1998.
-    "stance": (0.68, 0.645, 0.615, 0.59, 0.39, 0.35, 0.30),
+    "stance": (0.68, 0.645, 0.615, 0.59, 0.385, 0.345, 0.295),
     # Foot pitch at heel strike and at toe-off: Winter 1991; running with a rear-foot strike: Nigg et al. 1987.
     "strike_pitch": (0.0, 15.0, 21.0, 25.0, 9.0, 9.0, 6.0),
-    "off_pitch": (32.0, 52.0, 60.0, 64.0, 55.0, 60.0, 64.0),
+    "off_pitch": (32.0, 55.0, 63.0, 68.0, 55.0, 60.0, 64.0),
     # Knee in stance and swing: Winter 1991, Bovi et al. 2011, Fukuchi et al. 2018; running: Novacheck 1998.
     "loading": (0.0, 7.0, 12.0, 17.0, 16.0, 19.0, 20.0),
     "knee": (5.0, 6.5, 7.0, 7.5, 22.0, 23.0, 22.0),
@@ -43,9 +43,9 @@ _TABLES = {
     "chest_yaw": (0.0, 2.0, 3.4, 4.8, 10.0, 12.5, 15.0),
     "chest_pitch": (0.5, 1.5, 2.5, 4.0, 7.0, 9.0, 11.0),
     # Arms: mean and half range of shoulder flexion and elbow (Murray et al. 1967; Hinrichs 1987 for running).
-    "arm_mean": (2.0, 0.0, -2.5, -3.0, -14.0, -15.0, -15.0),
-    "arm_swing": (0.0, 11.0, 18.0, 25.0, 23.0, 29.0, 38.0),
-    "elbow_mean": (14.0, 18.0, 22.0, 30.0, 84.0, 90.0, 92.0),
+    "arm_mean": (2.0, 0.0, -2.5, -3.0, -15.0, -17.0, -18.0),
+    "arm_swing": (0.0, 11.0, 18.0, 25.0, 20.0, 25.0, 34.0),
+    "elbow_mean": (14.0, 18.0, 22.0, 30.0, 88.0, 96.0, 98.0),
     "elbow_swing": (0.0, 6.0, 11.0, 16.0, 10.0, 14.0, 19.0),
     "abduction": (7.0, 7.0, 7.0, 8.0, 16.0, 17.0, 18.0),
 }
@@ -91,4 +91,4 @@ def stride_rate(speed: ArrayLike) -> FloatArray:
 def landing_share(speed: ArrayLike) -> FloatArray:
     """The share of the stance after which the hips pass over the flat foot (earlier than half: the leg trails)."""
     run_share = running_share(speed)
-    return np.asarray((1.0 - run_share) * 0.39 + run_share * 0.345)
+    return np.asarray((1.0 - run_share) * 0.363 + run_share * 0.30)

@@ -22,7 +22,7 @@ from study.motion.synthetic.targets import bend_for, bent_length, hip_positions
 FloatArray = NDArray[np.float64]
 
 FOREVER = 1e6
-_STRAIGHTEST_STANCE = np.radians(6.5)
+_STRAIGHTEST_STANCE = np.radians(5.0)
 # The tips of the toes begin to carry the foot when the heel is this high, and the more the higher.
 _TOE_ROLL_FROM = np.radians(22.0)
 _TOE_ROLL = 0.75
@@ -62,6 +62,8 @@ class Contact:
     """Share of the swing at which the knee is bent most."""
     swing_reach: float = 0.0
     """How far beyond its landing angle the leg swings forward before it comes back to land."""
+    swing_lag: float | None = None
+    """Share of the way forward that the leg has gone when the knee is bent most; None for an even swing."""
     heel_up: float = 0.0
     """By how much the heel stays off the floor all through the contact."""
     turned: float = 0.0
@@ -272,6 +274,12 @@ def _swing(
     knee = clamped_spline(share, knots, [ends[0][0], peak, middle, late, ends[1][0]], (rates[0][0], rates[1][0]))
     rest = hermite(share, (ends[0][1:], ends[1][1:]), (rates[0][1:], rates[1][1:]))
     angle, aside, ankle_bend = rest.T
+    if before.swing_lag is not None:
+        # The thigh follows the shank: the leg hangs back until the knee is bent, then swings through.
+        way = ends[1][1] - ends[0][1]
+        passed = [ends[0][1], ends[0][1] + before.swing_lag * way, ends[0][1] + 0.77 * way, ends[1][1]]
+        knots = (0.0, peak_at, peak_at + 0.45 * (1 - peak_at), 1.0)
+        angle = clamped_spline(share, knots, passed, (rates[0][1], rates[1][1]))
     angle = angle + before.swing_reach * smooth_step(share, 0.3, 0.85) * (1.0 - smooth_step(share, 0.8, 1.0))
     lifted = 1.0 - smooth_step(share, 0.0, 0.45)
     level = smooth_step(share, 0.0, 0.3) * (1.0 - smooth_step(share, 0.75, 1.0))

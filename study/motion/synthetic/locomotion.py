@@ -68,7 +68,7 @@ class Person:
         return cls(
             phase=float(rng.uniform(0.0, 1.0)),
             first_foot=int(rng.integers(2)),
-            step_noise=0.012,
+            step_noise=0.009,
             arm_scale=1.0 + 0.09 * np.clip(rng.standard_normal(2), -2, 2),
             toe_out=np.radians(6.0 + 2.0 * np.clip(rng.standard_normal(2), -2, 2)),
             width=float(1.0 + 0.12 * np.clip(rng.standard_normal(), -2, 2)),
@@ -187,13 +187,14 @@ def _contact(
         strike_pitch=float(gait.by_speed("strike_pitch", v_start)),
         off_pitch=float(gait.by_speed("off_pitch", v_stop)),
         flat_from=0.19 + 0.02 * running,
-        heel_off=0.50 - 0.06 * running,
+        heel_off=0.46 - 0.02 * running,
         loading=float(gait.by_speed("loading", v_start)),
         knee=float(gait.by_speed("knee", v)),
         off_knee=float(gait.by_speed("off_knee", v_stop)),
         swing_knee=float(gait.by_speed("swing_knee", v_stop)),
-        swing_peak=0.29 + 0.15 * running,
+        swing_peak=0.26 + 0.17 * running,
         swing_reach=np.radians(2.0 + 1.0 * running) * min(1.0, v / 1.3),
+        swing_lag=0.12 - 0.18 * running,
         running=running,
     )
 
@@ -235,7 +236,7 @@ def _whole_body(
     # Over the bearing foot sideways (most in mid-stance, near 31 % of the cycle); quickest in double support.
     stance = gait.by_speed("stance", pace)
     sway = gait.by_speed("sway", pace) * moving * np.cos(turn - np.pi * stance)
-    surge = 0.010 * moving * np.sin(2 * turn - 0.6) * (1 - 0.5 * running)
+    surge = 0.006 * moving * np.sin(2 * turn - 0.6) * (1 - 0.5 * running)
     ground = path + sway[:, None] * aside + surge[:, None] * ahead
     wander = slow_noise(rng, times, 0.004, 2, (0.1, 0.5))
     standing = 1.0 - moving
@@ -296,11 +297,11 @@ def _height(
     """
     walking, limit, _ = hip_height(contacts, times, level, pelvis_angles)
     running = gait.running_share(pace)
-    swing = 1.02 * person.bounce * GRAVITY / (4 * np.pi * gait.stride_rate(pace)) ** 2
+    swing = 1.15 * person.bounce * GRAVITY / (4 * np.pi * gait.stride_rate(pace)) ** 2
     stance = gait.by_speed("stance", pace)
-    middle = 0.850 - 0.007 * (pace - 3.3)
+    middle = 0.860 - 0.006 * (pace - 3.3)
     bounce = middle - swing * np.cos(4 * np.pi * (phase - 0.5 * stance))
-    return under_limit((1 - running) * blur(walking, 0.045) + running * bounce, limit, 0.035)
+    return under_limit((1 - running) * blur(walking, 0.045) + running * bounce, limit, 0.045)
 
 
 def _trunk(
@@ -353,7 +354,7 @@ def _arms(
         arms[:, side, 1] = gait.by_speed("abduction", pace) - np.radians(4.0) * running * forward
         arms[:, side, 1] += np.radians(0.8) * drift[:, 2]
         # Turned in, so that the forearm comes across in front, more in running.
-        arms[:, side, 2] = -np.radians(12.0 + 6.0 * running) - np.radians(5.0) * running * forward
+        arms[:, side, 2] = -np.radians(12.0 - 4.0 * running) - np.radians(5.0) * running * forward
         late = -np.cos(own - 0.62 + 0.3 * running)
         bend = gait.by_speed("elbow_swing", pace) * scale * (late + 0.12 * np.cos(2 * own))
         arms[:, side, 3] = gait.by_speed("elbow_mean", pace) + bend + np.radians(1.5) * drift[:, 3]
