@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved
 from study.motion.feet import heading, stance
-from study.motion.legs import reach
+from study.motion.legs import knee_bend, knee_hinge, reach
 from study.motion.mirror import mirror
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +31,8 @@ _SLOPE_S = 0.04
 # A difference in velocity dies away over this, or over the period where that is shorter: a slope carried on through a
 # whole cycle would swing a leg by tenths of a metre.
 _SETTLE_S = 0.2
+# A knee bent by less counts as straight, radians.
+_STRAIGHT_KNEE = 0.035
 # A foot that is in the air for less than this is taken to stay on the floor.
 _SHORTEST_SWING_S = 0.1
 # The path is summed in so many steps a frame.
@@ -153,6 +155,7 @@ class _Period:
     height: FloatArray
     yaw: FloatArray
     turns: tuple[FloatArray, FloatArray]
+    hinges: tuple[FloatArray, FloatArray]
 
     def at(self, within: FloatArray) -> Clip:
         """Frames at times `(n,)`, in frames since the period's beginning."""
@@ -165,7 +168,23 @@ class _Period:
         rotations = quat.multiply(template.rotations, quat.exp(turned))
         yaw = fade * self.yaw[0] + slope * self.yaw[1]
         rotations[:, 0] = quat.multiply(quat.yaw(yaw), rotations[:, 0])
-        return replace(template, root_positions=positions, rotations=quat.normalise(rotations))
+        corrected = replace(template, root_positions=positions, rotations=quat.normalise(rotations))
+        for side, hinge in zip("LR", self.hinges, strict=True):
+            corrected = _knee_forward(corrected, template, side, hinge)
+        return corrected
+
+
+def _knee_forward(clip: Clip, captured: Clip, side: str, hinge: FloatArray) -> Clip:
+    """A corrected clip whose knee bends no further the wrong way than straight, or than it was captured."""
+    least = np.minimum(knee_bend(captured, side, hinge), _STRAIGHT_KNEE)
+    spare = knee_bend(clip, side, hinge) - least
+    # The greater of `spare` and 0, with its corner rounded.
+    rounded = np.where(spare < _STRAIGHT_KNEE, np.clip(spare + _STRAIGHT_KNEE, 0.0, None) ** 2, 0.0)
+    bend = np.where(spare < _STRAIGHT_KNEE, rounded / (4.0 * _STRAIGHT_KNEE), spare)
+    knee = clip.skeleton.role(f"knee.{side}")
+    rotations = clip.rotations.copy()
+    rotations[:, knee] = quat.multiply(quat.from_axis_angle(hinge, bend - spare), rotations[:, knee])
+    return replace(clip, rotations=quat.normalise(rotations))
 
 
 def _with_planted_feet(base: _Period, within: FloatArray) -> Clip:
@@ -287,7 +306,8 @@ def _base_period(clip: Clip, period: float, isometry: _Isometry) -> _Period:
     velocity = _slope(there.root_positions, 1.0) - quat.rotate(turning[0], _slope(here.root_positions, 1.0))
     path += slope[:, None] * velocity * np.array([1.0, 0.0, 1.0])
     path += clip.root_positions[-1] - path[-1]
-    return _Period(clip, period, path, height, yaw, turns)
+    hinges = (knee_hinge(clip, "L"), knee_hinge(clip, "R"))
+    return _Period(clip, period, path, height, yaw, turns, hinges)
 
 
 def _slope_frames(fps: float, available: int) -> int:

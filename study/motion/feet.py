@@ -21,7 +21,7 @@ _STANCE_SPEED = 0.5
 # ... and its lowest point is this near to the floor (metres): captured feet roll and sink by some centimetres.
 _STANCE_HEIGHT = 0.05
 # About a step: shorter ways are swayed by the hips, longer ones run into the turn.
-_SET_OUT_M = 0.6
+_SET_OUT_M = 0.9
 
 
 def foot_points(clip: Clip) -> tuple[FloatArray, FloatArray]:
@@ -110,7 +110,7 @@ def grounded(clip: Clip) -> Clip:
 def faced(clip: Clip) -> Clip:
     """The clip turned and shifted over the floor so that it starts over the origin and sets out towards +Z.
 
-    The direction is that of the first 0.6 m, where it goes so far in the first second; else the way the hips face.
+    The direction is that of the first 0.9 m, where it goes so far in the first second; else the way the hips face.
     """
     way = np.linalg.norm((clip.root_positions - clip.root_positions[0])[:, [0, 2]], axis=1)
     stop = min(clip.frames - 1, round(clip.fps))

@@ -44,7 +44,9 @@ def reach(clip: Clip, shifts: FloatArray, first: int = 0) -> Clip:
         frames = np.flatnonzero(dropped | (moved > 0.0))
         if len(frames):
             leg = tuple(clip.skeleton.role(f"{part}.{side}") for part in ("hip", "knee", "ankle"))
-            turned = _reach_one(_at(clip, frames), _at(lowered, frames), leg, _hinge(clip, side), targets[frames, foot])
+            turned = _reach_one(
+                _at(clip, frames), _at(lowered, frames), leg, knee_hinge(clip, side), targets[frames, foot]
+            )
             for joint in leg:
                 rotations[frames, joint] = turned[:, joint]
     return replace(lowered, rotations=rotations)
@@ -114,7 +116,7 @@ def _reach_one(
     return quat.normalise(rotations)
 
 
-def _hinge(clip: Clip, side: str) -> FloatArray:
+def knee_hinge(clip: Clip, side: str) -> FloatArray:
     """The axis about which the knee bends, in the thigh's frame: the mean over the clip, by how far it is bent."""
     positions, world = joint_positions(clip), global_rotations(clip)
     hip, knee, ankle = (clip.skeleton.role(f"{part}.{side}") for part in ("hip", "knee", "ankle"))
@@ -124,6 +126,16 @@ def _hinge(clip: Clip, side: str) -> FloatArray:
     axes = quat.rotate(quat.conjugate(world[:, hip]), normal * np.linalg.norm(normal, axis=1, keepdims=True))
     axis = np.sum(axes, axis=0) + 1e-9 * quat.rotate(quat.conjugate(world[0, hip]), line[0])
     return np.asarray(axis / np.linalg.norm(axis))
+
+
+def knee_bend(clip: Clip, side: str, hinge: FloatArray) -> FloatArray:
+    """How far a knee is bent in each frame `(frames,)`, radians; below 0 where it is bent the wrong way."""
+    positions, world = joint_positions(clip), global_rotations(clip)
+    hip, knee, ankle = (clip.skeleton.role(f"{part}.{side}") for part in ("hip", "knee", "ankle"))
+    thigh, shank = positions[:, knee] - positions[:, hip], positions[:, ankle] - positions[:, knee]
+    normal = np.cross(thigh, shank)
+    forward = np.where(np.sum(normal * quat.rotate(world[:, hip], hinge), axis=1) < 0.0, -1.0, 1.0)
+    return np.asarray(forward * np.arctan2(np.linalg.norm(normal, axis=1), np.sum(thigh * shank, axis=1)))
 
 
 def _bend(
