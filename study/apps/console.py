@@ -59,9 +59,10 @@ def progress(label: str) -> Iterator[Callable[[float, str], None]]:
         return
     words_now = [""]
     steps = 1000
-    with click.progressbar(
+    shown_bar: Any = click.progressbar(
         length=steps, label=label, file=sys.stderr, show_eta=True, item_show_func=lambda _: words_now[0]
-    ) as bar:
+    )
+    with shown_bar as bar:
 
         def advance(share: float, words: str) -> None:
             words_now[0] = words

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from study.apps.clips import clip_pair
 from study.apps.console import emit, json_option, library_option
 
-METHODS = ("fixed", "geodesic", "velocity")
+if TYPE_CHECKING:
+    from study.motion.clip import Clip
+    from study.transitions.blending import Transition
+
+METHODS = ("fixed", "geodesic", "velocity", "timewarp")
 
 
 def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -48,21 +52,25 @@ def blend_length(
 
     SRC and DST are motion files, or names of motions in --library.
     """
-    from study.transitions.blend_length import blend_length as choose
-
     first, second = clip_pair(source, destination, library, fps)
-    chosen = choose(first, second, start, end, method=method, fixed_frames=fixed_frames)
-    result = {
-        "blend_frames": chosen.blend_frames,
-        "blend_s": chosen.blend_s,
-        "cost": chosen.cost,
-        "costs": chosen.costs,
-        "method": method,
-        "fps": fps,
-    }
-    emit(
-        result, as_json, f"{chosen.blend_frames} frames ({chosen.blend_s:.3f} s at {fps:g} fps), cost {chosen.cost:.5g}"
-    )
+    if method == "timewarp":
+        from study.transitions.timewarp import warp_length
+
+        warped = warp_length(first, second, start, end)
+        windows = {"source_frames": warped.source_frames, "destination_frames": warped.destination_frames}
+        found: tuple[Any, ...] = (warped.blend_frames, warped.blend_s, warped.cost, warped.costs, warped.note)
+    else:
+        from study.transitions.blend_length import blend_length as choose
+
+        chosen = choose(first, second, start, end, method=method, fixed_frames=fixed_frames)
+        windows = {"source_frames": chosen.blend_frames, "destination_frames": chosen.blend_frames}
+        found = (chosen.blend_frames, chosen.blend_s, chosen.cost, chosen.costs, chosen.note)
+    keys = ("blend_frames", "blend_s", "cost", "costs", "note")
+    result = {**dict(zip(keys, found, strict=True)), **windows, "method": method, "fps": fps}
+    text = f"{found[0]} frames ({found[1]:.3f} s at {fps:g} fps), cost {found[2]:.5g}"
+    if windows["source_frames"] != windows["destination_frames"]:
+        text += f", {windows['source_frames']} of SRC over {windows['destination_frames']} of DST"
+    emit(result, as_json, f"{text}; {found[4]}" if found[4] else text)
 
 
 @click.command()
@@ -70,6 +78,7 @@ def blend_length(
 @click.option("--method", type=click.Choice(METHODS), help="Choose the blend length by this method.")
 @click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
 @click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
+@click.option("--keep-slide", is_flag=True, help="Leave the feet as blending leaves them, sliding or not.")
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
 )
@@ -84,20 +93,23 @@ def transition(
     method: str | None,
     frames: int | None,
     weight: str,
+    keep_slide: bool,
     out: Path,
     as_json: bool,
 ) -> None:
     """Blend from frame --start of SRC to frame --end of DST and write the result."""
     from study.experiment.drawing import draw_clip
     from study.motion.bvh import write_bvh
-    from study.transitions.blend_length import blend_length as choose
-    from study.transitions.blending import blend
+    from study.transitions.footskate import plant_feet
 
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
     first, second = clip_pair(source, destination, library, fps)
-    blend_frames = frames or choose(first, second, start, end, method=method or "geodesic").blend_frames
-    joined = blend(first, second, start, end, blend_frames, weight=weight)
+    joined = join(first, second, start, end, method, frames, weight)
+    slide = {}
+    if not keep_slide:
+        joined, planted = plant_feet(joined, first, second)
+        slide = {"slide_before_m": planted.slide_before_m, "slide_after_m": planted.slide_after_m}
     if out.suffix.lower() == ".bvh":
         write_bvh(joined.clip, out)
     else:
@@ -105,9 +117,26 @@ def transition(
     result = {
         "file": str(out),
         "frames": joined.clip.frames,
-        "blend_frames": blend_frames,
+        "blend_frames": joined.blend_frames,
         "blend_start": joined.blend_start,
         "blend_stop": joined.blend_stop,
+        "note": joined.note,
+        **slide,
     }
-    text = f"{out}: {joined.clip.frames} frames, blended from frame {joined.blend_start} to {joined.blend_stop - 1}"
-    emit(result, as_json, text)
+    emit(result, as_json, f"{out}: {joined.clip.frames} frames; {joined.note}")
+
+
+def join(
+    source: Clip, destination: Clip, start: int, end: int, method: str | None, frames: int | None, weight: str
+) -> Transition:
+    """The transition of so many frames, or as long as a method says."""
+    from study.transitions.blend_length import blend_length as choose
+    from study.transitions.blending import blend
+    from study.transitions.timewarp import warp_length, warped_blend
+
+    if method == "timewarp":
+        chosen = warp_length(source, destination, start, end)
+        windows = (chosen.source_frames, chosen.destination_frames)
+        return warped_blend(source, destination, start, end, *windows, weight=weight)
+    length = frames or choose(source, destination, start, end, method=method or "geodesic").blend_frames
+    return blend(source, destination, start, end, length, weight=weight)
