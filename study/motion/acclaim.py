@@ -186,7 +186,7 @@ def _read_root(source: Source, start: int, lines: list[_Words], degrees: bool) -
             position = _numbers(source, words, 3, "a coordinate of the root")
         elif key == b"orientation":
             orientation = _numbers(source, words, 3, "an angle of the root")
-    root.axis = _fixed_axes(order, orientation, degrees)
+    root.axis = _fixed_axes(order, _in_order(orientation, order), degrees)
     return root, position
 
 
@@ -224,7 +224,8 @@ def _read_bone(source: Source, lines: list[_Words], degrees: bool) -> _Bone:
     (bone.length,) = _numbers(source, entries[b"length"], 1, f"the length of {name!r}")
     if b"axis" in entries:
         angles = _numbers(source, entries[b"axis"], 3, f"the axis of {name!r}")
-        bone.axis = _fixed_axes(_axis_order(source, entries[b"axis"], 4), angles, degrees)
+        order = _axis_order(source, entries[b"axis"], 4)
+        bone.axis = _fixed_axes(order, _in_order(angles, order), degrees)
     if b"dof" in entries:
         bone.dofs = _dofs(source, entries[b"dof"][1:])
     return bone
@@ -284,6 +285,11 @@ def _dofs(source: Source, words: _Words) -> tuple[str, ...]:
             raise source.error(at, f"Expected degrees of freedom out of {', '.join(_DOFS)}, found {_shown(word)}.")
         dofs.append(dof)
     return tuple(dofs)
+
+
+def _in_order(angles: FloatArray, order: str) -> FloatArray:
+    """Angles about x, y and z, in which order the file always has them, in the order of turning."""
+    return angles[["XYZ".index(letter) for letter in order]]
 
 
 def _fixed_axes(order: str, angles: FloatArray, degrees: bool) -> FloatArray:
