@@ -257,38 +257,28 @@ def threshold_frames(fits: Fits, kind: Kind = "different_75") -> FloatArray:
 # Covariance
 
 
-def covariance(
-    fits: Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, *, by_participant: bool
-) -> FloatArray:
-    """Return the covariance of log criterion, lapse and log slopes of one fit, shape (p, p).
+def covariance(fits: Fits, frames: FloatArray, different: FloatArray, shown: FloatArray) -> FloatArray:
+    """Return the covariance of log criterion, lapse and log slopes of one fit, all answers taken as independent.
 
     Parameters
     ----------
     fits
         One fit (the first is used).
     frames : ndarray, shape (levels, slopes)
-    different, shown : ndarray, shape (participants, levels)
-        Counts a participant.
-    by_participant
-        False: the answers are taken as independent (inverse expected information). True: the participants are
-        (the sandwich of Huber 1967 with the small-sample factor n / (n - 1)).
+    different, shown : ndarray, shape (levels,)
+        What it was fitted to.
 
-    Notes
-    -----
-    A parameter at its bound has neither variance nor covariance: what is given holds with that parameter fixed.
+    Returns
+    -------
+    ndarray, shape (2 + slopes, 2 + slopes)
+        Inverse of the expected information. A parameter at its bound has neither variance nor covariance: what is
+        given holds with that parameter fixed.
     """
     point = np.concatenate([np.log(fits.criterion[:1]), fits.lapse[:1], np.log(fits.slopes[0])])[None]
     free = np.flatnonzero(~fits.held[0])
-    _, information = _scores(point, frames, different.sum(axis=0)[None], shown.sum(axis=0)[None])
+    _, information = _scores(point, frames, different[None], shown[None])
     result = np.zeros(information.shape[1:])
-    inverse = np.linalg.pinv(information[0][np.ix_(free, free)])
-    if by_participant:
-        count = len(different)
-        everyone = np.repeat(point, count, axis=0)
-        gradient = _scores(everyone, frames, different, shown)[0][:, free]
-        gradient = gradient - gradient.mean(axis=0)
-        inverse = inverse @ (gradient.T @ gradient) @ inverse * count / max(count - 1, 1)
-    result[np.ix_(free, free)] = inverse
+    result[np.ix_(free, free)] = np.linalg.pinv(information[0][np.ix_(free, free)])
     return result
 
 

@@ -222,35 +222,15 @@ def resampled_weights(participants: int, resamples: int, rng: np.random.Generato
     return rng.multinomial(participants, np.full(participants, 1 / participants), size=resamples).astype(np.float64)
 
 
-def bca_interval(
-    estimate: float, resampled: FloatArray, left_out: FloatArray, confidence: float = 0.95
-) -> tuple[float, float]:
-    """Return the bias-corrected accelerated bootstrap interval (Efron 1987).
+def jackknife_error(left_out: FloatArray) -> float | None:
+    """Return the standard error of an estimate from its values with one participant left out at a time.
 
-    Parameters
-    ----------
-    estimate
-        From all participants.
-    resampled : ndarray, shape (resamples,)
-        From the bootstrap samples; infinite where a sample never reached the threshold.
-    left_out : ndarray, shape (participants,)
-        From all participants but one; where one of these is infinite the acceleration is taken as 0.
+    None where one of these values is not finite: the estimate then hangs on single participants.
     """
-    from scipy.special import ndtr, ndtri
-
-    below = np.mean(resampled < estimate) + 0.5 * np.mean(resampled == estimate)
-    bias = float(ndtri(np.clip(below, 0.5 / len(resampled), 1 - 0.5 / len(resampled))))
-    acceleration = 0.0
-    if np.isfinite(left_out).all():
-        pull = left_out.mean() - left_out
-        scale = float((pull**2).sum())
-        acceleration = float((pull**3).sum()) / (6 * scale**1.5) if scale > 1e-18 else 0.0
-    ends = np.array([0.5 - confidence / 2, 0.5 + confidence / 2])
-    shifted = bias + ndtri(ends)
-    levels = np.clip(ndtr(bias + shifted / np.maximum(1 - acceleration * shifted, 1e-3)), 0.0, 1.0)
-    ordered = np.sort(resampled)
-    places = np.clip(np.round(levels * (len(ordered) - 1)).astype(int), 0, len(ordered) - 1)
-    return float(ordered[places[0]]), float(ordered[places[1]])
+    count = len(left_out)
+    if count < 2 or not np.isfinite(left_out).all():
+        return None
+    return math.sqrt((count - 1) / count * float(((left_out - left_out.mean()) ** 2).sum()))
 
 
 def finite(value: float | np.floating[Any] | None) -> float | None:

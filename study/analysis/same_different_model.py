@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from study.analysis import differencing as model
 from study.analysis import estimates
-from study.analysis.same_different import FEWEST_FOR_INTERVAL, SIDES, Counts, Side, Threshold, bootstrap_error
+from study.analysis.same_different import FEWEST_FOR_INTERVAL, SIDES, Counts, Threshold
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class ModelFit:
     Attributes
     ----------
     criterion, lapse
-        Estimates, with standard errors that take the participants as independent.
+        Estimates, the first with a standard error that takes the participants as independent.
     false_alarms
         Share of "different" that the model gives to pairs with no difference.
     slopes
@@ -41,7 +41,7 @@ class ModelFit:
     guess_corrected
         75% after Abbott's correction for the false alarms, by side.
     equal_slopes
-        Likelihood-ratio test (answers as independent) and Wald test (participants as independent) of one slope.
+        Tests of one slope for both sides: likelihood ratio (answers as independent), t (participants as independent).
     fit_deviance, fit_degrees_of_freedom, fit_p_value
         Against free percentages at each level; a small p-value says that the curve does not follow the data.
     curve
@@ -72,12 +72,7 @@ def _frames_by_side(differences: FloatArray) -> FloatArray:
 
 
 def fit_model(
-    counts: Counts,
-    *,
-    confidence: float = 0.95,
-    resamples: int = 1000,
-    largest_lapse: float = model.LARGEST_LAPSE,
-    rng: np.random.Generator | None = None,
+    counts: Counts, *, confidence: float = 0.95, largest_lapse: float = model.LARGEST_LAPSE
 ) -> ModelFit | str:
     """Fit the differencing model; a sentence that says why where it can't be fitted.
 
@@ -85,62 +80,85 @@ def fit_model(
     ----------
     counts
         Answers.
-    confidence, resamples, rng
-        Of the bootstrap over participants; seeded with 0 by default.
+    confidence
+        Of the intervals.
     largest_lapse
         Upper bound of the lapse rate.
 
     Notes
     -----
-    Maximum likelihood on the answers of all participants together, so the curve is that of the group. Intervals of
-    thresholds: Student's t on log thresholds with a sandwich covariance over participants; for one participant,
-    that participant's answers as independent. Where participants differ much in sensitivity the curve of the group is
-    flatter than anybody's, and its threshold is that of the group, not the mean of theirs.
+    Maximum likelihood on the answers of all participants together, so the curve is that of the group. Standard errors
+    are the jackknife's over participants, intervals Student's on log thresholds (measured coverage: docs/analysis.md);
+    for one participant, that participant's answers as independent. Where participants differ much in sensitivity the
+    curve of the group is flatter than anybody's, and its threshold is that of the group, not the mean of theirs.
     """
     reason = _why_no_fit(counts)
     if reason:
         return reason
     present = np.flatnonzero(counts.shown.sum(axis=0) > 0)
     differences, different, shown = counts.differences[present], counts.different[:, present], counts.shown[:, present]
-    frames = _frames_by_side(differences)
-    sides = [index for index in range(2) if frames[:, index].any()]
-    frames = frames[:, sides]
-    total = (different.sum(axis=0)[None], shown.sum(axis=0)[None])
+    both = _frames_by_side(differences)
+    sides = [index for index in range(2) if both[:, index].any()]
+    frames, total = both[:, sides], (different.sum(axis=0)[None], shown.sum(axis=0)[None])
     best = model.fit(frames, *total, largest_lapse=largest_lapse)
-    rng = rng or np.random.default_rng(0)
-    count = len(counts.participants)
-    weights = estimates.resampled_weights(count, resamples, rng) if count >= FEWEST_FOR_INTERVAL else np.zeros((0, 1))
-    resampled = (
-        model.fit(frames, weights @ different, weights @ shown, largest_lapse=largest_lapse) if len(weights) else None
-    )
-    by_participant = count >= FEWEST_FOR_INTERVAL
-    spread = model.covariance(best, frames, different, shown, by_participant=by_participant)
-    thresholds = {
-        kind: _model_thresholds(best, resampled, spread, frames, sides, count, kind, confidence) for kind in model.KINDS
-    }
-    saturated = _saturated_log_likelihood(*total)
-    deviance = max(2 * (saturated - float(best.log_likelihood[0])), 0.0)
+    spread = _spread_of(best, frames, different, shown, largest_lapse)
+    thresholds = {kind: _thresholds(best, spread, frames, sides, kind, confidence) for kind in model.KINDS}
+    deviance = max(2 * (_saturated_log_likelihood(*total) - float(best.log_likelihood[0])), 0.0)
     freedom = len(differences) - 2 - len(sides)
-    criterion = float(best.criterion[0])
     line = np.linspace(differences.min(), differences.max(), 201)
     curve = model.probability_different(_frames_by_side(line)[:, sides], best.criterion, best.lapse, best.slopes)[0]
-    alarms = model.probability_different(np.zeros((1, len(sides))), best.criterion, best.lapse, best.slopes)[0, 0]
+    alarms = model.probability_different(np.zeros((1, len(sides))), best.criterion, best.lapse, best.slopes)
     return ModelFit(
-        criterion=criterion,
-        criterion_error=estimates.finite(criterion * math.sqrt(max(spread[0, 0], 0.0))),
+        criterion=float(best.criterion[0]),
+        criterion_error=spread.criterion_error(best),
         lapse=float(best.lapse[0]),
-        false_alarms=float(alarms),
+        false_alarms=float(alarms[0, 0]),
         slopes={SIDES[side]: float(best.slopes[0, place]) for place, side in enumerate(sides)},
         jnd=thresholds["different_75"],
         corrected=thresholds["criterion_free_75"],
         guess_corrected=thresholds["guess_corrected_75"],
-        equal_slopes=_equal_slopes(best, spread, frames, total, count, largest_lapse) if len(sides) == 2 else None,
+        equal_slopes=_equal_slopes(best, spread, frames, total, largest_lapse) if len(sides) == 2 else None,
         fit_deviance=deviance,
         fit_degrees_of_freedom=freedom,
         fit_p_value=estimates.chi_square_probability(deviance, freedom) if freedom > 0 else None,
         curve=tuple((float(x), 100 * float(y)) for x, y in zip(line, curve, strict=True)),
         note=_caution(best),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Spread:
+    """How far a fit scatters: fits with one participant left out at a time, or the covariance for one participant."""
+
+    participants: int
+    left_out: model.Fits | None
+    covariance: FloatArray
+
+    def log_threshold_error(self, best: model.Fits, kind: model.Kind, place: int) -> float | None:
+        """Standard error of the log threshold of one slope; None where it can't be told."""
+        if self.left_out is not None:
+            others = model.threshold_frames(self.left_out, kind)[:, place]
+            return estimates.jackknife_error(np.log(others)) if (others > 0).all() else None
+        gradient = model.log_threshold_gradient(best, kind)[place]
+        return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
+
+    def criterion_error(self, best: model.Fits) -> float | None:
+        """Standard error of the criterion."""
+        if self.left_out is not None:
+            return estimates.jackknife_error(self.left_out.criterion)
+        return estimates.finite(float(best.criterion[0]) * math.sqrt(max(float(self.covariance[0, 0]), 0.0)))
+
+
+def _spread_of(
+    best: model.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, largest_lapse: float
+) -> _Spread:
+    answered = shown.sum(axis=1) > 0
+    different, shown = different[answered], shown[answered]
+    count = len(shown)
+    if count < FEWEST_FOR_INTERVAL:
+        return _Spread(count, None, model.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
+    others = (different.sum(axis=0) - different, shown.sum(axis=0) - shown)
+    return _Spread(count, model.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
 
 
 def _why_no_fit(counts: Counts) -> str:
@@ -177,90 +195,73 @@ def _saturated_log_likelihood(different: FloatArray, shown: FloatArray) -> float
     return float((xlogy(different, share) + xlogy(shown - different, 1 - share)).sum())
 
 
-def _model_thresholds(
-    best: model.Fits,
-    resampled: model.Fits | None,
-    spread: FloatArray,
-    frames: FloatArray,
-    sides: Sequence[int],
-    count: int,
-    kind: model.Kind,
-    confidence: float,
+def _thresholds(
+    best: model.Fits, spread: _Spread, frames: FloatArray, sides: Sequence[int], kind: model.Kind, confidence: float
 ) -> dict[str, Threshold]:
-    """Thresholds of one kind on every side shown, with Student intervals of their logarithms."""
-    found = model.threshold_frames(best, kind)[0]
-    gradient = model.log_threshold_gradient(best, kind) if (np.isfinite(found) & (found > 0)).all() else None
+    """Thresholds of one kind on every side shown."""
     result: dict[str, Threshold] = {}
     for place, index in enumerate(sides):
-        side, largest = SIDES[index], float(frames[:, place].max())
-        threshold = float(found[place])
-        held = bool(best.held[0, 2 + place])
-        error = None
-        if gradient is not None and not held:
-            error = math.sqrt(max(float(gradient[place] @ spread @ gradient[place]), 0.0))
-        bootstrap = model.threshold_frames(resampled, kind)[:, place] if resampled is not None else None
-        result[side] = _model_threshold(side, threshold, largest, error, bootstrap, held, count, confidence)
+        result[SIDES[index]] = _threshold(best, spread, float(frames[:, place].max()), place, index, kind, confidence)
     return result
 
 
-def _model_threshold(
-    side: Side,
-    threshold: float,
-    largest: float,
-    log_error: float | None,
-    resampled: FloatArray | None,
-    held: bool,
-    count: int,
-    confidence: float,
+def _threshold(
+    best: model.Fits, spread: _Spread, largest: float, place: int, index: int, kind: model.Kind, confidence: float
 ) -> Threshold:
-    clustered = count >= FEWEST_FOR_INTERVAL
-    who = "participants as independent" if clustered else "one participant, answers as independent"
+    """One threshold, with Student's interval of its logarithm."""
+    side, clustered = SIDES[index], spread.left_out is not None
+    who = "jackknife over participants" if clustered else "one participant, answers as independent"
     method = f"differencing model; Student interval of the logarithm, {who}"
-    unknown = estimates.Interval(None, None, confidence)
-    if held:
-        return Threshold(
-            side, None, None, unknown, "not estimable", method, "the slope stands at the bound of its range"
-        )
-    if threshold <= 0:
+    found = float(model.threshold_frames(best, kind)[0, place])
+    interval = estimates.Interval(None, None, confidence)
+    if best.held[0, 2 + place]:
+        note = "the slope stands at the bound of its range"
+        return Threshold(side, None, None, interval, "not estimable", method, note)
+    if found <= 0:
         note = "above 75% already where there is no difference"
-        return Threshold(side, None, None, unknown, "above", method, note)
-    interval = unknown
-    if log_error is not None:
-        times = estimates.t_quantile(confidence, count - 1) if clustered else estimates.normal_quantile(confidence)
-        low, high = threshold * math.exp(-times * log_error), threshold * math.exp(min(times * log_error, 50.0))
+        return Threshold(side, None, None, interval, "above", method, note)
+    error = spread.log_threshold_error(best, kind, place) if math.isfinite(found) else None
+    if error is not None:
+        times = (
+            estimates.t_quantile(confidence, spread.participants - 1)
+            if clustered
+            else estimates.normal_quantile(confidence)
+        )
+        low, high = found * math.exp(-times * error), found * math.exp(min(times * error, 50.0))
         interval = estimates.Interval(min(low, largest), high if high <= largest else None, confidence)
-    if threshold > largest:
+    if found > largest:
         note = f"not reached within the levels shown (largest {largest:g} frames)"
         return Threshold(side, None, None, interval, "not reached", method, note)
-    error = bootstrap_error(resampled) if resampled is not None else None
-    if error is None and log_error is not None:
-        error = threshold * log_error
     note = "" if interval.high is not None else f"the interval reaches beyond the levels shown ({largest:g} frames)"
-    return Threshold(side, threshold, error, interval, "reached", method, note)
+    if error is None:
+        note = "hangs on single participants: no interval"
+    return Threshold(side, found, None if error is None else found * error, interval, "reached", method, note)
 
 
 def _equal_slopes(
     best: model.Fits,
-    spread: FloatArray,
+    spread: _Spread,
     frames: FloatArray,
     total: tuple[FloatArray, FloatArray],
-    count: int,
     largest_lapse: float,
 ) -> dict[str, Any]:
     """Tests that shorter and longer blends are told apart equally well."""
     one = model.fit(frames.sum(axis=1, keepdims=True), *total, largest_lapse=largest_lapse)
     ratio = max(2 * float(best.log_likelihood[0] - one.log_likelihood[0]), 0.0)
     difference = float(np.log(best.slopes[0, 1] / best.slopes[0, 0]))
-    variance = float(spread[2, 2] + spread[3, 3] - 2 * spread[2, 3])
-    statistic = difference / math.sqrt(variance) if variance > 1e-12 and count >= FEWEST_FOR_INTERVAL else None
+    error = None
+    if spread.left_out is not None:
+        error = estimates.jackknife_error(np.log(spread.left_out.slopes[:, 1] / spread.left_out.slopes[:, 0]))
+    statistic = difference / error if error is not None and error > 1e-9 else None
+    freedom = spread.participants - 1
     return {
         "likelihood_ratio": ratio,
         "degrees_of_freedom": 1,
         "p_value_answers_independent": estimates.chi_square_probability(ratio, 1),
         "slope_ratio_longer_to_shorter": math.exp(difference),
         "t": statistic,
-        "t_degrees_of_freedom": count - 1 if statistic is not None else None,
-        "p_value_participants_independent": estimates.t_probability(statistic, count - 1)
-        if statistic is not None
-        else None,
+        "t_degrees_of_freedom": freedom if statistic is not None else None,
+        "p_value_participants_independent": (
+            estimates.t_probability(statistic, freedom) if statistic is not None else None
+        ),
     }

@@ -247,7 +247,7 @@ def methods_paragraph(protocol: Any, manifest: Any, analysis: Result, participan
         f"same-different "
         "model (one criterion, a slope for shorter and one for longer blends, a lapse rate of at most 10%) was fitted "
         "by "
-        "maximum likelihood to all answers; its intervals are Student’s, on the logarithm, from a sandwich covariance "
+        "maximum likelihood to all answers; its intervals are Student’s, on the logarithm, from a jackknife "
         "over "
         "participants. Preferences were tested as published (chi-square over all answers) and with one share a "
         "participant "
