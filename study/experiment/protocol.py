@@ -55,7 +55,7 @@ class StimulusSettings(_Part):
         description="From where the fixed camera looks at the group's common heading; `clearest` is the view in which "
         "the group's figures are large and their limbs move most in the picture.",
     )
-    style: Literal["stick", "points", "mannequin"] = Field(default="mannequin", description="How the figure is drawn.")
+    style: Literal["stick", "points", "mannequin"] = Field(default="stick", description="How the figure is drawn.")
     camera_group: Literal["transition", "category", "study"] = Field(
         default="transition",
         description="Which stimuli share one camera (2004: groups of motions share a camera position).",
