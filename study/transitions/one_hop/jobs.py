@@ -180,7 +180,8 @@ class _SecondLegs:
         self.by_stay: IntArray | None = None
         if self.alignment.destination_frame is not None:
             times = self.alignment.destination_frame + settings.blend_frames + self.stays
-            self.by_stay = self._rows(times, self.bounds)
+            free = bool((self.bounds == settings.longest_stay_hop).all())
+            self.by_stay = self.bounded_by(self.bounds[0]).counts if free else self._rows(times, self.bounds)
         elif (self.bounds == settings.longest_stay_hop).all():
             self.by_time = self.bounded_by(settings.longest_stay_hop)
 
