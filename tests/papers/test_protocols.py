@@ -1,0 +1,176 @@
+"""The published protocols: what 2004 sections 4.2 to 4.4 print, and that each can be shown on either library."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from study.experiment.observer_models import default_observer, truth
+from study.experiment.observers import simulate
+from study.experiment.plan import draw_plan
+from study.experiment.protocol import find_protocol, load_protocol, protocols_folder
+from study.experiment.responses import answers_frame, open_responses
+from study.experiment.stimuli import check, prepare
+from study.motion.library import open_library
+
+PUBLISHED = ("blend_length_jnd", "geodesic_vs_fixed", "velocity_vs_fixed")
+ALL = tuple(sorted(path.stem for path in protocols_folder().glob("*.toml")))
+
+
+@pytest.fixture(scope="module")
+def synthetic():
+    return open_library("synthetic")
+
+
+@pytest.fixture(scope="module")
+def cmu(mocap):
+    return open_library(mocap / "cmu")
+
+
+def published(name):
+    return load_protocol(find_protocol(name))
+
+
+def test_the_published_protocols_are_there():
+    assert {*PUBLISHED, "demo"} <= set(ALL)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_protocol_loads_and_bears_the_name_of_its_file(name):
+    assert published(name).name == name
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_what_all_studies_of_2004_have_in_common(name):
+    """30 fps; two seconds of entry and of exit (4.2); five seconds to answer (4.2, 4.3); alpha .01 (5.2)."""
+    protocol = published(name)
+    assert protocol.fps == 30.0
+    assert (protocol.stimuli.entry_s, protocol.stimuli.exit_s) == (2.0, 2.0)
+    assert protocol.timing.answer_s == 5.0
+    assert protocol.analysis.alpha == 0.01
+    assert protocol.stimuli.weight == "linear"
+    assert "2004" in protocol.source
+
+
+def test_study_one_is_as_printed():
+    """Section 4.2: k - 15, k - 10, k - 5, k, k + 5, k + 10, k + 20; three types of motion; threshold 75%."""
+    protocol = published("blend_length_jnd")
+    (study,) = protocol.studies
+    assert (study.task, study.reference, study.order) == ("same-different", "geodesic", "both")
+    assert study.differences_frames == (-15, -10, -5, 0, 5, 10, 20)
+    assert [t.category for t in protocol.transitions] == ["walking", "standing to walking", "running to turning"]
+    assert protocol.analysis.threshold == 0.75
+
+
+@pytest.mark.parametrize(("name", "method"), [("geodesic_vs_fixed", "geodesic"), ("velocity_vs_fixed", "velocity")])
+def test_studies_two_and_three_are_as_printed(name, method):
+    """Sections 4.3, 4.4: eight transitions, against 10 frames, optimal lengths from 5 to 35 frames, not close to 10."""
+    protocol = published(name)
+    (study,) = protocol.studies
+    assert (study.task, study.reference, study.comparison, study.fixed_frames) == ("preference", method, "fixed", 10)
+    assert len(protocol.transitions_of(study)) == 8
+    for transition in protocol.transitions_of(study):
+        points = protocol.points_for(study, transition)
+        assert points.choose == "random"
+        assert (points.shortest_frames, points.longest_frames, points.avoid_frames) == (5, 35, 10)
+        assert points.avoid_within_frames >= 1
+
+
+def test_study_two_shows_locomotion_and_study_three_does_not():
+    """4.3: standing and idling to walking or running, walking to running, turning; 4.4: boxing, dancing, tai-chi."""
+    two = {t.category for t in published("geodesic_vs_fixed").transitions}
+    assert two == {"standing to walking", "standing to running", "walking to running", "turning"}
+    assert {t.category for t in published("velocity_vs_fixed").transitions} == {"boxing", "dancing", "tai-chi"}
+
+
+def shown_on(name, library):
+    """Check and build a protocol's stimuli on a library; what must hold on any."""
+    protocol = published(name)
+    assert check(protocol, library) == []
+    prepared = prepare(protocol, library)
+    plan = draw_plan(protocol, prepared.pairs, "p01")
+    entry, after = round(protocol.stimuli.entry_s * 30), round(protocol.stimuli.exit_s * 30)
+    for record in prepared.records:
+        assert record.blend_frames >= 1
+        assert record.frames == entry + record.blend_frames + after
+        assert record.synthetic == library.synthetic
+        for use in (record.source, record.destination):
+            assert 0 <= use.frame < use.frames
+    return prepared, plan
+
+
+def assert_study_one(prepared, plan):
+    assert len(plan.trials) == 42
+    assert set(Counter((t.motion, t.difference_frames, t.reference_first) for t in plan.trials).values()) == {1}
+    assert len(prepared.stimuli) == 21
+    for pair in prepared.pairs:
+        reference, comparison = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
+        assert 16 <= reference.blend_frames <= 35
+        assert comparison.blend_frames == reference.blend_frames + pair.difference_frames
+
+
+def assert_study_two_or_three(prepared, plan):
+    assert len(plan.trials) == 8
+    for pair in prepared.pairs:
+        optimal, fixed = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
+        assert fixed.blend_frames == 10
+        assert 5 <= optimal.blend_frames <= 35
+        assert abs(optimal.blend_frames - 10) > 4
+        # Both show the same transition points: only the length differs.
+        assert (optimal.source.frame, optimal.destination.frame) == (fixed.source.frame, fixed.destination.frame)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_published_protocols_are_shown_on_the_synthetic_library(name, synthetic):
+    found = shown_on(name, synthetic)
+    (assert_study_one if name == "blend_length_jnd" else assert_study_two_or_three)(*found)
+
+
+def test_the_demo_is_short_on_the_synthetic_library(synthetic):
+    prepared, plan = shown_on("demo", synthetic)
+    assert len(plan.trials) == 17
+    assert sum(record.frames for record in prepared.records) < 1500
+    assert all(use.added_before == use.added_after == 0 for r in prepared.records for use in (r.source, r.destination))
+
+
+@pytest.mark.mocap
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_published_protocols_are_shown_on_cmu_clips(name, cmu):
+    prepared, plan = shown_on(name, cmu)
+    (assert_study_one if name == "blend_length_jnd" else assert_study_two_or_three)(prepared, plan)
+    assert "EIA-0196217" in prepared.acknowledgement
+    uses = [use for record in prepared.records for use in (record.source, record.destination)]
+    assert all(use.file for use in uses)
+    # What was added to a clip is said in words, too.
+    for use in uses:
+        assert any("extended" in note for note in use.notes) == bool(use.added_before or use.added_after)
+    if name == "blend_length_jnd":
+        assert any(use.added_before or use.added_after for use in uses)
+
+
+@pytest.mark.mocap
+def test_the_demo_is_shown_on_cmu_clips(cmu):
+    shown_on("demo", cmu)
+
+
+def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path, synthetic):
+    """35 participants as in the paper; at each level the proportion is the truth's within its sampling error."""
+    from study.experiment.observer_models import population_different
+
+    protocol = published("demo")
+    prepared = prepare(protocol, synthetic)
+    with open_responses(tmp_path) as responses:
+        simulate(protocol, prepared, responses, 35, seed=1)
+        table = answers_frame(responses)
+    known = truth(protocol, default_observer())
+    jnd = table[(table["study"] == "jnd") & ~table["missed"]]
+    for difference, rows in jnd.groupby("difference_frames"):
+        chance = float(population_different(default_observer().same_different, int(difference)))
+        # 70 answers a level, not quite independent within participants: three and a half binomial errors.
+        error = (chance * (1 - chance) / len(rows)) ** 0.5
+        assert abs((rows["answer"] == "different").mean() - chance) < 3.5 * error + 0.01
+    favoured = table[table["study"] == "geodesic_vs_fixed"]["chose_a"].mean()
+    assert favoured == pytest.approx(known["studies"]["geodesic_vs_fixed"]["favouring_a"], abs=0.08)
