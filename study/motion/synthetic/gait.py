@@ -60,17 +60,18 @@ def running_share(speed: ArrayLike) -> FloatArray:
     return smooth_step(speed, *WALK_TO_RUN)
 
 
-def by_speed(what: str, speed: ArrayLike) -> FloatArray:
+def by_speed(what: str, speed: ArrayLike, running: ArrayLike | None = None) -> FloatArray:
     """A quantity of the tables above at `speed (...)` in m/s; angles in radians.
 
     Walking is interpolated and extended over its own knots, running over its own, and the two are mixed around the
-    change-over, so that no speed gets a mean of walking and running but those few.
+    change-over, so that no speed gets a mean of walking and running but those few. `running (...)` overrides how
+    much of each.
     """
     speed = np.asarray(speed, dtype=np.float64)
     table = _TABLES[what]
     walk = shape_preserving(speed, SPEEDS[:4], table[:4])
     run = shape_preserving(speed, SPEEDS[4:], table[4:])
-    run_share = running_share(speed)
+    run_share = running_share(speed) if running is None else np.asarray(running, dtype=np.float64)
     value = (1.0 - run_share) * walk + run_share * run
     return np.asarray(np.radians(value) if what in _IN_DEGREES else value)
 

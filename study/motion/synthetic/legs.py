@@ -22,7 +22,8 @@ from study.motion.synthetic.targets import bend_for, bent_length, hip_positions
 FloatArray = NDArray[np.float64]
 
 FOREVER = 1e6
-_STRAIGHTEST_STANCE = np.radians(5.0)
+_STRAIGHTEST_STANCE = np.radians(7.0)
+_STRAIGHTEST_SWING = np.radians(4.0)
 # The tips of the toes begin to carry the foot when the heel is this high, and the more the higher.
 _TOE_ROLL_FROM = np.radians(22.0)
 _TOE_ROLL = 0.75
@@ -188,7 +189,11 @@ def hip_height(
             flat_square = away[:, 0] ** 2 + away[:, 2] ** 2
             bend = np.maximum(stance_knee(c, times[inside]), _STRAIGHTEST_STANCE)
             length = bent_length(body.THIGH, body.SHANK, bend)
-            longest = bent_length(body.THIGH, body.SHANK, _STRAIGHTEST_STANCE)
+            # Knees meet and leave the floor bent, more so where all goes fast.
+            least = max(_STRAIGHTEST_STANCE, 0.75 * c.knee) + 0.05 * (
+                1.0 - smooth_step(progress(c, times[inside]), 0, 0.3)
+            )
+            longest = bent_length(body.THIGH, body.SHANK, least)
             total[inside] += bearing[inside, side] * (away[:, 1] + np.sqrt(np.maximum(length**2 - flat_square, 0.04)))
             reach = away[:, 1] + np.sqrt(np.maximum(longest**2 - flat_square, 0.04))
             limit[inside] = np.minimum(limit[inside], reach)
@@ -198,16 +203,19 @@ def hip_height(
     return height, limit, bearing
 
 
-def under_limit(height: FloatArray, limit: FloatArray, smoothing_s: float) -> FloatArray:
-    """A smooth height that stays under the limit: what rises above it is taken off smoothly around it."""
-    height = blur(height, smoothing_s)
-    for _ in range(8):
-        over = np.maximum(height - limit, 0.0)
-        if over.max() <= 1e-4:
-            break
-        spread = blur(over, smoothing_s)
-        height = height - spread * (over.max() / spread.max())
-    return height
+def under_limit(height: FloatArray, limit: FloatArray, spread_s: float = 0.08) -> FloatArray:
+    """The height, lowered smoothly around each place where it would rise above the limit.
+
+    What is too much is widened by `spread_s` both ways, then averaged over the same width, so that it takes off at
+    least as much as is needed everywhere.
+    """
+    reach = round(spread_s / GRID_STEP)
+    over = np.pad(np.maximum(height - limit, 0.0), 2 * reach, mode="edge")
+    if over.max() == 0.0:
+        return height
+    widest = np.lib.stride_tricks.sliding_window_view(over, 2 * reach + 1).max(axis=-1)
+    window = np.hanning(2 * reach + 3)[1:-1]
+    return np.asarray(height - np.convolve(widest, window / window.sum(), mode="valid"))
 
 
 def solve_legs(
@@ -283,7 +291,9 @@ def _swing(
     angle = angle + before.swing_reach * smooth_step(share, 0.3, 0.85) * (1.0 - smooth_step(share, 0.8, 1.0))
     lifted = 1.0 - smooth_step(share, 0.0, 0.45)
     level = smooth_step(share, 0.0, 0.3) * (1.0 - smooth_step(share, 0.75, 1.0))
-    polar = np.column_stack([np.clip(knee, 0.035, 2.4), angle, aside])
+    above = knee - _STRAIGHTEST_SWING
+    knee = _STRAIGHTEST_SWING + 0.5 * (above + np.hypot(above, 0.03))
+    polar = np.column_stack([np.minimum(knee, 2.4), angle, aside])
     ankle_bend = ankle_bend * (1.0 - level) + level * (0.02 - 0.12 * lifted)
     yaw = yaws[0] + (yaws[1] - yaws[0]) * smooth_step(share, 0.05, 0.95)
     angles = np.column_stack([yaw, ankle_bend + _shank_pitch(polar), np.zeros(count + 1)])

@@ -96,7 +96,7 @@ def travel(course: Course, rng: np.random.Generator) -> Targets:
     path = running_integral(speed[:, None] * np.column_stack([np.sin(course.heading), np.cos(course.heading)]))
     path = path - np.array([np.interp(0.0, times, path[:, axis]) for axis in range(2)])
     pull = blur(slope(slope(path)), 0.10)
-    support = path - 0.80 * (0.55 * body.STATURE / GRAVITY) * pull
+    support = path - 0.60 * (0.55 * body.STATURE / GRAVITY) * pull
     phase = _phase(course, person)
     contacts = _contacts(course, person, phase, pace, support, rng)
     return _whole_body(course, person, rng, pace, path, pull, phase, contacts)
@@ -227,7 +227,8 @@ def _whole_body(
     times, heading = course.times, course.heading
     turn = 2 * np.pi * phase
     moving = np.clip(pace / 0.5, 0.0, 1.0)
-    running = gait.running_share(pace)
+    # The body changes from walking to running less abruptly than the feet.
+    running = blur(gait.running_share(pace), 0.16)
     ahead = np.column_stack([np.sin(heading), np.cos(heading)])
     aside = np.column_stack([np.cos(heading), -np.sin(heading)])
     lean_ahead = np.sum(pull * ahead, axis=1) / GRAVITY
@@ -235,7 +236,7 @@ def _whole_body(
 
     # Over the bearing foot sideways (most in mid-stance, near 31 % of the cycle); quickest in double support.
     stance = gait.by_speed("stance", pace)
-    sway = gait.by_speed("sway", pace) * moving * np.cos(turn - np.pi * stance)
+    sway = gait.by_speed("sway", pace, running) * moving * np.cos(turn - np.pi * stance)
     surge = 0.006 * moving * np.sin(2 * turn - 0.6) * (1 - 0.5 * running)
     ground = path + sway[:, None] * aside + surge[:, None] * ahead
     wander = slow_noise(rng, times, 0.004, 2, (0.1, 0.5))
@@ -245,10 +246,14 @@ def _whole_body(
         ground = ground + _first_shift(course.start, person, times)[:, None] * aside
 
     # The side of the leading leg goes forward; the side of the swinging leg sinks after toe-off.
-    pelvis_yaw = heading - gait.by_speed("pelvis_yaw", pace) * np.cos(turn - 0.2 + 0.5 * running)
-    roll = gait.by_speed("pelvis_list", pace) * np.cos(turn - 2 * np.pi * (0.14 + 0.02 * running))
+    pelvis_yaw = heading - gait.by_speed("pelvis_yaw", pace, running) * np.cos(turn - 0.2 + 0.5 * running)
+    roll = gait.by_speed("pelvis_list", pace, running) * np.cos(turn - 2 * np.pi * (0.14 + 0.02 * running))
     bank = -0.35 * np.arctan(lean_aside)
-    pitch = gait.by_speed("pelvis_pitch", pace) + 0.018 * moving * np.cos(2 * turn - 0.8) + 0.4 * np.arctan(lean_ahead)
+    pitch = (
+        gait.by_speed("pelvis_pitch", pace, running)
+        + 0.018 * moving * np.cos(2 * turn - 0.8)
+        + 0.4 * np.arctan(lean_ahead)
+    )
     pelvis_angles = np.column_stack([pelvis_yaw, pitch, roll + bank])
 
     level = np.column_stack([ground[:, 0], np.zeros(len(times)), ground[:, 1]])
@@ -297,11 +302,11 @@ def _height(
     """
     walking, limit, _ = hip_height(contacts, times, level, pelvis_angles)
     running = gait.running_share(pace)
-    swing = 1.15 * person.bounce * GRAVITY / (4 * np.pi * gait.stride_rate(pace)) ** 2
+    swing = 0.98 * person.bounce * GRAVITY / (4 * np.pi * gait.stride_rate(pace)) ** 2
     stance = gait.by_speed("stance", pace)
-    middle = 0.860 - 0.006 * (pace - 3.3)
+    middle = 0.851 - 0.008 * (pace - 3.3)
     bounce = middle - swing * np.cos(4 * np.pi * (phase - 0.5 * stance))
-    return under_limit((1 - running) * blur(walking, 0.045) + running * bounce, limit, 0.045)
+    return under_limit((1 - running) * blur(walking, 0.045) + running * bounce, limit)
 
 
 def _trunk(
@@ -316,13 +321,13 @@ def _trunk(
     lean_aside: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Chest and head in the world: the chest turns against the pelvis, the head holds still and leads a turn."""
-    running = gait.running_share(pace)
+    running = blur(gait.running_share(pace), 0.16)
     sway = slow_noise(rng, times, np.radians(0.7), 3)
-    yaw_swing = gait.by_speed("chest_yaw", pace) * np.cos(turn - 0.35)
+    yaw_swing = gait.by_speed("chest_yaw", pace, running) * np.cos(turn - 0.35)
     # The head looks into a turn a third of a second before the body goes there (Grasso et al. 1998).
     ahead = blur(np.interp(times + 0.32, times, course.heading), 0.12)
     chest_yaw = 0.75 * course.heading + 0.25 * ahead + yaw_swing + sway[:, 0]
-    pitch = gait.by_speed("chest_pitch", pace) + person.lean + 0.9 * np.arctan(lean_ahead) + sway[:, 1]
+    pitch = gait.by_speed("chest_pitch", pace, running) + person.lean + 0.9 * np.arctan(lean_ahead) + sway[:, 1]
     pitch = pitch + np.radians(1.2) * np.clip(pace / 1.3, 0, 1.5) * np.cos(2 * turn - 1.2)
     chest_roll = -0.25 * roll - 0.75 * np.arctan(lean_aside) + sway[:, 2]
     chest = np.column_stack([chest_yaw, pitch, chest_roll])
@@ -340,24 +345,24 @@ def _arms(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Arms swing against the legs of their side; the elbow bends more in front, and follows a little later."""
     n = len(times)
-    running = gait.running_share(pace)
+    running = blur(gait.running_share(pace), 0.16)
     arms, wrists, collars = np.zeros((n, 2, 4)), np.zeros((n, 2, 2)), np.zeros((n, 2, 2))
     for side in (LEFT, RIGHT):
         drift = slow_noise(rng, times, 1.0, 4)
         own = turn - np.pi * side
         forward = -np.cos(own - 0.30 + 0.15 * running)
         scale = person.arm_scale[side] * (1.0 + 0.06 * drift[:, 0])
-        swing = gait.by_speed("arm_swing", pace) * scale
+        swing = gait.by_speed("arm_swing", pace, running) * scale
         # The swing forward is quicker than the swing back.
         wave = forward + 0.07 * np.cos(2 * own - 0.4)
-        arms[:, side, 0] = gait.by_speed("arm_mean", pace) + swing * wave + np.radians(1.2) * drift[:, 1]
-        arms[:, side, 1] = gait.by_speed("abduction", pace) - np.radians(4.0) * running * forward
+        arms[:, side, 0] = gait.by_speed("arm_mean", pace, running) + swing * wave + np.radians(1.2) * drift[:, 1]
+        arms[:, side, 1] = gait.by_speed("abduction", pace, running) - np.radians(4.0) * running * forward
         arms[:, side, 1] += np.radians(0.8) * drift[:, 2]
         # Turned in, so that the forearm comes across in front, more in running.
         arms[:, side, 2] = -np.radians(12.0 - 4.0 * running) - np.radians(5.0) * running * forward
         late = -np.cos(own - 0.62 + 0.3 * running)
-        bend = gait.by_speed("elbow_swing", pace) * scale * (late + 0.12 * np.cos(2 * own))
-        arms[:, side, 3] = gait.by_speed("elbow_mean", pace) + bend + np.radians(1.5) * drift[:, 3]
+        bend = gait.by_speed("elbow_swing", pace, running) * scale * (late + 0.12 * np.cos(2 * own))
+        arms[:, side, 3] = gait.by_speed("elbow_mean", pace, running) + bend + np.radians(1.5) * drift[:, 3]
         wrists[:, side, 0] = np.radians(35.0 + 10.0 * running)
         wrists[:, side, 1] = np.radians(10.0) + np.radians(3.0) * moving * np.cos(own - 1.0)
         collars[:, side, 0] = OUTWARD[side] * person.shoulder_drop + np.radians(2.0) * running

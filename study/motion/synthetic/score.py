@@ -153,7 +153,7 @@ def perform(score: Score, rng: np.random.Generator, *, stature_hips: float = 0.9
 
     level = np.column_stack([ground[:, 0], np.zeros(n), ground[:, 1]])
     _, limit, _ = hip_height(sides, times, level, pelvis, pivots)
-    level[:, 1] = under_limit(stature_hips - score.crouch.values[:, 0], limit, 0.05)
+    level[:, 1] = under_limit(stature_hips - score.crouch.values[:, 0], limit, 0.12)
     ankles, feet, toes = solve_legs(sides, times, level, pelvis, heading, pivots)
     hands = np.stack([_hand(score, side, heading, chest, rng, unrest) for side in (LEFT, RIGHT)], axis=1)
     return Targets(
