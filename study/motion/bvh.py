@@ -344,16 +344,16 @@ def _assemble(
 
 
 def _rotations(joints: list[_Joint], values: FloatArray) -> FloatArray:
-    """Local rotations `(frames, joints, 4)`; joints with the same order of axes are turned at once."""
+    """Local rotations `(frames, joints, 4)`; joint by joint, which keeps what is at work in the processor's cache."""
     by_channel = np.ascontiguousarray(values.T)
     rotations = np.empty((4, len(joints), len(values)))
-    groups: dict[str, list[int]] = {}
     for j, joint in enumerate(joints):
-        groups.setdefault("".join(axis for _, axis in joint.columns("rotation")), []).append(j)
-    for order, members in groups.items():
-        columns = np.array([[c for c, _ in joints[j].columns("rotation")] for j in members], dtype=np.int64)
-        angles = np.radians(by_channel[columns.T])
-        rotations[:, members] = quat.from_euler_parts(order, angles) if order else quat.IDENTITY[:, None, None]
+        turns = joint.columns("rotation")
+        if turns:
+            angles = np.radians(by_channel[[column for column, _ in turns]])
+            rotations[:, j] = quat.from_euler_parts("".join(axis for _, axis in turns), angles)
+        else:
+            rotations[:, j] = quat.IDENTITY[:, None]
     return rotations.transpose(2, 1, 0)
 
 
