@@ -157,3 +157,17 @@ def test_every_key_is_described_and_stands_in_the_documentation(repository):
 
     document = (repository / "docs" / "protocols.md").read_text()
     assert key_tables() in document, "run `python -m study.experiment.protocol_keys` and paste its tables"
+
+
+def test_an_installed_package_carries_its_protocols(tmp_path, monkeypatch):
+    """The wheel has them in `study/protocols`; the repository beside `study`."""
+    from study.experiment import protocol
+
+    package = tmp_path / "study"
+    (package / "experiment").mkdir(parents=True)
+    monkeypatch.setattr(protocol, "__file__", str(package / "experiment" / "protocol.py"))
+    with pytest.raises(ProtocolError, match="Expected the protocols that come with Segue in"):
+        protocols_folder()
+    (package / "protocols").mkdir()
+    (package / "protocols" / "demo.toml").write_text(GOOD)
+    assert find_protocol("demo") == package / "protocols" / "demo.toml"
