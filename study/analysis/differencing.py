@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-Kind = Literal["different_75", "guess_corrected_75", "criterion_free_75"]
-KINDS: tuple[Kind, ...] = ("different_75", "guess_corrected_75", "criterion_free_75")
+Kind = Literal["different", "guess_corrected", "criterion_free"]
+KINDS: tuple[Kind, ...] = ("different", "guess_corrected", "criterion_free")
 
 ROOT_TWO = float(np.sqrt(2.0))
 LARGEST_LAPSE = 0.1
@@ -211,7 +211,7 @@ def _step(
 
 
 @cache
-def criterion_free_delta(correct: float = 0.75) -> float:
+def criterion_free_delta(correct: float) -> float:
     """Return the d-prime at which an observer with the best criterion is right in this share of the pairs.
 
     Half of the pairs have no difference, half have this one (Macmillan & Creelman 2005, p. 222: the greatest share of
@@ -228,17 +228,19 @@ def criterion_free_delta(correct: float = 0.75) -> float:
     return float(brentq(lambda delta: best(delta) - correct, 0.1, 10.0, xtol=1e-10))
 
 
-def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind) -> FloatArray:
+def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind, level: float = 0.75) -> FloatArray:
     """Return the d-prime at threshold, shape (fits,).
 
-    `different_75`: 75% of the answers are "different". `guess_corrected_75`: 75% after Abbott's correction,
-    (p - f) / (1 - f), for the share f of "different" at no difference. `criterion_free_75`: `criterion_free_delta`.
+    `different`: this share of the answers is "different". `guess_corrected`: it is so after Abbott's correction,
+    (p - f) / (1 - f), for the share f of "different" at no difference. `criterion_free`: `criterion_free_delta`.
     0 where the pairs with no difference are above it already, infinite where the lapses keep the curve below it.
     """
-    if kind == "criterion_free_75":
-        return np.full(len(criterion), criterion_free_delta())
+    if kind == "criterion_free" and level <= 0.5:
+        return np.zeros(len(criterion))  # guessing gets as many right
+    if kind == "criterion_free":
+        return np.full(len(criterion), criterion_free_delta(level))
     alarms = lapse / 2 + (1 - lapse) * detected(np.zeros(1), criterion)
-    target = np.full(len(criterion), 0.75) if kind == "different_75" else alarms + 0.75 * (1 - alarms)
+    target = np.full(len(criterion), level) if kind == "different" else alarms + level * (1 - alarms)
     low, high = np.zeros(len(criterion)), np.full(len(criterion), WIDEST_DELTA)
     for _ in range(60):
         middle = (low + high) / 2
@@ -248,9 +250,9 @@ def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind) -> Flo
     return np.asarray(np.where(target >= 1 - lapse / 2, np.inf, found), dtype=np.float64)
 
 
-def threshold_frames(fits: Fits, kind: Kind = "different_75") -> FloatArray:
+def threshold_frames(fits: Fits, kind: Kind = "different", level: float = 0.75) -> FloatArray:
     """Return the threshold of every slope in frames, shape (fits, slopes); infinite where it is never reached."""
-    delta = threshold_delta(fits.criterion, fits.lapse, kind)[:, None]
+    delta = threshold_delta(fits.criterion, fits.lapse, kind, level)[:, None]
     return np.asarray(np.where(np.isfinite(delta), delta / fits.slopes, np.inf), dtype=np.float64)
 
 
@@ -282,12 +284,12 @@ def covariance(fits: Fits, frames: FloatArray, different: FloatArray, shown: Flo
     return result
 
 
-def log_threshold_gradient(fits: Fits, kind: Kind) -> FloatArray:
+def log_threshold_gradient(fits: Fits, kind: Kind, level: float = 0.75) -> FloatArray:
     """Return derivatives of the log threshold by log criterion, lapse and log slopes, shape (slopes, 2 + slopes)."""
     step = 1e-5
     criterion = fits.criterion[0] * np.exp(np.array([step, -step, 0, 0]))
     lapse = fits.lapse[0] + np.array([0, 0, step, -step])
-    log_delta = np.log(threshold_delta(criterion, lapse, kind))
+    log_delta = np.log(threshold_delta(criterion, lapse, kind, level))
     slopes = fits.slopes.shape[1]
     gradient = np.zeros((slopes, 2 + slopes))
     gradient[:, 0] = (log_delta[0] - log_delta[1]) / (2 * step)

@@ -39,7 +39,7 @@ def analyse_jnd(
     answers
         Of one study.
     level
-        Share of "different" at the threshold read off the percentages; the model's thresholds are at 75%.
+        Share of "different" at threshold.
     confidence, resamples, seed
         Of the intervals, and of the bootstrap behind the standard errors.
 
@@ -54,7 +54,7 @@ def analyse_jnd(
     rng = np.random.default_rng(seed)
     counts = count_answers(answers)
     published = crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng)
-    fitted = fit_model(counts, confidence=confidence)
+    fitted = fit_model(counts, level=level, confidence=confidence)
     moved = counts.differences != 0
     given = same_different_answers(answers)
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
@@ -107,7 +107,7 @@ def _by_motion(
     rows = []
     for motion, part in given.groupby(given["motion"].astype(str), sort=False):
         counts = count_answers(part)
-        fitted = fit_model(counts, confidence=confidence)
+        fitted = fit_model(counts, level=level, confidence=confidence)
         moved = counts.differences != 0
         shown, different = counts.shown[:, moved].sum(), counts.different[:, moved].sum()
         rows.append(

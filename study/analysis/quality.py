@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 FASTEST_S = 0.2
 MANY_MISSED = 0.1
 MANY_FAST = 0.1
-LONG_RUN = 12
+LONG_RUN = 20
+FEWEST_FOR_UNIFORM = 8
 
 
 def _longest_run(answers: list[str]) -> int:
@@ -87,7 +88,7 @@ def _flags(row: dict[str, Any], given: pd.DataFrame, fastest_s: float) -> list[s
         flags.append(f"{row['longest_run']} times the same answer in a row")
     tasks = given["task"] if "task" in given else ["answers"] * len(given)
     for task, part in given.groupby(tasks):
-        if len(part) >= LONG_RUN / 2 and part["answer"].nunique() == 1:
+        if len(part) >= FEWEST_FOR_UNIFORM and part["answer"].nunique() == 1:
             flags.append(f'always "{part["answer"].iloc[0]}" ({task})')
     return flags
 

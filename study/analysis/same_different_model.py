@@ -33,13 +33,15 @@ class ModelFit:
         Share of "different" that the model gives to pairs with no difference.
     slopes
         d-prime a frame, by side.
+    level
+        Share at threshold in what follows, usually 0.75.
     jnd
-        75% "different", by side.
+        That share "different", by side.
     corrected
-        The difference at which an observer with the best criterion is right in 75% of the pairs, by side: what the
-        sensitivity allows, whatever the criterion.
+        The difference at which an observer with the best criterion is right in that share of the pairs, by side: what
+        the sensitivity allows, whatever the criterion.
     guess_corrected
-        75% after Abbott's correction for the false alarms, by side.
+        That share after Abbott's correction for the false alarms, by side.
     equal_slopes
         Tests of one slope for both sides: likelihood ratio (answers as independent), t (participants as independent).
     fit_deviance, fit_degrees_of_freedom, fit_p_value
@@ -55,6 +57,7 @@ class ModelFit:
     lapse: float
     false_alarms: float
     slopes: dict[str, float]
+    level: float
     jnd: dict[str, Threshold]
     corrected: dict[str, Threshold]
     guess_corrected: dict[str, Threshold]
@@ -72,7 +75,11 @@ def _frames_by_side(differences: FloatArray) -> FloatArray:
 
 
 def fit_model(
-    counts: Counts, *, confidence: float = 0.95, largest_lapse: float = model.LARGEST_LAPSE
+    counts: Counts,
+    *,
+    level: float = 0.75,
+    confidence: float = 0.95,
+    largest_lapse: float = model.LARGEST_LAPSE,
 ) -> ModelFit | str:
     """Fit the differencing model; a sentence that says why where it can't be fitted.
 
@@ -80,6 +87,8 @@ def fit_model(
     ----------
     counts
         Answers.
+    level
+        Share of "different", or of right answers, at threshold; above one half.
     confidence
         Of the intervals.
     largest_lapse
@@ -101,7 +110,7 @@ def fit_model(
     sides = [index for index in range(2) if both[:, index].any()]
     frames, total = both[:, sides], (different.sum(axis=0)[None], shown.sum(axis=0)[None])
     best = model.fit(frames, *total, largest_lapse=largest_lapse)
-    spread = _spread_of(best, frames, different, shown, largest_lapse)
+    spread = _spread_of(level, best, frames, different, shown, largest_lapse)
     thresholds = {kind: _thresholds(best, spread, frames, sides, kind, confidence) for kind in model.KINDS}
     deviance = max(2 * (_saturated_log_likelihood(*total) - float(best.log_likelihood[0])), 0.0)
     freedom = len(differences) - 2 - len(sides)
@@ -114,9 +123,10 @@ def fit_model(
         lapse=float(best.lapse[0]),
         false_alarms=float(alarms[0, 0]),
         slopes={SIDES[side]: float(best.slopes[0, place]) for place, side in enumerate(sides)},
-        jnd=thresholds["different_75"],
-        corrected=thresholds["criterion_free_75"],
-        guess_corrected=thresholds["guess_corrected_75"],
+        level=level,
+        jnd=thresholds["different"],
+        corrected=thresholds["criterion_free"],
+        guess_corrected=thresholds["guess_corrected"],
         equal_slopes=_equal_slopes(best, spread, frames, total, largest_lapse) if len(sides) == 2 else None,
         fit_deviance=deviance,
         fit_degrees_of_freedom=freedom,
@@ -131,15 +141,16 @@ class _Spread:
     """How far a fit scatters: fits with one participant left out at a time, or the covariance for one participant."""
 
     participants: int
+    level: float
     left_out: model.Fits | None
     covariance: FloatArray
 
     def log_threshold_error(self, best: model.Fits, kind: model.Kind, place: int) -> float | None:
         """Standard error of the log threshold of one slope; None where it can't be told."""
         if self.left_out is not None:
-            others = model.threshold_frames(self.left_out, kind)[:, place]
+            others = model.threshold_frames(self.left_out, kind, self.level)[:, place]
             return estimates.jackknife_error(np.log(others)) if (others > 0).all() else None
-        gradient = model.log_threshold_gradient(best, kind)[place]
+        gradient = model.log_threshold_gradient(best, kind, self.level)[place]
         return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
 
     def criterion_error(self, best: model.Fits) -> float | None:
@@ -150,15 +161,15 @@ class _Spread:
 
 
 def _spread_of(
-    best: model.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, largest_lapse: float
+    level: float, best: model.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, largest_lapse: float
 ) -> _Spread:
     answered = shown.sum(axis=1) > 0
     different, shown = different[answered], shown[answered]
     count = len(shown)
     if count < FEWEST_FOR_INTERVAL:
-        return _Spread(count, None, model.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
+        return _Spread(count, level, None, model.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
     others = (different.sum(axis=0) - different, shown.sum(axis=0) - shown)
-    return _Spread(count, model.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
+    return _Spread(count, level, model.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
 
 
 def _why_no_fit(counts: Counts) -> str:
@@ -212,13 +223,13 @@ def _threshold(
     side, clustered = SIDES[index], spread.left_out is not None
     who = "jackknife over participants" if clustered else "one participant, answers as independent"
     method = f"differencing model; Student interval of the logarithm, {who}"
-    found = float(model.threshold_frames(best, kind)[0, place])
+    found = float(model.threshold_frames(best, kind, spread.level)[0, place])
     interval = estimates.Interval(None, None, confidence)
     if best.held[0, 2 + place]:
         note = "the slope stands at the bound of its range"
         return Threshold(side, None, None, interval, "not estimable", method, note)
     if found <= 0:
-        note = "above 75% already where there is no difference"
+        note = f"above {100 * spread.level:g}% already where there is no difference"
         return Threshold(side, None, None, interval, "above", method, note)
     error = spread.log_threshold_error(best, kind, place) if math.isfinite(found) else None
     if error is not None:

@@ -34,7 +34,7 @@ def analyse(
         One row an answer: `participant`, `task`, `study`, `answer`, and the columns that the tasks need (see
         `docs/analysis.md`). Missed answers have no `answer`.
     threshold
-        Share of "different" that defines the just noticeable difference read off the percentages.
+        Share of "different" that defines the just noticeable difference; above one half.
     confidence
         Of all intervals.
     alpha

@@ -235,8 +235,8 @@ def _shown_sentence(manifest: Manifest) -> str:
     )
     motions = "a synthetic library" if manifest.synthetic else f"the library {manifest.library}"
     text = (
-        f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} from {motions}, "
-        f"{manifest.size[0]} × {manifest.size[1]} pixels at {manifest.fps:g} frames per second."
+        f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} from {motions}, {manifest.size[0]} × "
+        f"{manifest.size[1]} pixels at {manifest.fps:g} frames per second."
     )
     if extended:
         text += (

@@ -71,7 +71,7 @@ def same_different_figure(result: Result, name: str, mark: str) -> str:
             across, up = zip(*model["curve"], strict=True)
             axes.plot(across, up, color=BLUE, linewidth=1.8, zorder=3)
             for threshold in model["jnd"].values():
-                _model_threshold(axes, threshold, 0.75, label=True)
+                _model_threshold(axes, threshold, result["level"], label=True)
         axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
         axes.set_ylabel("answers “different”")
         _key(axes, bool(model))
@@ -87,7 +87,7 @@ def _key(axes: Axes, with_model: bool) -> None:
                markersize=4.5, label="mean ± standard error over participants"),
     ]  # fmt: skip
     if with_model:
-        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label="differencing model, 75% points with interval"))
+        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label="differencing model, thresholds with interval"))
     axes.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8.5, labelcolor=SOFT)
 
 
@@ -109,7 +109,7 @@ def motions_figure(result: Result, name: str, mark: str) -> str:
                 across, up = zip(*motion["model"]["curve"], strict=True)
                 axes.plot(across, up, color=BLUE, linewidth=1.5, zorder=3)
                 for threshold in motion["model"]["jnd"].values():
-                    _model_threshold(axes, threshold, 0.75, label=False)
+                    _model_threshold(axes, threshold, result["level"], label=False)
             axes.set_title(_readable(motion["motion"]))
         for axes in grid.flat[len(motions) :]:
             axes.set_axis_off()
@@ -148,7 +148,7 @@ def thresholds_figure(result: Result, name: str, mark: str, known: Mapping[str, 
         if ticks:
             axes.set_xlim(min(*ticks, -1) * 1.02, max(*ticks, 1) * 1.02)
             axes.set_xticks(ticks, [f"{tick:+.0f}".replace("-", "−") if tick else "k" for tick in ticks])
-        axes.set_xlabel("75% “different”, frames from k")
+        axes.set_xlabel(f"{100 * result['level']:.0f}% “different”, frames from k")
         _threshold_key(axes, bool(known))
         add_mark(figure, mark)
         return to_svg(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries))

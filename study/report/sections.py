@@ -69,14 +69,14 @@ def jnd_section(
     drawings = [
         Drawing(
             figures.same_different_figure(result, f"{anchor}-curve", mark),
-            "Answers “different” by the difference in blend length from k, the length that the reference method gives. "
-            "Points are means over participants with one standard error; dashed lines join them, as in 2004. The blue "
-            "curve is the model, its drop lines the 75% points, the bars at their feet 95% intervals.",
+            "Answers “different” by the difference in blend length from k, the length that the reference method "
+            "gives. Points are means over participants with one standard error; dashed lines join them, as in 2004. "
+            "The blue curve is the model, its drop lines the thresholds, the bars at their feet 95% intervals.",
         ),
         Drawing(
             figures.thresholds_figure(result, f"{anchor}-thresholds", mark, truth),
-            "The just noticeable difference with 95% intervals, over participants. Where there is no bar, the interval "
-            "reaches beyond the levels shown.",
+            "The just noticeable difference with 95% intervals, over participants. Where there is no bar, the "
+            "interval reaches beyond the levels shown.",
         ),
     ]
     if len(result["motions"]) > 1:
@@ -116,10 +116,10 @@ _THRESHOLD_COLUMNS: tuple[tuple[str, str, tables.Kind], ...] = (
 
 
 def _threshold_rows(entry: Result, fps: float) -> list[dict[str, Any]]:
-    kinds = [("75% “different”, straight lines (as published)", entry["published"])]
+    kinds = [("straight lines (as published)", entry["published"])]
     if entry["model"]:
-        kinds.append(("75% “different”, model", entry["model"]["jnd"]))
-        kinds.append(("75% right, best criterion (model)", entry["model"]["corrected"]))
+        kinds.append(("model", entry["model"]["jnd"]))
+        kinds.append(("best criterion (model)", entry["model"]["corrected"]))
     rows = []
     for label, thresholds in kinds:
         for side in ("longer", "shorter"):
@@ -143,12 +143,13 @@ def _threshold_rows(entry: Result, fps: float) -> list[dict[str, Any]]:
 
 def threshold_table(name: str, result: Result, fps: float) -> Table:
     """Return the thresholds as published and corrected."""
+    percent = f"{100 * result['level']:.0f}%"
     caption = (
-        "The just noticeable difference, as published and corrected. The first reading moves with the rate of false "
-        "alarms "
-        "and cuts the corners of the curve; the second follows the curve; the third is the difference at which an "
-        "observer with the best criterion would be right in 75% of same and different pairs, whatever the criterion "
-        "people took. Intervals are over participants; a dash where they reach beyond the levels shown."
+        f"The just noticeable difference, as published and corrected. Straight lines: where {percent} of the answers "
+        "are “different”, read off between the levels; this moves with the rate of false alarms and cuts the corners "
+        f"of the curve. Model: the same {percent} on the fitted curve. Best criterion: the difference at which an "
+        f"observer with the best criterion would be right in {percent} of same and different pairs, whatever the "
+        "criterion people took. Intervals are over participants; a dash where they reach beyond the levels shown."
     )
     rows = _threshold_rows(result, fps)
     columns = [column for column in _THRESHOLD_COLUMNS if column[0] != "remark" or any(row["remark"] for row in rows)]
@@ -166,7 +167,13 @@ def motion_threshold_table(name: str, result: Result, fps: float) -> Table:
         ("answers", "answers", "count"),
         *_THRESHOLD_COLUMNS,
     ]
-    return tables.make(f"{name}_thresholds_by_motion", "Thresholds for every motion by itself.", columns, rows)
+    return tables.make(
+        f"{name}_thresholds_by_motion",
+        "Thresholds for every motion by itself, in frames.",
+        columns,
+        rows,
+        files_only=("answers", "seconds", "remark"),
+    )
 
 
 def percent_table(name: str, result: Result) -> Table:
@@ -174,8 +181,7 @@ def percent_table(name: str, result: Result) -> Table:
     return tables.make(
         f"{name}_percent_different",
         "Answers “different” by difference in blend length. Mean and standard error over participants; Wilson’s "
-        "interval "
-        "of the answers as if independent.",
+        "interval of the answers as if independent.",
         [
             ("difference_frames", "frames from k", "count"),
             ("participants", "participants", "count"),
@@ -195,8 +201,7 @@ def d_prime_table(name: str, result: Result) -> Table:
     return tables.make(
         f"{name}_d_prime",
         "Sensitivity at every level under the differencing rule, against the pairs without a difference. Answers "
-        "pooled, "
-        "taken as independent; one half added to each count.",
+        "pooled, taken as independent; one half added to each count.",
         [
             ("difference_frames", "frames from k", "count"),
             ("d_prime", "d-prime", "two"),
@@ -236,8 +241,8 @@ def recovery_table(name: str, result: Result, known: Result) -> Table:
             )
     return tables.make(
         f"{name}_recovery",
-        "What the simulated observers had and what was found, in frames. For straight lines the known value is "
-        "where they would cross with endless data.",
+        "What the simulated observers had and what was found, in frames. For straight lines the known value is where "
+        "they would cross with endless data.",
         [
             ("estimate", "estimate", "text"),
             ("side", "blend is", "text"),
@@ -265,8 +270,7 @@ def preference_section(name: str, title: str, comparisons: Sequence[Result], *, 
             Drawing(
                 svg,
                 "Answers that favoured the first method, for every motion pair with Wilson’s 95% interval; below, all "
-                "answers "
-                "as if independent, and the mean over participants with its interval.",
+                "answers as if independent, and the mean over participants with its interval.",
             )
         )
         shown.append(preference_table(name + suffix, comparison))
@@ -310,8 +314,8 @@ def preference_table(name: str, comparison: Result) -> Table:
     ]
     return tables.make(
         f"{name}_preference",
-        f"Percent favouring {words.readable(comparison['method_a'])} over {words.readable(comparison['method_b'])}, as "
-        "published and corrected. The published test takes all answers as independent; a participant’s answers are "
+        f"Percent favouring {words.readable(comparison['method_a'])} over {words.readable(comparison['method_b'])}, "
+        "as published and corrected. The published test takes all answers as independent; a participant’s answers are "
         "not.",
         [
             ("reading", "reading", "text"),
@@ -331,8 +335,8 @@ def preference_motion_table(name: str, comparison: Result) -> Table:
     rows = [{**row, "motion": words.readable(row["motion"])} for row in comparison["motions"]]
     return tables.make(
         f"{name}_preference_by_motion",
-        "For every motion pair: Wilson’s 95% interval, chi-square(1) as published, exact binomial test, and the latter "
-        "adjusted over the motions by Holm’s method.",
+        "For every motion pair: Wilson’s 95% interval, chi-square(1) as published, exact binomial test, and the "
+        "latter adjusted over the motions by Holm’s method.",
         [
             ("motion", "motion", "text"),
             ("favouring", "favouring", "count"),
@@ -388,7 +392,7 @@ def stimulus_table(manifest: Manifest) -> Table:
     """Return every stimulus: method, lengths, motions and their files, extension, hash."""
     rows = [
         {
-            "id": record.id[:12],
+            "id": record.id,
             "transition": words.readable(record.transition),
             "category": record.category,
             "method": record.method,
@@ -406,8 +410,7 @@ def stimulus_table(manifest: Manifest) -> Table:
     return tables.make(
         "stimuli",
         "Every stimulus. k is the length that the method gives; the blend is k and the difference. Motions are named "
-        "with "
-        "their file and the frame at which the blend starts or ends.",
+        "with their file and the frame at which the blend starts or ends.",
         [
             ("transition", "transition", "text"),
             ("method", "method", "text"),
@@ -422,6 +425,7 @@ def stimulus_table(manifest: Manifest) -> Table:
             ("id", "hash", "text"),
         ],
         rows,
+        files_only=("notes", "frames", "id", *(() if any(row["extension"] for row in rows) else ("extension",))),
     )
 
 
@@ -436,7 +440,7 @@ def _extension(record: Any) -> str:
         added = use.added_before + use.added_after
         if added:
             parts.append(f"{label} {added} frames" + (f" ({'; '.join(use.notes)})" if use.notes else ""))
-    return "; ".join(parts) or "–"
+    return "; ".join(parts)
 
 
 def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
@@ -458,13 +462,14 @@ def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
             ("trials", "asked", "count"),
             ("answered", "answered", "count"),
             ("missed", "missed", "count"),
-            ("median_response_s", "median response, s", "two"),
+            ("median_response_s", "median time, s", "two"),
             ("too_fast", "too fast", "count"),
             ("false_alarms", "false alarms", "count"),
             ("same_pairs", "of same pairs", "count"),
             ("flags", "flags", "text"),
         ],
         rows,
+        files_only=("too_fast",) if analysis["data"] == "mixed" else ("too_fast", "kind"),
     )
 
 

@@ -10,16 +10,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+LONGEST_SHORT = 30
+"""Longer text may break into lines."""
+
 Kind = Literal["text", "count", "one", "two", "three", "percent", "p"]
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its key in the rows, its heading, and how its values are written."""
+    """A column: its key in the rows, its heading, how its values are written, and whether the page shows it."""
 
     key: str
     heading: str
     kind: Kind = "text"
+    shown: bool = True
 
     @property
     def numeric(self) -> bool:
@@ -37,12 +41,19 @@ class Table:
     rows: tuple[Mapping[str, Any], ...]
 
     @property
-    def cells(self) -> list[list[tuple[str, bool]]]:
-        """What the page shows: text, and whether it is a number."""
-        return [
-            [(written(row.get(column.key), column.kind), column.numeric) for column in self.columns]
-            for row in self.rows
-        ]
+    def shown(self) -> tuple[Column, ...]:
+        """The columns that the page shows; the files have all of them."""
+        return tuple(column for column in self.columns if column.shown)
+
+    @property
+    def cells(self) -> list[list[tuple[str, str]]]:
+        """What the page shows: text and its class (number, short or long)."""
+        return [[_cell(row.get(column.key), column) for column in self.shown] for row in self.rows]
+
+
+def _cell(value: Any, column: Column) -> tuple[str, str]:
+    text = written(value, column.kind)
+    return text, "number" if column.numeric else "short" if len(text) <= LONGEST_SHORT else "long"
 
 
 def written(value: Any, kind: Kind) -> str:
@@ -87,6 +98,15 @@ def as_json(table: Table) -> str:
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def make(name: str, caption: str, columns: Sequence[tuple[str, str, Kind]], rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return a table from plain column tuples (key, heading, kind)."""
-    return Table(name, caption, tuple(Column(*column) for column in columns), tuple(rows))
+def make(
+    name: str,
+    caption: str,
+    columns: Sequence[tuple[str, str, Kind]],
+    rows: Sequence[Mapping[str, Any]],
+    *,
+    files_only: Sequence[str] = (),
+) -> Table:
+    """Return a table from plain column tuples (key, heading, kind); `files_only` names columns the page leaves out."""
+    return Table(
+        name, caption, tuple(Column(*column, shown=column[0] not in files_only) for column in columns), tuple(rows)
+    )

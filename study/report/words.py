@@ -87,8 +87,8 @@ def jnd_headline(result: Result, fps: float, data: str) -> tuple[str, str]:
     """Return the just noticeable difference as a short statement and a line of detail."""
     model = result["model"]
     chosen = model["jnd"] if model else result["published"]
-    statement = joined([_side_in_words(chosen.get(side), side, fps) for side in ("longer", "shorter")])
-    percent = f"{100 * (0.75 if model else result['level']):.0f}%"
+    statement = ", or ".join(_side_in_words(chosen.get(side), side, fps) for side in ("longer", "shorter"))
+    percent = f"{100 * result['level']:.0f}%"
     subject = {"collected": "People", "simulated": "Simulated observers", "mixed": "The observers", "none": "Nobody"}
     lead = f"{subject[data]} called {percent} of pairs different where the blend was {statement}."
     if not model:
@@ -127,8 +127,8 @@ def jnd_notes(result: Result) -> list[str]:
     if model:
         fit = model["fit_p_value"]
         notes.append(
-            f"Pairs without any difference were called different in {100 * model['false_alarms']:.1f}% (model). "
-            f"The criterion is {model['criterion']:.2f} standard deviations of one impression, the lapse rate "
+            f"Pairs without any difference were called different in {100 * model['false_alarms']:.1f}% (model). The "
+            f"criterion is {model['criterion']:.2f} standard deviations of one impression, the lapse rate "
             f"{100 * model['lapse']:.1f}%."
         )
         if fit is not None:
@@ -162,8 +162,8 @@ def _equal_slopes(test: Result) -> str:
     people = test["p_value_participants_independent"]
     text = (
         f"One frame longer is seen {test['slope_ratio_longer_to_shorter']:.2f} times as well as one frame shorter; "
-        f"likelihood ratio {test['likelihood_ratio']:.2f} on 1 degree of freedom, "
-        f"p {_p(test['p_value_answers_independent'])}"
+        f"likelihood ratio {test['likelihood_ratio']:.2f} on 1 degree of freedom, p "
+        f"{_p(test['p_value_answers_independent'])}"
     )
     return text + (f"; over participants p {_p(people)}." if people is not None else ".")
 
@@ -187,8 +187,8 @@ def preference_headline(comparison: Result) -> tuple[str, str]:
         detail = f"{sentence(people['note'])}. " if people["note"] else ""
     if published["chi_square"] is not None:
         detail += (
-            f"As published: chi-square(1, N = {published['answers']}) = {published['chi_square']:.2f}, "
-            f"p {_p(published['p_value'])}."
+            f"As published: chi-square(1, N = {published['answers']}) = {published['chi_square']:.2f}, p "
+            f"{_p(published['p_value'])}."
         )
     return readable(comparison["answer"]), detail
 
@@ -197,16 +197,15 @@ def preference_notes(comparison: Result) -> list[str]:
     """Return what the preference rests on, one sentence each."""
     people, order, clusters = comparison["participants"], comparison["order"], comparison["clustering"]
     notes = [
-        f"{number(people['for_a'], 'participant')} leant towards {readable(comparison['method_a'])}, "
-        f"{people['for_b']} towards {readable(comparison['method_b'])}, {people['undecided']} towards neither."
+        f"{number(people['for_a'], 'participant')} leant towards {readable(comparison['method_a'])}, {people['for_b']} "
+        f"towards {readable(comparison['method_b'])}, {people['undecided']} towards neither."
     ]
     if clusters["design_effect"] is not None:
         correlation = f"{clusters['intraclass_correlation']:.3f}".replace("-", "−")
         notes.append(
             f"Answers of one participant correlate by {correlation}: the pooled test counts "
             f"{comparison['published']['answers']} answers that are worth {clusters['effective_answers'] or 0:.0f} "
-            f"independent "
-            f"ones (design effect {clusters['design_effect']:.2f})."
+            f"independent ones (design effect {clusters['design_effect']:.2f})."
         )
     if order["first_percent"] is not None:
         test = f", p {_p(order['p_value'])} over participants" if order["p_value"] is not None else ""
@@ -230,32 +229,32 @@ def methods_paragraph(protocol: Any, manifest: Any, analysis: Result, participan
     kinds = joined([f"{readable(study.title or study.name)} ({_task(study)})" for study in protocol.studies])
     motions = "synthetic motions" if manifest.synthetic else f"motions of the library {manifest.library}"
     first = (
-        f"{sentence(participants)} took part in {number(len(protocol.studies), 'study', 'studies')}: "
-        f"{kinds}. Transitions between {motions} were blended by spherical linear interpolation under a {shown.weight} "
-        f"weight between a start frame in the source and an end frame in the destination, and shown as a {shown.style} "
-        f"figure of {shown.width} × {shown.height} pixels at {protocol.fps:g} frames per second from a fixed camera, "
-        f"without "
+        f"{sentence(participants)} took part in {number(len(protocol.studies), 'study', 'studies')}: {kinds}. "
+        f"Transitions between {motions} were blended by spherical linear interpolation under a {shown.weight} weight "
+        f"between a start frame in the source and an end frame in the destination, and shown as a {shown.style} figure "
+        f"of {shown.width} × {shown.height} pixels at {protocol.fps:g} frames per second from a fixed camera, without "
         f"a ground plane, with {shown.entry_s:g} s before and {shown.exit_s:g} s after the blend. The stimuli of a "
-        f"pair "
-        f"followed each other after {protocol.timing.gap_s:g} s; {protocol.timing.answer_s:g} s were given to answer. "
-        "Pairs and their order were drawn at random for every participant."
+        f"pair followed each other after {protocol.timing.gap_s:g} s; {protocol.timing.answer_s:g} s were given to "
+        "answer. Pairs and their order were drawn at random for every participant."
     )
     second = (
-        "Percentages are means over participants with standard errors of these means. "
-        "Thresholds as published are where straight lines between percentages cross "
-        f"{100 * protocol.analysis.threshold:.0f}%, with Fieller intervals over participants. The differencing "
-        f"same-different "
-        "model (one criterion, a slope for shorter and one for longer blends, a lapse rate of at most 10%) was fitted "
-        "by "
-        "maximum likelihood to all answers; its intervals are Student’s, on the logarithm, from a jackknife "
-        "over "
-        "participants. Preferences were tested as published (chi-square over all answers) and with one share a "
-        "participant "
-        f"(Student’s t). The level of significance is {protocol.analysis.alpha:g}, intervals are of "
-        f"{100 * analysis['confidence']:g}%. Missed answers were left out and counted; no participant was excluded."
+        "Percentages are means over participants with standard errors of these means. Thresholds as published are "
+        f"where straight lines between percentages cross {100 * protocol.analysis.threshold:.0f}%, with Fieller "
+        "intervals over participants. The differencing same-different model (one criterion, a slope for shorter and "
+        "one for longer blends, a lapse rate of at most 10%) was fitted by maximum likelihood to all answers; its "
+        "intervals are Student’s, on the logarithm, from a jackknife over participants. Preferences were tested as "
+        "published (chi-square over all answers) and with one share a participant (Student’s t). The level of "
+        f"significance is {protocol.analysis.alpha:g}, intervals are of {100 * analysis['confidence']:g}%. Missed "
+        "answers were left out and counted; no participant was excluded."
     )
     return [first, second]
 
 
 def _task(study: Any) -> str:
-    return f"{study.task}, {study.order} order" + (f", {study.repeats} repeats" if study.repeats > 1 else "")
+    orders = {
+        "both": "each pair in both orders",
+        "random": "order at random",
+        "balanced": "orders balanced",
+        "by-group": "order by group",
+    }
+    return f"{study.task}, {orders[study.order]}" + (f", {study.repeats} times" if study.repeats > 1 else "")

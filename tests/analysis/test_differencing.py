@@ -74,7 +74,7 @@ def test_d_prime_stays_finite(hits: int, alarms: int, expected: float | None) ->
 
 
 def test_the_criterion_free_threshold_is_where_the_best_criterion_gives_three_in_four() -> None:
-    delta = differencing.criterion_free_delta()
+    delta = differencing.criterion_free_delta(0.75)
     criteria = np.linspace(0, 8, 40001)
     gained = norm.sf(criteria, delta, np.sqrt(2)) + norm.cdf(-criteria, delta, np.sqrt(2))
     correct = 0.5 * gained + 0.5 * (1 - 2 * norm.sf(criteria / np.sqrt(2)))
