@@ -221,8 +221,8 @@ def find_heading(group: Sequence[FloatArray]) -> float:
 def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray:
     """The figure's centre over the floor, smoothed, relative to the first frame: `(frames, 3)` with y = 0.
 
-    The smoothing is a Gaussian of standard deviation `seconds`, with the path carried on in a straight line
-    past both of its ends.
+    The smoothing is a Gaussian of standard deviation `seconds`; past both of its ends the path goes on as its own
+    mirror image through that end, so that a straight way stays as it is.
     """
     if not (seconds >= 0 and np.isfinite(seconds)):
         raise RendererError(f"Expected a tracking time of 0 seconds or more, got {seconds}.")
@@ -231,13 +231,9 @@ def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray
     sigma = seconds * fps
     if sigma > 0 and len(centre) > 1:
         reach = int(np.ceil(3 * sigma))
-        slope_frames = min(len(centre) - 1, max(1, round(sigma)))
-        steps = np.arange(1, reach + 1)[:, None]
-        before = centre[0] - steps[::-1] * (centre[slope_frames] - centre[0]) / slope_frames
-        after = centre[-1] + steps * (centre[-1] - centre[-1 - slope_frames]) / slope_frames
         kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
         kernel /= kernel.sum()
-        line = np.concatenate([before, centre, after])
+        line = np.pad(centre, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
         centre = np.stack([np.convolve(line[:, axis], kernel, mode="valid") for axis in range(3)], axis=1)
     path: FloatArray = centre - centre[0]
     return path

@@ -247,7 +247,8 @@ class Atlas:
         """The tiles of frames `first .. stop - 1`, each to be used up before the next is asked for."""
         frame = first
         while frame < stop:
-            # A figure that leaves the frame would paint over its neighbours: it gets the picture for itself.
+            # A figure that leaves the frame would paint over its neighbours: it gets the picture for itself, in whose
+            # corner what sticks out to the left and above is cut, and the rest is not read.
             last = frame + 1
             while not self._loose[frame] and last < stop and last - frame < self._held and not self._loose[last]:
                 last += 1
@@ -262,11 +263,8 @@ class Atlas:
         data[..., 12:14] = (place - self._boxes[first:stop, :2])[:, None]
         capsules = self._painter.load(data)
         self._start(first, place)
-        scissor = (0, 0, *self._tile) if self._loose[first] else None
-        self._luma.scissor = scissor
         self._luma.use()
         self._painter.paint("luma", capsules, self._extent)
-        self._chroma.scissor = scissor and (0, 0, width // 2, height // 2)
         self._chroma.use()
         self._painter.paint("chroma", capsules, self._extent)
         rows = (-(-count // self._across)) * height
