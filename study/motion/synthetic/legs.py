@@ -286,8 +286,8 @@ def _swing(
         # The thigh follows the shank: the leg hangs back until the knee is bent, then swings through.
         way = ends[1][1] - ends[0][1]
         passed = [ends[0][1], ends[0][1] + before.swing_lag * way, ends[0][1] + 0.77 * way, ends[1][1]]
-        knots = (0.0, peak_at, peak_at + 0.45 * (1 - peak_at), 1.0)
-        angle = clamped_spline(share, knots, passed, (rates[0][1], rates[1][1]))
+        when = (0.0, peak_at, peak_at + 0.45 * (1 - peak_at), 1.0)
+        angle = clamped_spline(share, when, passed, (rates[0][1], rates[1][1]))
     angle = angle + before.swing_reach * smooth_step(share, 0.3, 0.85) * (1.0 - smooth_step(share, 0.8, 1.0))
     lifted = 1.0 - smooth_step(share, 0.0, 0.45)
     level = smooth_step(share, 0.0, 0.3) * (1.0 - smooth_step(share, 0.75, 1.0))
