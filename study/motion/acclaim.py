@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
-from study.motion.numbers import ByteArray, IntArray, parse_words, split_words
+from study.motion.digits import ByteArray, IntArray, parse_words, split_words
 from study.motion.skeleton import Skeleton
 from study.motion.source import Source, number, read_source
 from study.motion.units import INCH, find_scale

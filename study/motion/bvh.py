@@ -11,7 +11,6 @@ from __future__ import annotations
 import difflib
 import os
 import re
-import tempfile
 import warnings
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -20,10 +19,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import MotionWarning
+from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
-from study.motion.numbers import parse_table
+from study.motion.digits import parse_table
 from study.motion.skeleton import Skeleton
 from study.motion.source import Source, number, read_source
 from study.motion.units import find_scale
@@ -397,6 +396,11 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
         The file; one that is there is replaced.
     metres_per_unit
         The length unit to write; centimetres, which most tools expect, by default.
+
+    Raises
+    ------
+    MotionFileError
+        Where the file can't be written.
     """
     path = Path(path)
     lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
@@ -405,14 +409,18 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
     table = np.concatenate([clip.root_positions / metres_per_unit, degrees], axis=1)
     row = " ".join(["%.10g"] * table.shape[1])
     lines += [row % tuple(values) for values in table.tolist()]
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+        with temporary.open("w", encoding="utf-8", newline="\n") as file:
             file.write("\n".join(lines) + "\n")
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        temporary.replace(path)
+    except OSError as problem:
+        raise MotionFileError(
+            f"Expected to write a BVH file here, but can't ({problem.strerror}). Check the folder and the space on it.",
+            path,
+        ) from problem
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:

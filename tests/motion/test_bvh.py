@@ -13,7 +13,7 @@ from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
 from study.motion.bvh import frame_rate, read_bvh, write_bvh
 from study.motion.clip import joint_positions
-from study.motion.numbers import parse_words, split_words
+from study.motion.digits import parse_words, split_words
 
 HIERARCHY = """HIERARCHY
 ROOT Hips
@@ -319,6 +319,11 @@ def test_an_interrupted_write_leaves_the_old_file(
         write_bvh(clip, path)
     assert path.read_text() == "old"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["clip.bvh", "out.bvh"]
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, bvh: Callable[[str], Path]) -> None:
+    with pytest.raises(MotionFileError, match="Expected to write a BVH file here"):
+        write_bvh(read_bvh(bvh(HIERARCHY + ROWS)), tmp_path / "none" / "out.bvh")
 
 
 # -- Real files -----------------------------------------------------------------------------------------------------
