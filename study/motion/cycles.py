@@ -27,11 +27,13 @@ End = Literal["start", "end"]
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 0.22, 0.95
 # Slowest pelvis that counts as going somewhere, m/s, over this time.
 _SLOWEST_GAIT, _SPEED_S = 0.4, 0.3
-# How unlike two periods may be, as a share of how much the limbs move. Straight gaits have 0.1 to 0.4, the ends of
-# running turns up to 0.7; boxing, dancing and martial forms cut anywhere have 0.8 and more, nearly always above 1.
-_UNLIKE = 0.75
-# The comparison looks back from the end, nearer frames counting more, with this time constant; seconds.
-_MEMORY_S = 0.06
+# How unlike two periods may be, as a share of how much the limbs move. Captured walks and straight runs have 0.1 to 0.4,
+# runs that speed up or end a turn up to 0.7; boxing, dancing and martial forms cut anywhere have 0.6 and more, nearly
+# always above 1, and hardly ever go as fast as a run.
+_UNLIKE, _UNLIKE_RUNNING, _RUNNING = 0.45, 0.75, 1.8
+# The comparison looks back from the end, nearer frames counting more, with these time constants; seconds. A captured
+# run can hold less than two cycles, so that little more than the seam itself can be compared.
+_MEMORY_S, _MEMORY_RUNNING_S = 0.15, 0.06
 # Frames that must be there beyond one period to be compared; seconds.
 _OVERLAP_S = 0.05
 # A cycle differs from twice a step by no more than this share.
@@ -191,23 +193,26 @@ def _joined(clip: Clip, added: Clip, at: End) -> Clip:
 def _gait(clip: Clip, at: End) -> Cycle | None:
     """The gait cycle, or the step, that ends a clip; None where no period fits."""
     limbs, mirrored = _limbs_seen_from_the_trunk(clip)
-    memory = _MEMORY_S * clip.fps
     recent = limbs[-max(3, round(_LONGEST_STEP_S * clip.fps)) :]
     scale = float(np.sqrt(np.mean(np.sum((recent - recent.mean(axis=0)) ** 2, axis=-1))))
     if scale == 0.0:
         return None
-    shortest, longest = _SHORTEST_STEP_S * clip.fps, _longest_step_s(_end_speed(clip)) * clip.fps
+    speed = _end_speed(clip)
+    runs = speed >= _RUNNING
+    limit, memory = (_UNLIKE_RUNNING, _MEMORY_RUNNING_S) if runs else (_UNLIKE, _MEMORY_S)
+    memory *= clip.fps
+    shortest, longest = _SHORTEST_STEP_S * clip.fps, _longest_step_s(speed) * clip.fps
     step, step_unlike = _best_lag(limbs, mirrored, shortest, longest, memory, _OVERLAP_S * clip.fps)
-    if step_unlike / scale <= _UNLIKE:
+    if step_unlike / scale <= limit:
         # Two steps make a cycle, give or take a limp; anything longer is a second time round, or chance.
         shortest, longest = step * (1.0 - _LIMP), step * (1.0 + _LIMP)
     whole, whole_unlike = _best_lag(limbs, limbs, 2 * shortest, 2 * longest, memory, _OVERLAP_S * clip.fps)
     step_unlike, whole_unlike = step_unlike / scale, whole_unlike / scale
-    if min(step_unlike, whole_unlike) > _UNLIKE:
+    if min(step_unlike, whole_unlike) > limit:
         return None
     turn, steady = _turning(clip, whole) if np.isfinite(whole_unlike) else (0.0, False)
-    bends = abs(turn) > _STRAIGHT and not (steady and abs(turn) < _TURNING)
-    if step_unlike <= _UNLIKE and (bends or step_unlike < whole_unlike - _BETTER):
+    bends = bool(abs(turn) > _STRAIGHT) and not (steady and abs(turn) < _TURNING)
+    if step_unlike <= limit and (bends or step_unlike < whole_unlike - _BETTER):
         step_turn, _ = _turning(clip, 2 * step)
         return Cycle("step", at, step, step_unlike, curving=bends or abs(step_turn) > _STRAIGHT)
     return Cycle("gait", at, whole, whole_unlike, turn if abs(turn) > _STRAIGHT and not bends else 0.0, bends)
@@ -239,8 +244,7 @@ def _best_lag(
         unlike[k] = np.sum(weights * squares) / np.sum(weights)
     best = int(np.argmin(unlike))
     if best in (0, len(lags) - 1):
-        # Still falling at the edge of what can be a step: not a period.
-        return float(lags[best]), float(np.inf if best == 0 else np.sqrt(unlike[best]))
+        return 0.0, np.inf  # still falling at the edge of what can be a period: it is none
     left, middle, right = unlike[best - 1 : best + 2]
     bow = left - 2.0 * middle + right
     shift = 0.5 * (left - right) / bow if bow > 0 else 0.0

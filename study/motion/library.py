@@ -241,7 +241,9 @@ def prepared(entry: Entry) -> Clip:
 
     if entry.file is None:
         raise MotionError(f"Expected a file behind {entry.name!r}, found none.")
-    clip = read_clip(entry.file).noting(f"read from {entry.file.name}")
+    clip = read_clip(entry.file)
+    if entry.trial:
+        clip = clip.noting(f"CMU trial {entry.trial}, as {entry.name!r}")
     clip = _without_added_pose(clip, entry)
     clip = _usable(clip, entry)
     clip = mend(clip, find_defects(clip))
