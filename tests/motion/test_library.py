@@ -342,7 +342,7 @@ class _Site(http.server.BaseHTTPRequestHandler):
 def site() -> Iterator[str]:
     _Site.asked, _Site.break_off = [], False
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), _Site)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
     thread.start()
     yield f"http://127.0.0.1:{server.server_port}"
     server.shutdown()

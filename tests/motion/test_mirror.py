@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study.motion.files import read_clip
 
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions
+from study.motion.files import read_clip
 from study.motion.mirror import find_partners, mirror, mirror_map
 from study.motion.skeleton import Skeleton
 
