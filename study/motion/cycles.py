@@ -27,7 +27,7 @@ End = Literal["start", "end"]
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 0.22, 0.95
 # Slowest pelvis that counts as going somewhere, m/s, over this time.
 _SLOWEST_GAIT, _SPEED_S = 0.4, 0.3
-# How unlike two periods may be, as a share of how much the limbs move. Captured walks and straight runs have 0.1 to 0.4,
+# How unlike two periods may be, as a share of how much the limbs move. Captured walks and straight runs have 0.1-0.4,
 # runs that speed up or end a turn up to 0.7; boxing, dancing and martial forms cut anywhere have 0.6 and more, nearly
 # always above 1, and hardly ever go as fast as a run.
 _UNLIKE, _UNLIKE_RUNNING, _RUNNING = 0.45, 0.75, 1.8
