@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from renderer.video import VideoInfo
 
 MANIFEST_VERSION = 1
-MANIFEST, PROTOCOL, STIMULI = "manifest.json", "protocol.toml", "stimuli"
+MANIFEST, PROTOCOL, STIMULI, ANSWERS = "manifest.json", "protocol.toml", "stimuli", "responses.sqlite"
 
 
 @dataclass(frozen=True)
@@ -183,11 +183,19 @@ def _claim(folder: Path, stimulus_set: StimulusSet) -> None:
                 f"protocol.toml with {found[:12]}; name another folder, or move this one away."
             )
     if (folder / MANIFEST).exists():
-        library = read_manifest(folder).library
-        if library != stimulus_set.library:
+        known = read_manifest(folder)
+        if known.library != stimulus_set.library:
             raise StimulusError(
-                f"{folder}: expected stimuli from the library {stimulus_set.library!r}, found some from {library!r}; "
-                "name another folder."
+                f"{folder}: expected stimuli from the library {stimulus_set.library!r}, found some from "
+                f"{known.library!r}; name another folder."
+            )
+        changed = {entry.id for entry in known.records} ^ {entry.id for entry in stimulus_set.records}
+        if changed and (folder / ANSWERS).exists():
+            # Plans name stimuli by id: with another manifest the answers would be about nothing.
+            raise StimulusError(
+                f"{folder}: expected the stimuli that answers were given to, found {len(changed)} that differ (made by "
+                f"Segue {known.versions.get('segue', '?')} then, {stimulus_set.versions.get('segue', '?')} now, or "
+                "from other motion files); name another folder, or move this one away."
             )
     if not stored.exists():
         write_whole(stored, protocol.text.encode())

@@ -20,6 +20,7 @@ import sqlalchemy as sa
 from study.errors import SessionError
 from study.experiment.plan import Plan, Trial, plan_from_json
 from study.experiment.protocol import Protocol
+from study.experiment.rendering import ANSWERS, write_whole
 from study.experiment.response_tables import answers, events, migrate, sessions
 from study.experiment.session import Answer
 
@@ -85,7 +86,7 @@ def open_responses(url_or_path: str | Path) -> Responses:
     text = str(url_or_path)
     if "://" not in text:
         path = Path(text)
-        path = path / "responses.sqlite" if path.is_dir() or not path.suffix else path
+        path = path / ANSWERS if path.is_dir() or not path.suffix else path
         path.parent.mkdir(parents=True, exist_ok=True)
         text = f"sqlite:///{path}"
     engine = sa.create_engine(text)
@@ -359,7 +360,5 @@ def answers_frame(
 
 def export_csv(responses: Responses, path: str | Path) -> Path:
     """Write all answers, every showing, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
-    from study.experiment.rendering import write_whole
-
     write_whole(Path(path), answers_frame(responses, all_attempts=True).to_csv(index=False).encode())
     return Path(path)

@@ -222,6 +222,19 @@ def test_a_folder_of_another_protocol_or_library_is_refused(prepared, rendered):
         render(replace(prepared, library="mine"), folder)
 
 
+def test_stimuli_that_were_answered_to_are_not_replaced(prepared, tmp_path):
+    """Without answers a folder takes the new stimuli of the same protocol; with answers it keeps the old ones."""
+    record(prepared, tmp_path)
+    fewer = replace(prepared, stimuli=prepared.stimuli[1:])
+    record(fewer, tmp_path)
+    assert read_manifest(tmp_path).records == fewer.records
+    (tmp_path / "responses.sqlite").write_bytes(b"")
+    with pytest.raises(StimulusError, match="expected the stimuli that answers were given to, found 1 that differ"):
+        record(prepared, tmp_path)
+    assert read_manifest(tmp_path).records == fewer.records
+    record(fewer, tmp_path)
+
+
 def test_what_is_no_results_folder_is_refused(prepared, tmp_path):
     with pytest.raises(StimulusError, match="expected the manifest of a results folder, found none; render first"):
         read_manifest(tmp_path)
