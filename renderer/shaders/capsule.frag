@@ -24,7 +24,11 @@ void main() {
     PRECISE vec2 out_of_axis = from_start - f_line.zw * share;
     PRECISE float radius = f_body.x + f_body.y * share;
     PRECISE float distance2 = out_of_axis.x * out_of_axis.x + out_of_axis.y * out_of_axis.y;
-    PRECISE float inside = (radius * radius - distance2) * f_body.w;
+    // 1 / 2r where the capsule has this radius: one step of Newton's from that of its mean radius. Soft shapes, which are
+    // stretched, bring their own steepness.
+    PRECISE float nearer = f_body.w * (2.0 - 2.0 * radius * f_body.w);
+    float steep = f_extra.w > 1.0 ? f_body.w : nearer;
+    PRECISE float inside = (radius * radius - distance2) * steep;
 #ifdef CHROMA
     float cover = clamp(inside * 0.5 + 0.5, 0.0, 1.0) * f_colour.w;
     painted = vec4(f_colour.yz, 0.0, cover);
@@ -35,7 +39,7 @@ void main() {
     float round_end = on_line > 0.5 ? step(1.5, f_extra.z) : step(2.5, f_extra.z);
     PRECISE vec2 straight_on = from_start - f_line.zw * on_line;
     vec2 side = round_end > 0.5 ? out_of_axis : straight_on;
-    PRECISE float across = f_body.w * 2.0;
+    PRECISE float across = steep * 2.0;
     PRECISE float slope = (side.x * LIGHT_X + side.y * LIGHT_Y) * across;
     PRECISE float rim = (side.x * side.x + side.y * side.y) * across * across;
     PRECISE float light = 1.0 + min(f_extra.z, 1.0) * (LIGHT_BASE + slope - rim * LIGHT_RIM);
