@@ -41,7 +41,7 @@ def frame_distance(a: FloatArray, b: FloatArray, weights: FloatArray) -> FloatAr
     return np.asarray((differences**2) @ weights[used])
 
 
-def half_angle_squares(dots: FloatArray) -> FloatArray:
+def half_angle_squares(dots: NDArray[np.floating]) -> NDArray[np.floating]:
     """Squared half angles, of any shape, from the dot products of unit quaternions; overwrites what it is given.
 
     Notes
