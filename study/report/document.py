@@ -55,6 +55,7 @@ class Page:
     strips: tuple[Preview, ...]
     videos: tuple[tuple[Preview, ...], ...]
     stimuli: tables.Table
+    motions: tables.Table
     participants: tables.Table
     shown_sentence: str
     methods: tuple[str, ...]
@@ -152,6 +153,7 @@ def compose(material: Material, analysis: Result) -> Page:
         strips=tuple(media.embed_strips(manifest)),
         videos=tuple(tuple(pair) for pair in media.embed_videos(manifest)),
         stimuli=sections.stimulus_table(manifest),
+        motions=sections.motion_table(manifest),
         participants=sections.participant_table(analysis, material.sessions),
         shown_sentence=_shown_sentence(manifest),
         methods=tuple(words.methods_paragraph(protocol, manifest, analysis, _who(analysis))),
@@ -205,7 +207,11 @@ def _who(analysis: Result) -> str:
 
 def _facts(material: Material, analysis: Result) -> tuple[str, ...]:
     quality, manifest = analysis["quality"], material.manifest
-    motions = "synthetic motions" if manifest.synthetic else f"captured motions, {manifest.library}"
+    motions = (
+        "synthetic motions"
+        if manifest.synthetic
+        else f"captured motions of the library {words.library(manifest.library)}"
+    )
     return (
         _who(analysis),
         f"{quality['answered']:,} answers, {quality['missed']:,} missed",
@@ -233,15 +239,15 @@ def _shown_sentence(manifest: Manifest) -> str:
         any(use.added_before or use.added_after for use in (record.source, record.destination))
         for record in manifest.records
     )
-    motions = "a synthetic library" if manifest.synthetic else f"the library {manifest.library}"
+    motions = "a synthetic library" if manifest.synthetic else f"the library {words.library(manifest.library)}"
     text = (
         f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} from {motions}, {manifest.size[0]} × "
         f"{manifest.size[1]} pixels at {manifest.fps:g} frames per second."
     )
     if extended:
         text += (
-            f" In {words.number(extended, 'stimulus', 'stimuli')} a motion was too short for what is shown before or "
-            "after the blend and was extended; the table says by how much."
+            f" In {'all' if extended == len(manifest.records) else extended} of them a motion was too short for what "
+            "is shown before or after the blend and was extended; the table says by how much."
         )
     return text
 
@@ -270,7 +276,7 @@ def _versions(material: Material) -> tuple[tuple[str, str], ...]:
 def all_tables(page: Page) -> list[tables.Table]:
     """Every table of the page."""
     found = [table for section in page.sections for table in (*section.tables, *section.folded)]
-    return [*found, page.stimuli, page.participants]
+    return [*found, page.stimuli, page.motions, page.participants]
 
 
 def write_tables(folder: Path, chosen: Sequence[tables.Table], analysis: Result) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.report import figures, tables, words
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from study.experiment.stimuli import Manifest
+    from study.experiment.stimulus_set import MotionUse
 
 Result = Mapping[str, Any]
 
@@ -389,7 +391,7 @@ def ratings_section(name: str, title: str, rows: Sequence[Result], *, mark: str,
 
 
 def stimulus_table(manifest: Manifest) -> Table:
-    """Return every stimulus: method, lengths, motions and their files, extension, hash."""
+    """Return every stimulus: method, lengths, motions, hash."""
     rows = [
         {
             "id": record.id,
@@ -402,45 +404,73 @@ def stimulus_table(manifest: Manifest) -> Table:
             "frames": record.frames,
             "source": _motion_in_words(record.source),
             "destination": _motion_in_words(record.destination),
-            "extension": _extension(record),
             "notes": "; ".join(record.notes),
         }
         for record in manifest.records
     ]
     return tables.make(
         "stimuli",
-        "Every stimulus. k is the length that the method gives; the blend is k and the difference. Motions are named "
-        "with their file and the frame at which the blend starts or ends.",
+        "Every stimulus, in frames. k is the length that the method gives; the blend is k and the difference.",
         [
             ("transition", "transition", "text"),
+            ("category", "category", "text"),
             ("method", "method", "text"),
             ("optimal_frames", "k", "count"),
             ("difference_frames", "difference", "count"),
             ("blend_frames", "blend", "count"),
-            ("frames", "frames", "count"),
+            ("frames", "in all", "count"),
             ("source", "from", "text"),
             ("destination", "to", "text"),
-            ("extension", "extended by", "text"),
             ("notes", "notes", "text"),
             ("id", "hash", "text"),
         ],
         rows,
-        files_only=("notes", "frames", "id", *(() if any(row["extension"] for row in rows) else ("extension",))),
+        files_only=("category", "notes", "id"),
     )
 
 
-def _motion_in_words(use: Any) -> str:
-    place = f"{use.file}, " if use.file else ""
-    return f"{words.readable(use.motion)} ({place}frame {use.frame} of {use.frames})"
+def _motion_in_words(use: MotionUse) -> str:
+    """The motion and its trial; no folder of the machine that rendered it."""
+    return words.readable(use.motion) + (f" ({Path(use.file).stem})" if use.file else "")
 
 
-def _extension(record: Any) -> str:
-    parts = []
-    for label, use in (("source", record.source), ("destination", record.destination)):
-        added = use.added_before + use.added_after
-        if added:
-            parts.append(f"{label} {added} frames" + (f" ({'; '.join(use.notes)})" if use.notes else ""))
-    return "; ".join(parts)
+def motion_table(manifest: Manifest) -> Table:
+    """Return every motion that was used: its file, where it was blended, and by how much it was extended."""
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for record in manifest.records:
+        for role, use in (("from", record.source), ("to", record.destination)):
+            key = (record.transition, role, use.motion, use.file, use.frame, use.added_before, use.added_after)
+            rows[key] = {
+                "transition": words.readable(record.transition),
+                "role": role,
+                "motion": words.readable(use.motion),
+                "file": Path(use.file).name,
+                "frame": use.frame,
+                "frames": use.frames,
+                "added_before": use.added_before,
+                "added_after": use.added_after,
+                "changes": "; ".join(note for note in use.notes if note.startswith(("extended", "mirrored"))),
+                "notes": "; ".join(use.notes),
+            }
+    return tables.make(
+        "motions",
+        "Every motion, in frames of the study: its file, the frame at which the blend starts or ends, its length, and "
+        "the frames that were added before and after it where it was too short.",
+        [
+            ("transition", "transition", "text"),
+            ("role", "", "text"),
+            ("motion", "motion", "text"),
+            ("file", "file", "text"),
+            ("frame", "at", "count"),
+            ("frames", "of", "count"),
+            ("added_before", "added before", "count"),
+            ("added_after", "after", "count"),
+            ("changes", "how", "text"),
+            ("notes", "all notes", "text"),
+        ],
+        list(rows.values()),
+        files_only=("notes", *(() if any(row["changes"] for row in rows.values()) else ("changes",))),
+    )
 
 
 def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:

@@ -11,7 +11,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 LONGEST_SHORT = 30
-"""Longer text may break into lines."""
+"""Longer text may break into lines. [characters]"""
+
+WIDTH_OF_TEXT = 92
+"""Characters that a table may take in a row before it stands out into the margins."""
 
 Kind = Literal["text", "count", "one", "two", "three", "percent", "p"]
 
@@ -44,6 +47,18 @@ class Table:
     def shown(self) -> tuple[Column, ...]:
         """The columns that the page shows; the files have all of them."""
         return tuple(column for column in self.columns if column.shown)
+
+    @property
+    def broad(self) -> bool:
+        """Whether it needs more than the width of the text."""
+        widths = [
+            max([len(column.heading), *lengths]) for column, lengths in zip(self.shown, self._lengths, strict=True)
+        ]
+        return sum(min(width, LONGEST_SHORT) + 2 for width in widths) > WIDTH_OF_TEXT
+
+    @property
+    def _lengths(self) -> list[list[int]]:
+        return [[len(row[place][0]) for row in self.cells] for place in range(len(self.shown))]
 
     @property
     def cells(self) -> list[list[tuple[str, str]]]:

@@ -22,6 +22,11 @@ def readable(name: str) -> str:
     return name.replace("_", " ")
 
 
+def library(name: str) -> str:
+    """Return a motion library's name; of a folder its last part, as no page should tell of the machine's disk."""
+    return name.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
+
+
 def sentence(text: str) -> str:
     """Return a text with its first letter as a capital."""
     return text[:1].upper() + text[1:]
@@ -227,7 +232,7 @@ def methods_paragraph(protocol: Any, manifest: Any, analysis: Result, participan
     """
     shown = protocol.stimuli
     kinds = joined([f"{readable(study.title or study.name)} ({_task(study)})" for study in protocol.studies])
-    motions = "synthetic motions" if manifest.synthetic else f"motions of the library {manifest.library}"
+    motions = "synthetic motions" if manifest.synthetic else f"motions of the library {library(manifest.library)}"
     first = (
         f"{sentence(participants)} took part in {number(len(protocol.studies), 'study', 'studies')}: {kinds}. "
         f"Transitions between {motions} were blended by spherical linear interpolation under a {shown.weight} weight "
