@@ -268,8 +268,8 @@ def frame_rate(printed: str) -> float:
 
     Examples
     --------
-    >>> frame_rate("0.0083333"), frame_rate("0.033367"), frame_rate("0.0123456789")
-    (120.0, 29.97002997002997, 81.0000007371)
+    >>> frame_rate("0.0083333"), frame_rate("0.033367"), frame_rate("0.012")
+    (120.0, 29.97002997002997, 83.33333333333333)
     """
     exact = Fraction(printed)
     mantissa, _, exponent = printed.lower().partition("e")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import doctest
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -254,6 +256,12 @@ def test_the_place_is_right_with_other_line_ends_and_a_mark(bvh: Callable[[bytes
 )
 def test_a_printed_frame_time_means_the_rate_that_its_digits_allow(printed: str, fps: float) -> None:
     assert frame_rate(printed) == pytest.approx(fps, rel=1e-15)
+
+
+def test_the_examples_in_the_docstrings_run() -> None:
+    result = doctest.testmod(sys.modules[frame_rate.__module__])
+    assert result.attempted > 0
+    assert result.failed == 0
 
 
 def test_fast_numbers_are_the_doubles_that_float_gives() -> None:
