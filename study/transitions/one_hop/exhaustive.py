@@ -40,7 +40,8 @@ def exhaustive_search(
             allowed = problem.offsets.get((switch.source, hop))
             if allowed is not None and offset not in allowed:
                 continue
-            if problem.nearest_to_direct is not None and abs(offset - to_destination) > problem.nearest_to_direct:
+            near = problem.nearest_to_direct
+            if near is not None and (hop != switch.destination or abs(offset - to_destination) > near):
                 continue
             for stay_hop in range(min(settings.longest_stay_hop, settings.stay_both - stay_source) + 1):
                 second_start = start + blend + stay_hop

@@ -206,7 +206,7 @@ class _SecondLegs:
         return rows
 
     def _mend(self, rows: IntArray, times: OffsetArray) -> None:
-        """What a second leg has beyond its costs: the destination as its own hop, and hops kept near to direct.
+        """What a second leg has beyond its costs: the destination as its own hop, and offsets kept near to its own.
 
         Where the hop is the destination at its own place, nothing is left to blend: the second leg costs nothing and
         needs no more frames. So the direct transition is among the one-hop ones wherever it exists.
@@ -217,7 +217,7 @@ class _SecondLegs:
             rows[own, times[own] - self.ends.start] = 0
         if self.problem.nearest_to_direct is not None:
             apart = np.abs(np.arange(self.ends.start, self.ends.stop) - times[:, None])
-            rows[apart > self.problem.nearest_to_direct] = FORBIDDEN
+            rows[(apart > self.problem.nearest_to_direct) | (self.job.hop != self.destination)] = FORBIDDEN
 
 
 def _search(problem: Problem, job: Job, switch: Switch, leg: Table, second: _SecondLegs, limit: Best) -> Found:

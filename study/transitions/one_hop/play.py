@@ -64,6 +64,28 @@ class Segment:
     clip_start: int
 
 
+@dataclass(frozen=True)
+class Step:
+    """One leg of a transition: a stay in the clip that plays, then a blend into another clip.
+
+    Parameters
+    ----------
+    stay
+        Frames to stay first.
+    clip
+        The number of the clip to blend into.
+    offset
+        The frame of the transition's source at which that clip's frame 0 stands.
+    blend_frames
+        Frames of the blend.
+    """
+
+    stay: int
+    clip: int
+    offset: int
+    blend_frames: int
+
+
 @dataclass(frozen=True, eq=False)
 class Played:
     """What the state machine showed.
@@ -182,17 +204,35 @@ def play(
         frame = tape.frame + trigger.frame - tape.length
         _check_trigger(tape, trigger, frame)
         alignment = table.row(tape.number, trigger.destination).alignment
+        entry = None
         if method == "direct":
-            entries.append(None)
-            _go_direct(tape, table, trigger.destination, alignment, frame)
+            steps = _direct_steps(tape, table, trigger.destination, alignment, frame)
         else:
-            entries.append(_go_by_hop(tape, table, trigger.destination, alignment, frame))
+            entry = table.look_up(tape.number, trigger.destination, frame)
+            if entry is None:
+                names = table.clips[tape.number], table.clips[trigger.destination]
+                raise TransitionError(
+                    f"Expected a frame of {names[0]} with a transition to {names[1]}, got {frame}, where none fits "
+                    "in the clips. Trigger it earlier."
+                )
+            steps = entry_steps(table, entry, trigger.destination, alignment.offset_at(frame))
+        entries.append(entry)
+        _follow(tape, frame, steps)
     wanted = tape.clips[tape.number].frames if frames is None else tape.frame + frames - tape.length
     if wanted > tape.clips[tape.number].frames or (frames is not None and frames < tape.length):
         longest = tape.length + tape.clips[tape.number].frames - tape.frame
         raise TransitionError(f"Expected {tape.length} to {longest} frames of output for these triggers, got {frames}.")
     tape.play_to(wanted, "state")
-    return Played(_joined(tape, table, method), tuple(tape.segments), tuple(entries))
+    return Played(_joined(tape, method), tuple(tape.segments), tuple(entries))
+
+
+def entry_steps(table: OneHopTable, entry: Entry, destination: int, offset: int) -> tuple[Step, ...]:
+    """A table's entry as steps; `offset` is the destination's."""
+    first, second = (table.blend_frames if own is None else own for own in (entry.blend_first, entry.blend_second))
+    return (
+        Step(entry.stay_source, entry.hop, entry.offset, first),
+        Step(entry.stay_hop, destination, offset, second),
+    )
 
 
 def _check_table(clips: Sequence[Clip], table: OneHopTable) -> None:
@@ -215,48 +255,71 @@ def _check_trigger(tape: _Tape, trigger: Trigger, frame: int) -> None:
         raise TransitionError(f"Expected a trigger before output frame {end}, where {name} ends, got {trigger.frame}.")
 
 
-def _go_direct(tape: _Tape, table: OneHopTable, destination: int, alignment: Alignment, frame: int) -> None:
+def _direct_steps(
+    tape: _Tape, table: OneHopTable, destination: int, alignment: Alignment, frame: int
+) -> tuple[Step, ...]:
     """The baseline: at once into the destination."""
-    into = frame - alignment.offset_at(frame)
+    offset = alignment.offset_at(frame)
     lengths = tape.clips[tape.number].frames, tape.clips[destination].frames
-    if frame + table.blend_frames > lengths[0] or not 0 <= into <= lengths[1] - table.blend_frames:
+    if frame + table.blend_frames > lengths[0] or not 0 <= frame - offset <= lengths[1] - table.blend_frames:
         raise TransitionError(
             f"Expected {table.blend_frames} frames for a direct transition at frame {frame} of "
-            f"{table.clips[tape.number]} and frame {into} of {table.clips[destination]}, which have {lengths[0]} and "
-            f"{lengths[1]} frames. Trigger it at another frame."
+            f"{table.clips[tape.number]} and frame {frame - offset} of {table.clips[destination]}, which have "
+            f"{lengths[0]} and {lengths[1]} frames. Trigger it at another frame."
         )
+    return (Step(0, destination, offset, table.blend_frames),)
+
+
+def _follow(tape: _Tape, frame: int, steps: Sequence[Step]) -> None:
+    """Plays the current clip to a frame, and from there each step; offsets count from the current clip's frame 0."""
     tape.play_to(frame, "state")
-    tape.blend_into(destination, into, table.blend_frames)
+    offset = 0
+    for number, step in enumerate(steps):
+        start = tape.frame + offset + step.stay
+        tape.play_to(start - offset, "hop" if number else "state")
+        # The clip that plays, where it plays already: the direct transition, written as a one-hop one.
+        if number and (step.clip, step.offset) == (tape.number, offset):
+            continue
+        tape.blend_into(step.clip, start - step.offset, step.blend_frames)
+        offset = step.offset
 
 
-def _go_by_hop(tape: _Tape, table: OneHopTable, destination: int, alignment: Alignment, frame: int) -> Entry:
-    entry = table.look_up(tape.number, destination, frame)
-    if entry is None:
-        raise TransitionError(
-            f"Expected a frame of {table.clips[tape.number]} with a transition to {table.clips[destination]}, got "
-            f"{frame}, where none fits in the clips. Trigger it earlier."
-        )
-    offset = alignment.offset_at(frame)
-    start = frame + entry.stay_source
-    tape.play_to(start, "state")
-    tape.blend_into(entry.hop, start - entry.offset, table.blend_frames)
-    if entry.hop == destination and entry.offset == offset and entry.stay_hop == 0:
-        return entry  # a direct transition: there is nothing left to blend
-    second = start + table.blend_frames + entry.stay_hop
-    tape.play_to(second - entry.offset, "hop")
-    tape.blend_into(destination, second - offset, table.blend_frames)
-    return entry
+def play_steps(
+    clips: Sequence[Clip], first: int, first_frame: int, frame: int, steps: Sequence[Step], weight: str = "linear"
+) -> Played:
+    """One transition, given step by step, and its last clip to its end.
+
+    Parameters
+    ----------
+    clips
+        Clips of one rig at one frame rate.
+    first, first_frame
+        The clip that plays at the start, and its frame then.
+    frame
+        Its triggered frame.
+    steps
+        The transition: hops, and the destination last.
+    weight
+        As in `play`.
+    """
+    check_clips(clips)
+    same_body = tuple(retarget(clip, clips[0].skeleton) for clip in clips)
+    tape = _Tape(same_body, weight, first, first_frame, same_body[first])
+    _follow(tape, frame, steps)
+    tape.play_to(same_body[tape.number].frames, "state")
+    return Played(_joined(tape, "step by step"), tuple(tape.segments))
 
 
-def _joined(tape: _Tape, table: OneHopTable, method: str) -> Clip:
+def _joined(tape: _Tape, how: str) -> Clip:
     source = tape.recorded[0]
-    words = ", ".join(f"{s.kind} {table.clips[s.clip]} from its frame {s.clip_start}" for s in tape.segments)
+    names = [clip.name or f"clip {number}" for number, clip in enumerate(tape.clips)]
+    words = ", ".join(f"{s.kind} {names[s.clip]} from its frame {s.clip_start}" for s in tape.segments)
     return Clip(
         source.skeleton,
         np.concatenate([part.root_positions for part in tape.recorded]),
         np.concatenate([part.rotations for part in tape.recorded]),
         source.fps,
-        f"{table.clips[tape.segments[0].clip]} to {table.clips[tape.number]}, {method}",
-        (f"played {method}: {words}",),
+        f"{names[tape.segments[0].clip]} to {names[tape.number]}, {how}",
+        (f"played {how}: {words}",),
         any(clip.synthetic for clip in tape.clips),
     )

@@ -190,7 +190,8 @@ class Problem:
     offsets
         By (source, hop), the only offsets that the hop may have, ascending (section 4.4); any unless given.
     nearest_to_direct
-        How far, in frames, the hop's offset may lie from the destination's (section 5, Higher responsiveness).
+        Where given, the hop must be the destination itself, and its offset lie within so many frames of the
+        destination's (section 5, Higher responsiveness).
     """
 
     clips: tuple[Clip, ...]

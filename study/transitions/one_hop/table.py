@@ -25,6 +25,8 @@ from study.transitions.one_hop.search import Best
 
 FORMAT, VERSION = "segue one-hop table", 1
 COLUMNS = ("hop", "offset", "stay_source", "stay_hop")
+# Two more where each transition has blend lengths of its own.
+BLEND_COLUMNS = ("blend_first", "blend_second")
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,16 @@ class Entry:
         The source's frame at which the hop's frame 0 stands.
     stay_source, stay_hop
         Frames to wait before the first and before the second blend.
+    blend_first, blend_second
+        Frames of both blends, where the table has them for each entry; None where it has one length for all.
     """
 
     hop: int
     offset: int
     stay_source: int
     stay_hop: int
+    blend_first: int | None = None
+    blend_second: int | None = None
 
 
 @dataclass(frozen=True)
@@ -85,8 +91,8 @@ class OneHopTable:
         Frames of each blend.
     rows
         The transitions.
-    entries : (n, 4) int32
-        All entries, row after row; see `COLUMNS`.
+    entries : (n, 4) or (n, 6) int32
+        All entries, row after row; see `COLUMNS` and `BLEND_COLUMNS`.
     costs, direct_costs : (n,)
         Eq. 2 for each entry, and the distance of the direct transition; infinite where there is none.
     weight
@@ -105,6 +111,11 @@ class OneHopTable:
     direct_costs: NDArray[np.float64]
     weight: float
     words: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """What the integers of an entry are."""
+        return (*COLUMNS, *BLEND_COLUMNS) if self.entries.shape[1] > len(COLUMNS) else COLUMNS
 
     def row(self, source: int, destination: int) -> Row:
         """The transition between two clips; `TransitionError` where the table has none."""
@@ -181,7 +192,7 @@ def header(table: OneHopTable) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "version": VERSION,
-        "columns": list(COLUMNS),
+        "columns": list(table.columns),
         "type": "little-endian 32-bit signed integers",
         "bytes": int(table.entries.size * 4),
         "entries": len(table.entries),
@@ -247,7 +258,8 @@ def read_table(path: Path) -> OneHopTable:
             f"{flat}: expected {said.get('bytes', 'no')} bytes, as {words.name} says, found {len(content)}. "
             "Build it again."
         )
-    return _table(said, np.frombuffer(content, dtype="<i4").astype(np.int32).reshape(-1, len(COLUMNS)), path)
+    width = len(said.get("columns", COLUMNS))
+    return _table(said, np.frombuffer(content, dtype="<i4").astype(np.int32).reshape(-1, width), path)
 
 
 def _table(
@@ -257,7 +269,8 @@ def _table(
     costs: NDArray[np.float64] | None = None,
     direct_costs: NDArray[np.float64] | None = None,
 ) -> OneHopTable:
-    if said.get("format") != FORMAT or said.get("version") != VERSION or tuple(said["columns"]) != COLUMNS:
+    known = (COLUMNS, (*COLUMNS, *BLEND_COLUMNS))
+    if said.get("format") != FORMAT or said.get("version") != VERSION or tuple(said["columns"]) not in known:
         raise TransitionError(
             f"{path}: expected a {FORMAT} of version {VERSION} with columns {', '.join(COLUMNS)}, found "
             f"{said.get('format')} {said.get('version')} {said.get('columns')}. Build it again."

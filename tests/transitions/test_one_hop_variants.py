@@ -1,0 +1,329 @@
+"""Variants of the search: beats, genres, ends that don't overlap, body parts, blends of their own length, chains."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.errors import TransitionError
+from study.motion import quaternions as quat
+from study.motion.clip import Clip, trim
+from study.motion.skeleton import Skeleton
+from study.motion.synthetic import synthesize
+from study.transitions.blend_length import blend_length
+from study.transitions.one_hop import beats as on_beat
+from study.transitions.one_hop.adaptive import UNIT, build_adaptive, geodesic_blends
+from study.transitions.one_hop.build import build_table
+from study.transitions.one_hop.chains import find_chains
+from study.transitions.one_hop.connect import connect
+from study.transitions.one_hop.parts import part_joints, part_weights, put_together
+from study.transitions.one_hop.play import Step, Trigger, play, play_steps
+from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch
+from study.transitions.weights import joint_weights
+
+DISTANCE = PointCloudDistance()
+
+
+def turning(frames: int, seed: int, fps: float = 30.0) -> Clip:
+    """A leg that swings, on the roles that the weights of 2003 need."""
+    rng = np.random.default_rng(seed)
+    names, parents = ["Hips"], [-1]
+    for side in ("Left", "Right"):
+        for part in ("UpLeg", "Leg", "Arm", "ForeArm"):
+            parents.append(0 if part in ("UpLeg", "Arm") else len(names) - 1)
+            names.append(side + part)
+    skeleton = Skeleton(
+        tuple(names), np.array(parents), rng.uniform(-0.3, 0.3, (9, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    )
+    turns = 0.15 * np.cumsum(rng.standard_normal((frames, 9, 3)), axis=0)
+    path = np.cumsum(rng.standard_normal((frames, 3)) * 0.03, axis=0)
+    return Clip(skeleton, path, quat.exp(turns), fps, f"turning {seed}")
+
+
+def one_rig(*lengths: int) -> tuple[Clip, ...]:
+    clips = [turning(length, k) for k, length in enumerate(lengths)]
+    return tuple(Clip(clips[0].skeleton, c.root_positions, c.rotations, c.fps, c.name) for c in clips)
+
+
+# Beats (section 4.4)
+
+
+@pytest.mark.parametrize("tempo", [84.0, 100.0, 143.0])
+def test_the_tempo_of_a_dancer_is_found(tempo: float) -> None:
+    """A joint that swings once in two beats comes to rest on each."""
+    clip = one_rig(300)[0]
+    times = np.arange(300) / 30.0
+    angle = 0.6 * np.cos(np.pi * tempo / 60.0 * times)
+    rotations = np.tile([1.0, 0.0, 0.0, 0.0], (300, 9, 1))
+    rotations[:, 1] = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), angle)
+    swinging = Clip(clip.skeleton, np.zeros((300, 3)), rotations, 30.0, "swing")
+    found = on_beat.find_beats(swinging)
+    expected = on_beat.regular_beats(swinging, tempo)
+    inner = expected[(expected > 30) & (expected < 270)]
+    assert all(np.abs(found - beat).min() <= 2 for beat in inner)
+    assert len(found) == pytest.approx(len(expected), abs=1)
+
+
+def test_beats_from_a_file(tmp_path: Path) -> None:
+    clip = one_rig(90)[0]
+    (tmp_path / "a.beats").write_text("# time beat\n0.5 1\n1.0 2\n\n1.5 3\n7.0 4\n")
+    assert on_beat.read_beats(tmp_path / "a.beats", clip).tolist() == [15, 30, 45]
+    (tmp_path / "b.beats").write_text("0.5\nend\n")
+    with pytest.raises(TransitionError, match=r"b\.beats:2: expected a time in seconds, found 'end'"):
+        on_beat.read_beats(tmp_path / "b.beats", clip)
+
+
+def test_offsets_put_beats_on_beats() -> None:
+    source, hop = np.array([10, 25, 40, 55, 70]), np.array([4, 19, 34])
+    offsets = on_beat.beat_offsets(source, hop, tolerance=0)
+    assert offsets.tolist() == [-24, -9, 6, 21, 36, 51, 66]
+    for offset in offsets:
+        shown = [beat + offset for beat in hop if 10 <= beat + offset <= 70]
+        assert set(shown) <= set(source.tolist())
+        assert shown
+    assert len(on_beat.beat_offsets(source, np.array([0, 11, 22, 33]), tolerance=0)) < 5
+    assert len(on_beat.beat_offsets(source, np.zeros(0, dtype=np.int64))) == 0
+
+
+def test_a_beat_aware_search_uses_those_offsets_only_and_costs_no_less() -> None:
+    clips = one_rig(80, 90, 70)
+    beats = {number: on_beat.regular_beats(clip, 150.0, 0.1 * number) for number, clip in enumerate(clips)}
+    offsets = on_beat.all_beat_offsets(beats, [0], range(3))
+    settings, switches = (
+        Settings(6, 12, 12),
+        (Switch(0, 1, Alignment(offset=int(offsets[0, 1][len(offsets[0, 1]) // 2]))),),
+    )
+    free = build_table(Problem(clips, switches, settings, 100, DISTANCE))
+    kept = build_table(Problem(clips, switches, settings, 100, DISTANCE, offsets=offsets))
+    some = kept.entries[:, 0] >= 0
+    assert some.sum() > 40
+    assert all(entry[1] in offsets[0, int(entry[0])] for entry in kept.entries[some])
+    assert (kept.costs[some] >= free.costs[some]).all()
+    assert (kept.costs[some] <= kept.direct_costs[some]).all()
+
+
+# Genres (section 5, Eq. 6)
+
+
+def test_a_genre_is_preferred_by_its_cost() -> None:
+    clips = one_rig(80, 90, 70, 85)
+    genres = ("jazz", "jazz", "pop", "pop")
+    switches = (Switch(0, 1, Alignment(offset=0)),)
+    hops = []
+    for cost in (0.0, 0.02, 3.0):
+        costs = on_beat.genre_costs(genres, "pop", cost, DISTANCE)
+        table = build_table(Problem(clips, switches, Settings(6, 12, 12), 100, DISTANCE, hop_costs=costs))
+        hops.append(np.isin(table.entries[table.entries[:, 0] >= 0, 0], (2, 3)).mean())
+    assert hops[0] < hops[1] < hops[2]
+    assert hops[2] > 0.5
+    with pytest.raises(TransitionError, match=r"genres \(jazz, pop\), got 'waltz'"):
+        on_beat.genre_costs(genres, "waltz", 1.0, DISTANCE)
+
+
+# No overlap (section 5, Connection of nonoverlapping motions)
+
+
+def test_a_connection_is_the_best_of_all_hops_frames_and_stays() -> None:
+    clips, settings = one_rig(40, 50, 45), Settings(6, 12, 9)
+    problem = Problem(clips, (), settings, 50, DISTANCE)
+    found = connect(problem, 0, 1)
+    prepared = [DISTANCE.prepare(clip, 6) for clip in clips]
+    whole = [range(clip.frames - 5) for clip in clips]
+    costs = []
+    for hop in range(3):
+        first = DISTANCE.counts(prepared[0], prepared[hop], 6, whole[0], whole[hop])[-1]
+        second = DISTANCE.counts(prepared[1], prepared[hop], 6, whole[1], whole[hop])[0]
+        costs += [
+            (int(first[frame]) + int(second[frame + 6 + stay]) + 50 * stay, hop, frame, stay)
+            for frame, stay in product(range(len(first)), range(10))
+            if frame + 6 + stay < len(second)
+        ]
+    cost, hop, frame, stay = min(costs)
+    entry = found.entry
+    assert (entry.hop, 34 - entry.offset, entry.stay_hop) == (hop, frame, stay)
+    assert found.cost == pytest.approx(cost * DISTANCE.unit, abs=3 * DISTANCE.unit)
+    steps = [Step(0, entry.hop, entry.offset, 6), Step(entry.stay_hop, 1, found.alignment.offset or 0, 6)]
+    played = play_steps(clips, 0, 0, 34, steps)
+    assert played.segments[-1].clip_start == 6
+    assert played.clip.frames == 34 + 6 + stay + 50
+    with pytest.raises(TransitionError, match="at least 6 frames, the blend"):
+        connect(Problem((clips[0], trim(clips[1], 0, 4)), (), settings), 0, 1)
+
+
+# Upper and lower body apart (section 5, Separate handling of body parts)
+
+
+def test_each_part_has_its_own_transition_and_they_end_together() -> None:
+    clips = tuple(synthesize(name, seconds=6.0, fps=30.0, seed=k) for k, name in enumerate(("dance", "box", "walk")))
+    skeleton = clips[0].skeleton
+    upper = part_joints(skeleton, "upper")
+    assert upper[[skeleton.role(role) for role in ("spine", "head", "elbow.L", "wrist.R")]].all()
+    assert not upper[[skeleton.role(role) for role in ("pelvis", "knee.L", "ankle.R")]].any()
+    played = {}
+    for part in ("lower", "upper"):
+        distance = PointCloudDistance(part_weights(skeleton, part))
+        problem = Problem(clips, (Switch(0, 1),), Settings.at(30.0), 5000, distance)
+        played[part] = play(clips, build_table(problem), [Trigger(30, 1)]).clip
+    whole = put_together(played["lower"], played["upper"])
+    assert np.array_equal(whole.root_positions, played["lower"].root_positions)
+    knee, elbow = skeleton.role("knee.L"), skeleton.role("elbow.L")
+    assert np.allclose(np.abs(np.sum(whole.rotations[:, knee] * played["lower"].rotations[:, knee], axis=-1)), 1)
+    assert np.allclose(np.abs(np.sum(whole.rotations[:, elbow] * played["upper"].rotations[:, elbow], axis=-1)), 1)
+    with pytest.raises(TransitionError, match="one rig and length"):
+        put_together(played["lower"], trim(clips[0], 0, 99))
+
+
+# A bound on the duration (section 5, Higher responsiveness)
+
+
+def test_a_bound_on_both_stays_holds() -> None:
+    clips = one_rig(80, 90, 70)
+    switches = (Switch(0, 1, Alignment(offset=0)), Switch(1, 2, Alignment(destination_frame=5)))
+    free = build_table(Problem(clips, switches, Settings(6, 12, 12), 0, DISTANCE))
+    bounded = build_table(Problem(clips, switches, Settings(6, 12, 12, 8), 0, DISTANCE))
+    some = bounded.entries[:, 0] >= 0
+    assert (free.entries[some, 2:].sum(axis=1) > 8).any()
+    assert (bounded.entries[some, 2:].sum(axis=1) <= 8).all()
+    assert (bounded.costs[some] >= free.costs[some]).all()
+
+
+def test_hops_kept_near_to_direct_are_the_destination() -> None:
+    clips = one_rig(80, 90, 70)
+    problem = Problem(
+        clips, (Switch(0, 1, Alignment(offset=-3)),), Settings(6, 12, 12), 10, DISTANCE, nearest_to_direct=2
+    )
+    table = build_table(problem)
+    some = table.entries[:, 0] >= 0
+    assert set(table.entries[some, 0].tolist()) == {1}
+    assert np.abs(table.entries[some, 1] + 3).max() <= 2
+    assert (table.costs[some] <= table.direct_costs[some]).all()
+
+
+# Blend lengths by the geodesic method (section 5, Blending duration)
+
+
+def test_each_blend_has_the_length_of_the_geodesic_method() -> None:
+    a, b = one_rig(40, 45)
+    weights = joint_weights(a.skeleton, "wang2003")
+    blends = geodesic_blends(a, b, weights, 3, 20)
+    assert (blends.counts[38:] >= 2**29).all()
+    for i, j in ((0, 0), (5, 17), (12, 3), (18, 25)):
+        one = blend_length(a, b, i, j, method="geodesic", shortest=3, longest=20, specification="left", restrict=True)
+        assert blends.counts[i, j] * UNIT == pytest.approx(one.cost, abs=UNIT)
+        assert one.costs is not None
+        assert one.costs[blends.lengths[i, j] - 3] == pytest.approx(one.cost, abs=2 * UNIT)
+
+
+@pytest.mark.parametrize("alignment", [Alignment(offset=-2), Alignment(destination_frame=4)])
+def test_adaptive_entries_equal_exhaustive_search(alignment: Alignment) -> None:
+    clips, low, high, stay_most, weight = one_rig(22, 25, 20), 2, 7, 3, 400
+    table = build_adaptive(
+        clips,
+        [Switch(0, 1, alignment)],
+        weight * UNIT,
+        settings=Settings(1, stay_most, stay_most),
+        shortest=low,
+        longest=high,
+    )
+    weights = joint_weights(clips[0].skeleton, "wang2003")
+    blends = {(k, hop): geodesic_blends(clips[k], clips[hop], weights, low, high) for k in (0, 1) for hop in range(3)}
+    assert table.columns[4:] == ("blend_first", "blend_second")
+    for trigger in range(22):
+        to = alignment.offset_at(trigger)
+        found = []
+        for s, hop in product(range(stay_most + 1), range(3)):
+            first, second = blends[0, hop], blends[1, hop]
+            for u in range(clips[hop].frames):
+                if trigger + s >= 22 or first.counts[trigger + s, u] >= 2**29:
+                    continue
+                b = int(first.lengths[trigger + s, u])
+                c = int(first.counts[trigger + s, u]) + weight * (s + b - low)
+                e, v = trigger + s + b - to, u + b
+                if hop == 1 and e == v and 0 <= e <= 25:
+                    found.append((c, s, hop, u, 0, b, 0))
+                for h in range(stay_most + 1):
+                    if 0 <= e + h < 25 and v + h < clips[hop].frames and second.counts[e + h, v + h] < 2**29:
+                        b2 = int(second.lengths[e + h, v + h])
+                        cost = c + int(second.counts[e + h, v + h]) + weight * (h + b2 - low)
+                        found.append((cost, s, hop, u, h, b, b2))
+        entry = table.entries[trigger].tolist()
+        if not found:
+            assert entry == [-1, 0, 0, 0, 0, 0]
+            continue
+        cost, s, hop, u, h, b, b2 = min(found)
+        assert entry == [hop, trigger + s - u, s, h, b, b2]
+        assert table.costs[trigger] == cost * UNIT
+        assert table.costs[trigger] <= table.direct_costs[trigger]
+    played = play(clips, table, [Trigger(3, 1)])
+    entry = table.look_up(0, 1, 3)
+    assert entry is not None
+    assert played.segments[1].stop - played.segments[1].start == entry.blend_first
+
+
+# More than one hop (section 5, Multiple hops)
+
+
+def cheapest_chain(
+    costs: dict[tuple[int, int], np.ndarray], clips: tuple[Clip, ...], settings: Settings, weight: int, to: int
+) -> dict[int, float]:
+    """By triggered frame the least cost from clip 0 to clip 1 with at most two hops, by trying everything."""
+    blend, stays = settings.blend_frames, range(settings.longest_stay_hop + 1)
+
+    def cheapest(clip: int, frame: int, time: int, left: int, hopped: bool) -> float:
+        best = 0.0 if hopped and clip == 1 and frame == time and 0 <= time <= clips[1].frames else np.inf
+        for stay in stays:
+            if frame + stay >= clips[clip].frames - blend + 1:
+                break
+            there = time + stay
+            if hopped and 0 <= there < clips[1].frames - blend + 1:
+                best = min(best, costs[clip, 1][frame + stay, there] + weight * stay)
+            for hop in range(len(clips)) if left else ():
+                for start in range(clips[hop].frames - blend + 1):
+                    cost = costs[clip, hop][frame + stay, start] + weight * stay
+                    if cost < best:
+                        best = min(best, cost + cheapest(hop, start + blend, there + blend, left - 1, True))
+        return best
+
+    return {trigger: cheapest(0, trigger, trigger - to, 2, False) for trigger in range(clips[0].frames)}
+
+
+def test_two_hops_equal_exhaustive_search_and_never_cost_more_than_one() -> None:
+    clips, settings, weight = one_rig(14, 16, 12), Settings(3, 2, 2), 300
+    problem = Problem(clips, (), settings, weight, DISTANCE)
+    prepared = [DISTANCE.prepare(clip, 3) for clip in clips]
+    windows = [range(clip.frames - 2) for clip in clips]
+    costs = {
+        (a, b): DISTANCE.counts(prepared[a], prepared[b], 3, windows[a], windows[b]) for a in range(3) for b in range(3)
+    }
+    switch = Switch(0, 1, Alignment(offset=-1))
+    expected = cheapest_chain(costs, clips, settings, weight, -1)
+    two, one = (find_chains(problem, switch, hops) for hops in (2, 1))
+    table = build_table(Problem(clips, (switch,), settings, weight, DISTANCE))
+    gained = 0
+    for trigger in range(14):
+        chain, single = two[trigger], one[trigger]
+        if chain is None:
+            assert expected[trigger] == np.inf
+            assert single is None
+            continue
+        assert chain.cost == pytest.approx(expected[trigger] * DISTANCE.unit, abs=4 * DISTANCE.unit)
+        if single is not None:
+            assert single.cost == pytest.approx(table.costs[trigger], abs=2 * DISTANCE.unit)
+            assert len(single.steps) == 2
+            assert chain.cost <= single.cost
+            gained += chain.cost < single.cost
+        played = play_steps(clips, 0, 0, trigger, chain.steps)
+        assert played.segments[-1].clip == 1
+        assert played.clip.frames == 16 - 1  # the destination stands one frame before the source, and ends as it would
+    assert gained > 2
+
+
+def test_chains_that_need_too_much_memory_are_refused() -> None:
+    problem = Problem(one_rig(60, 60), (), Settings(3, 2, 2), 300, DISTANCE)
+    with pytest.raises(TransitionError, match=r"chains of 116 hop frames needs .* GB\. Give fewer"):
+        find_chains(problem, Switch(0, 1, Alignment(offset=0)), 2, memory_bytes=1000)
+    with pytest.raises(TransitionError, match="an alignment by an offset"):
+        find_chains(problem, Switch(0, 1, Alignment(destination_frame=0)), 2)
