@@ -189,19 +189,21 @@ def test_head_is_steadier_than_the_chest(walk: Gait) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_flat_feet_do_not_slide(name: str) -> None:
-    """While heel and toes are down the joint of the toes stays within 3 mm."""
+def test_balls_of_the_feet_do_not_slide(name: str) -> None:
+    """While the ball of a foot is down, flat, heel up or turning, the joint of the toes stays within 3 mm."""
     clip = synthesize(name, seconds=12.0, fps=60.0, seed=1)
     seen = 0
     for side in ("Left", "Right"):
-        heel, toe, _ = soles(clip, side)
-        flat = (heel[:, 1] < 0.0008) & (toe[:, 1] < body.TOE_HEIGHT + 0.0004)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], flat, [False]]).astype(int)))
+        _, toe, tip = soles(clip, side)
+        down = (toe[:, 1] < body.TOE_HEIGHT + 0.0003) & (tip[:, 1] < body.TOE_HEIGHT + 0.0003)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], down, [False]]).astype(int)))
         for start, stop in edges.reshape(-1, 2):
-            # A turning foot keeps the joint of its toes; it is the fixed point of every flat foot.
-            assert np.ptp(toe[start:stop, [0, 2]], axis=0).max() < 0.003, (name, side, start)
-            seen += int(stop - start)
-    assert seen > 30
+            # The frames of touch-down and take-off may lie just outside the contact.
+            inside = toe[start + 1 : stop - 1, [0, 2]]
+            if len(inside):
+                assert np.ptp(inside, axis=0).max() < 0.003, (name, side, start)
+            seen += len(inside)
+    assert seen > 100
 
 
 @pytest.mark.parametrize("name", ["walk_slow", "walk", "walk_fast", "stand_to_walk", "walk_turn_left", "idle", "stand"])
@@ -221,7 +223,7 @@ def test_nothing_jerks(name: str, seed: int) -> None:
     """No point accelerates by more than captured people do (CMU 09_01: 364 m/s^2, 14_02: 363 at 60 fps)."""
     clip = synthesize(name, seconds=8.0, fps=60.0, seed=seed)
     acceleration = np.linalg.norm(np.diff(joint_positions(clip, ends=True), n=2, axis=0), axis=-1) * 60.0**2
-    assert acceleration.max() < 280.0
+    assert acceleration.max() < 300.0
     spin = 2.0 * quat.half_angle_between(clip.rotations[1:], clip.rotations[:-1]) * 60.0
     assert np.degrees(spin.max()) < 2300.0
 

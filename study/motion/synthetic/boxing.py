@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from study.motion.synthetic.curves import running_integral, slow_noise
 from study.motion.synthetic.locomotion import grid
 from study.motion.synthetic.score import Score, perform
 from study.motion.synthetic.targets import LEFT, RIGHT, Targets
@@ -20,7 +21,7 @@ _STYLE = {
     "off_pitch": 0.45,
     "heel_off": 0.75,
     "nominal_s": 0.6,
-    "swing_knee": 0.95,
+    "swing_knee": 0.70,
     "swing_peak": 0.42,
     "knee": 0.5,
 }
@@ -35,20 +36,30 @@ _COMBINATIONS = (
     ("jab", "cross", "hook", "cross"),
     ("jab", "slip_right", "cross", "hook"),
     ("jab", "body_cross", "hook"),
+    ("jab", "cross", "duck", "hook", "cross"),
     ("slip_left", "hook", "cross"),
     ("jab", "cross", "slip_left", "hook", "cross"),
 )
-_SINGLES = (("jab",), ("jab", "jab"), ("jab", "cross"), ("jab",), ("slip_right", "jab"), ("jab", "cross", "hook"))
+_SINGLES = (
+    ("jab",),
+    ("jab", "jab"),
+    ("jab", "cross"),
+    ("slip_right", "jab"),
+    ("duck",),
+    ("jab", "duck", "cross"),
+    ("jab", "cross", "hook"),
+    ("slip_left", "slip_right"),
+)
 
 
 def box(seconds: float, rng: np.random.Generator, *, tempo: float = 1.0) -> Targets:
     """Moving about in guard, with single punches and short combinations between steps."""
-    return _bout(seconds, rng, _SINGLES, pause=(0.7, 1.7), tempo=tempo)
+    return _bout(seconds, rng, _SINGLES, pause=(0.4, 1.2), tempo=tempo)
 
 
 def box_combination(seconds: float, rng: np.random.Generator, *, tempo: float = 1.0) -> Targets:
     """Combinations of three to five punches with little rest."""
-    return _bout(seconds, rng, _COMBINATIONS, pause=(0.35, 0.9), tempo=tempo)
+    return _bout(seconds, rng, _COMBINATIONS, pause=(0.2, 0.7), tempo=tempo)
 
 
 def _bout(
@@ -70,11 +81,11 @@ def _bout(
         for name in phrases[int(rng.integers(len(phrases)))]:
             time = _MOVES[name](score, time, rng, tempo)
         time += float(rng.uniform(*pause)) / tempo * 0.5
-        if rng.random() < 0.6:
+        if rng.random() < 0.75:
             time, centre = _steps(score, time, centre, rng, tempo)
         time += float(rng.uniform(*pause)) / tempo * 0.5
     _bounce(score, rng, tempo)
-    return perform(score, rng, unrest=1.2)
+    return perform(score, rng, unrest=1.5)
 
 
 def _take_guard(score: Score) -> None:
@@ -92,14 +103,18 @@ def _take_guard(score: Score) -> None:
 
 def _bounce(score: Score, rng: np.random.Generator, tempo: float) -> None:
     """The light rise and fall of someone on the balls of his feet, now stronger, now weaker."""
-    from study.motion.synthetic.curves import running_integral, slow_noise
-
     rate = 1.75 * tempo * (1.0 + 0.08 * slow_noise(rng, score.times, 1.0)[:, 0])
     size = np.clip(1.0 + 0.5 * slow_noise(rng, score.times, 1.0)[:, 0], 0.2, 2.0)
     beat = 2 * np.pi * running_integral(rate)
-    score.crouch.values[:, 0] += 0.009 * size * np.cos(beat)
-    score.shift.values[:, 1] += 0.010 * size * np.cos(0.5 * beat)
-    score.shift.values[:, 0] += 0.006 * size * np.sin(0.5 * beat)
+    score.crouch.values[:, 0] += 0.014 * size * np.cos(beat)
+    score.shift.values[:, 1] += 0.018 * size * np.cos(0.5 * beat)
+    score.shift.values[:, 0] += 0.012 * size * np.sin(0.5 * beat)
+    # The trunk never holds still: it weaves, and the head goes with it less than the shoulders do.
+    weave = np.radians([4.5, 2.5, 3.5]) * slow_noise(rng, score.times, 1.0, 3, (0.25, 0.9))
+    score.chest.values += weave
+    score.pelvis.values += 0.4 * weave
+    score.head.values += 0.3 * weave
+    score.shift.values[:, 0] -= 0.20 * weave[:, 2]
     for side in (LEFT, RIGHT):
         lag = 0.6 + 0.3 * side
         score.hands[side].values[:, 1] += 0.007 * size * np.cos(beat - lag)
@@ -112,10 +127,10 @@ def _steps(
 ) -> tuple[float, FloatArray]:
     """A small step: the foot on the side to which one goes moves first, the other follows to keep the stance."""
     # Back toward the middle of the ring the farther out one is.
-    to = np.clip(rng.normal(0.0, [0.12, 0.17]) - 0.45 * centre, -0.24, 0.24)
+    to = np.clip(rng.normal(0.0, [0.16, 0.20]) - 0.40 * centre, -0.28, 0.28)
     first = LEFT if to[1] + 0.6 * to[0] > 0 else RIGHT
     new = centre + to
-    long, gap = 0.19 / tempo, 0.13 / tempo
+    long, gap = 0.22 / tempo, 0.13 / tempo
     for index, side in enumerate((first, 1 - first)):
         place = (_LEFT_PLACE, _RIGHT_PLACE)[side]
         yaw = (_LEFT_YAW, _RIGHT_YAW)[side] + rng.normal(0.0, 0.05)
@@ -194,6 +209,21 @@ def _slip(score: Score, time: float, rng: np.random.Generator, tempo: float, tow
     return end - 0.08
 
 
+def _duck(score: Score, time: float, rng: np.random.Generator, tempo: float) -> float:
+    """Under a swing: the knees bend deep, the back leans, the head passes from one side to the other."""
+    down, up = 0.30 / tempo, 0.36 / tempo
+    low, end = time + down, time + down + up
+    toward = 1.0 if rng.random() < 0.5 else -1.0
+    deep = 0.075 + float(rng.uniform(0.15, 0.21))
+    score.crouch.visit(time, low, end + 0.08, deep)
+    score.chest.move(time, low, [_STANCE_YAW + 0.10 * toward, np.radians(32.0), -toward * np.radians(9.0)])
+    score.chest.move(low - 0.08, end, [_STANCE_YAW - 0.10 * toward, np.radians(18.0), toward * np.radians(9.0)])
+    score.chest.move(end - 0.06, end + 0.25, [_STANCE_YAW - 0.03, np.radians(12.0), 0.0])
+    score.head.visit(time, low, end, [np.radians(-6.0), np.radians(16.0), 0.0])
+    score.shift.visit(time, low, end, [0.05 * toward, -0.02])
+    return end
+
+
 def _slip_left(score: Score, time: float, rng: np.random.Generator, tempo: float) -> float:
     return _slip(score, time, rng, tempo, 1.0)
 
@@ -215,6 +245,7 @@ _MOVES = {
     "cross": _cross,
     "body_cross": _body_cross,
     "hook": _hook,
+    "duck": _duck,
     "slip_left": _slip_left,
     "slip_right": _slip_right,
 }
