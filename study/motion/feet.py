@@ -79,17 +79,6 @@ def stance(clip: Clip, *, floor: float | None = None) -> BoolArray:
     return planted
 
 
-def stance_speeds(clip: Clip, *, floor: float | None = None) -> FloatArray:
-    """Speed over the floor, m/s, of the lowest point of each foot in each frame in which it bears weight `(n,)`."""
-    planted = stance(clip, floor=floor)
-    speeds = []
-    for side, points in enumerate(foot_points(clip)):
-        lowest = np.argmin(points[..., 1], axis=1)
-        frames = np.flatnonzero(planted[:, side])
-        speeds.append(horizontal_speeds(points, clip.fps)[frames, lowest[frames]])
-    return np.concatenate(speeds)
-
-
 def heading(clip: Clip) -> FloatArray:
     """Which way the hips face in each frame, radians about the vertical from +Z towards +X, continuous `(frames,)`.
 
