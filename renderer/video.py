@@ -83,7 +83,7 @@ def frame_rate(fps: float | Fraction) -> Fraction:
     # Broadcast rates and whole ones, within what files round to; any other number as it is.
     whole = Fraction(round(rate))
     broadcast = Fraction(round(rate) * 1000, 1001)
-    for nice, tolerance in ((whole, 2e-5), (broadcast, 2e-4)):
+    for nice, tolerance in ((whole, 1e-4), (broadcast, 2e-4)):
         if abs(nice - rate) <= tolerance * rate:
             return nice
     return rate.limit_denominator(60_000)
