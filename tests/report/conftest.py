@@ -129,10 +129,10 @@ def _pairs(protocol: Protocol, record: Callable[[str, str, int], StimulusRecord]
 def results_folder(tmp_path: Path) -> Callable[..., Path]:
     """A function that makes a results folder, with as many simulated participants as asked for."""
 
-    def make(participants: int = 6, *, synthetic: bool = True, protocol_text: str = PROTOCOL, videos: int = 2) -> Path:
+    def make(participants: int = 4, *, synthetic: bool = True, title: str = "A small study", videos: int = 2) -> Path:
         folder = tmp_path / "small"
         (folder / "stimuli").mkdir(parents=True)
-        (folder / "protocol.toml").write_text(protocol_text, encoding="utf-8")
+        (folder / "protocol.toml").write_text(PROTOCOL.replace("A small study", title), encoding="utf-8")
         protocol = load_protocol(folder / "protocol.toml")
         records: dict[str, StimulusRecord] = {}
 

@@ -1,0 +1,194 @@
+"""The report as a whole: self-contained, marked, escaped, repeatable, and honest on poor data."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from study.errors import AnalysisError, SegueError
+from study.report.document import gather, write_report
+
+MakeFolder = Callable[..., Path]
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """Elements, ids and links of a page; an element that is closed out of order is an error."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(text)
+        assert not self.open, f"never closed: {self.open}"
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.tags.append((tag, values))
+        self.ids += [values["id"] or ""] if "id" in values else []
+        self.links += [value for key, value in attrs if key in ("href", "src", "xlink:href") and value]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.fixture
+def written(results_folder: MakeFolder) -> tuple[Path, Page]:
+    path = write_report(results_folder(), resamples=50)
+    return path, Page(path.read_text(encoding="utf-8"))
+
+
+def test_the_page_needs_nothing_but_itself(written: tuple[Path, Page]) -> None:
+    path, page = written
+    assert path.name == "report.html"
+    for link in page.links:
+        assert link.startswith(("#", "data:")), link
+    text = path.read_text(encoding="utf-8")
+    assert not re.search(r"https?://(?!www\.w3\.org/)", text), "an address outside of SVG's namespaces"
+    assert "@import" not in text
+    assert not any(tag == "script" for tag, _ in page.tags)
+    assert "default-src 'none'" in text
+
+
+def test_ids_are_unique_and_inner_links_lead_somewhere(written: tuple[Path, Page]) -> None:
+    _, page = written
+    assert len(page.ids) == len(set(page.ids))
+    for link in page.links:
+        if link.startswith("#"):
+            assert link[1:] in page.ids
+
+
+def test_every_study_has_a_headline_figures_and_tables(written: tuple[Path, Page]) -> None:
+    path, page = written
+    text = path.read_text(encoding="utf-8")
+    for words in ("Just noticeable difference", "Geodesic against fixed", "Naturalness", "Versions and hashes"):
+        assert words in page.text
+    assert "Simulated observers called 75% of pairs different" in page.text
+    assert "answers favoured geodesic over fixed" in page.text
+    drawings = re.findall(r'<svg[^>]* role="img" aria-labelledby="([^" ]+) ([^"]+)"', text)
+    assert len(drawings) >= 6
+    for title, description in drawings:
+        assert title in page.ids
+        assert description in page.ids
+
+
+def test_simulated_answers_and_synthetic_motions_are_marked_at_the_top_and_on_every_figure(
+    written: tuple[Path, Page],
+) -> None:
+    path, page = written
+    text = path.read_text(encoding="utf-8")
+    top = page.text[: page.text.index("In short")]
+    assert "These answers are simulated" in top
+    assert "The motions are synthetic" in top
+    drawings = re.findall(r"<svg.*?</svg>", text, flags=re.DOTALL)
+    assert drawings
+    for svg in drawings:
+        assert "simulated answers, no people · synthetic motions, none captured" in svg
+
+
+def test_captured_motions_are_not_called_synthetic(results_folder: MakeFolder) -> None:
+    text = write_report(results_folder(synthetic=False), resamples=20).read_text(encoding="utf-8")
+    assert "synthetic motions" not in text
+    assert "obtained from mocap.cs.cmu.edu" in text
+    assert "16_47" not in text
+    assert "35_01" in text
+
+
+def test_tables_are_written_as_csv_and_json(written: tuple[Path, Page]) -> None:
+    path, _ = written
+    folder = path.parent / "tables"
+    names = {file.stem for file in folder.glob("*.csv")}
+    assert names == {file.stem for file in folder.glob("*.json")} - {"analysis"}
+    assert {"jnd_percent_different", "jnd_thresholds", "stimuli", "motions", "participants"} <= names
+    with (folder / "jnd_percent_different.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["difference_frames"]) for row in rows] == [-15, -10, -5, 0, 5, 10, 20]
+    content = json.loads((folder / "jnd_percent_different.json").read_text(encoding="utf-8"))
+    assert float(rows[0]["percent"]) == content["rows"][0]["percent"]
+    assert set(json.loads((folder / "analysis.json").read_text(encoding="utf-8"))) >= {"jnd", "preference", "ratings"}
+
+
+def test_the_same_folder_gives_the_same_bytes(results_folder: MakeFolder) -> None:
+    folder = results_folder(3)
+    first = write_report(folder, resamples=20).read_bytes()
+    assert write_report(folder, resamples=20).read_bytes() == first
+    assert not list(folder.rglob("*.part"))
+
+
+def test_what_people_wrote_is_escaped(results_folder: MakeFolder) -> None:
+    attack = "<script>alert(1)</script> & $x^2$"
+    page = write_report(results_folder(2, title=attack), resamples=20).read_text(encoding="utf-8")
+    assert "<script>" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x^2$" in page
+
+
+def test_a_folder_without_answers_is_refused(results_folder: MakeFolder) -> None:
+    folder = results_folder(0)
+    with pytest.raises(AnalysisError, match="expected answers, found none"):
+        write_report(folder)
+    (folder / "responses.sqlite").unlink()
+    with pytest.raises(AnalysisError, match="found no database"):
+        write_report(folder)
+    assert not (folder / "report.html").exists()
+
+
+def test_a_folder_without_manifest_is_refused(results_folder: MakeFolder) -> None:
+    folder = results_folder(1)
+    (folder / "manifest.json").unlink()
+    with pytest.raises(SegueError, match="manifest"):
+        write_report(folder)
+
+
+def test_one_participant_and_no_videos(results_folder: MakeFolder) -> None:
+    path = write_report(results_folder(1, videos=0), resamples=20)
+    page = Page(path.read_text(encoding="utf-8"))
+    assert "1 simulated observer" in page.text
+    assert not any(tag in ("video", "img") for tag, _ in page.tags)
+    assert "None" not in page.text.replace("None of them was captured", "")
+    assert "nan" not in page.text.lower()
+
+
+def test_known_truth_of_simulated_observers_stands_beside_what_was_found(written: tuple[Path, Page]) -> None:
+    path, _ = written
+    with (path.parent / "tables" / "jnd_recovery.csv").open(encoding="utf-8") as file:
+        rows = {(row["estimate"], row["side"]): row for row in csv.DictReader(file)}
+    assert float(rows["differencing model", "longer"]["known"]) == pytest.approx(7.0)
+    assert float(rows["differencing model", "shorter"]["known"]) == pytest.approx(8.0)
+
+
+def test_importing_the_report_loads_nothing_heavy() -> None:
+    code = (
+        "import sys; import study.report.document, study.report.figures, study.report.drawing; "
+        "heavy = {'matplotlib', 'pandas', 'scipy', 'av', 'PIL', 'jinja2', 'sqlalchemy'} & set(sys.modules); "
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[2])
+
+
+def test_gathering_reads_all_parts(results_folder: MakeFolder) -> None:
+    material = gather(results_folder(2))
+    assert material.protocol.name == "small"
+    assert set(material.answers["participant"]) == {"sim-001", "sim-002"}
+    assert len(material.sessions) == 2

@@ -1,0 +1,112 @@
+"""Cells, CSV and sentences: how numbers are written, and what is said where there are none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study.report import words
+from study.report.media import strip_of_video
+from study.report.tables import as_csv, as_json, make, p_value, written
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "expected"),
+    [
+        (None, "two", "–"),
+        (float("nan"), "two", "–"),
+        (-1.234, "two", "−1.23"),
+        (1470, "count", "1,470"),
+        (-15.0, "count", "−15"),
+        (96.43, "percent", "96.4%"),
+        (0.00001, "p", "< .001"),
+        (0.0121, "p", ".012"),
+        (0.239, "p", ".24"),
+        (1.0, "p", "1.00"),
+    ],
+)
+def test_how_values_are_written(value: Any, kind: Any, expected: str) -> None:
+    assert written(value, kind) == expected
+
+
+def test_p_value_never_rounds_to_nothing() -> None:
+    assert p_value(0.0009999) == "< .001"
+    assert p_value(0.001) == ".001"
+
+
+def test_files_have_all_columns_and_full_numbers() -> None:
+    table = make(
+        "x", "A table.", [("a", "A", "text"), ("b", "B", "one")], [{"a": 'say "x", y', "b": 0.123456789}, {"a": "z"}],
+        files_only=("b",),
+    )  # fmt: skip
+    assert as_csv(table) == 'a,b\n"say ""x"", y",0.123456789\nz,\n'
+    assert json.loads(as_json(table))["rows"] == [{"a": 'say "x", y', "b": 0.123456789}, {"a": "z", "b": None}]
+    assert [[text for text, _ in row] for row in table.cells] == [['say "x", y'], ["z"]]
+
+
+def threshold(side: str, frames: float | None, note: str = "") -> dict[str, Any]:
+    return {
+        "side": side, "frames": frames, "standard_error": None, "interval": {"low": None, "high": None}, "note": note,
+    }  # fmt: skip
+
+
+def test_a_threshold_that_is_not_reached_is_said_to_be_so() -> None:
+    published = {
+        "longer": threshold("longer", None, "not reached within the levels shown (largest 20 frames: 60%)"),
+        "shorter": threshold("shorter", 8.0),
+    }
+    result = {"model": None, "model_note": "every answer was “same”", "published": published, "level": 0.75}
+    statement, detail = words.jnd_headline(result, 30.0, "collected")
+    assert "not reached within the levels shown" in statement
+    assert "8.0 frames (0.27 s) shorter" in statement
+    assert statement.startswith("People called 75%")
+    assert "No model was fitted" in detail
+
+
+def test_intervals_with_open_ends_are_said_to_be_open() -> None:
+    assert words.interval(1.0, 2.0) == "1.0 to 2.0"
+    assert words.interval(1.0, None) == "1.0 or more"
+    assert words.interval(None, 2.0) == "2.0 or less"
+    assert words.interval(None, None) == "no interval"
+
+
+def test_mixed_data_are_marked() -> None:
+    assert "mixed" in words.mark_of("mixed", synthetic=False)
+    (warning,) = words.warnings_of("mixed", synthetic=False, simulated=3, participants=10)
+    assert "3 of 10 participants are simulated" in warning
+    assert words.warnings_of("collected", synthetic=False, simulated=0, participants=10) == []
+    assert words.mark_of("collected", synthetic=False) == ""
+
+
+def test_a_librarys_folder_is_named_without_its_path() -> None:
+    assert words.library("/home/somebody/motions/cmu/") == "cmu"
+    assert words.library("synthetic") == "synthetic"
+
+
+def test_a_strip_shows_the_figure_and_underlines_the_blend(tmp_path: Path) -> None:
+    import io
+
+    import av
+    import numpy as np
+    from PIL import Image
+
+    path = tmp_path / "x.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 160, 120, "yuv420p"
+        for frame in range(30):
+            picture = np.full((120, 160, 3), 250, dtype=np.uint8)
+            picture[30:100, 10 + 4 * frame : 22 + 4 * frame] = 40
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode(None))
+    strip = np.asarray(Image.open(io.BytesIO(strip_of_video(path, 0, 15))).convert("RGB")).astype(int)
+    dark = (strip.max(axis=2) < 90).any(axis=0)
+    starts = int((dark[1:] & ~dark[:-1]).sum())
+    assert starts == 10, "ten moments, the figure in each"
+    foot = strip[-2]
+    blue = (foot[:, 2] - foot[:, 0]) > 80
+    assert blue[: len(blue) // 2 - 4].all()
+    assert not blue[len(blue) // 2 + 4 :].any()
