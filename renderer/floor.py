@@ -25,49 +25,71 @@ _CONTACT_OPACITY, _CONTACT_HEIGHT_M = 0.34, 0.16
 _BODY_OPACITY, _BODY_RADIUS_M = 0.20, 0.42
 
 
-def floor_nv12(figure: Figure, camera: Camera, shift: FloatArray) -> NDArray[np.uint8]:
-    """The floor and the background as an NV12 frame; `shift (3,)` is how far a tracking camera has come, metres."""
+class Floor:
+    """The plane as one camera sees it.
+
+    What does not change while the camera travels straight on is computed once; the grid's lines move.
+    """
+
+    def __init__(self, figure: Figure, camera: Camera) -> None:
+        self._size = camera.size
+        self._ground = to_ycbcr(figure.background)
+        floor = 0.0 if figure.floor_m is None else figure.floor_m
+        way = _rays(camera)
+        falls = (way[1] < -1e-6) & (camera.eye[1] > floor)
+        far = np.where(falls, (floor - camera.eye[1]) / np.where(falls, way[1], -1.0), 0.0)
+        # Half way faded at twice the distance to where the camera looks.
+        reach = far * np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+        scale = 2.0 * float(np.hypot(*camera.eye[[0, 2]])) + 2.0 * abs(float(camera.eye[1] - floor)) + 1.0
+        self._seen = np.where(falls, np.exp(-np.log(2.0) * (reach / scale) ** 2), 0.0)
+        self._lines = [_Lines(camera.eye[axis] + far * way[axis]) for axis in (0, 2)]
+
+    def luma(self, shift: FloatArray) -> FloatArray:
+        """Luma `(height, width)`, not rounded; `shift (3,)` is how far a tracking camera has come, metres."""
+        grid = np.maximum(self._lines[0].at(float(shift[0])), self._lines[1].at(float(shift[2])))
+        shade = 1.0 - self._seen * (1.0 - _FLOOR_SHADE * (1.0 - grid * (1.0 - _GRID_SHADE)))
+        return np.asarray((self._ground[0] - 16.0) * shade + 16.0)
+
+    def nv12(self, shift: FloatArray) -> NDArray[np.uint8]:
+        """The same as an NV12 frame."""
+        width, height = self._size
+        frame = np.empty((height * 3 // 2, width), dtype=np.uint8)
+        frame[:height] = np.round(self.luma(shift))
+        frame[height:, 0::2] = round(self._ground[1])
+        frame[height:, 1::2] = round(self._ground[2])
+        return frame
+
+    def rgb(self) -> NDArray[np.uint8]:
+        """The same as RGB `(height, width, 3)`."""
+        luma = self.luma(np.zeros(3))
+        return to_rgb(luma, np.full_like(luma, self._ground[1]), np.full_like(luma, self._ground[2]))
+
+
+class _Lines:
+    """Lines a metre apart across one axis of the floor, as wide on the screen as they are, and as faint where thin."""
+
+    def __init__(self, metres: FloatArray) -> None:
+        self._metres = metres
+        footprint = np.maximum(np.abs(np.gradient(metres, axis=0)) + np.abs(np.gradient(metres, axis=1)), 1e-6)
+        self._slope = 1.0 / footprint
+        # Where a pixel is wider than a third of the spacing the lines would run into each other: they fade before.
+        self._faint = np.minimum(1.0, 2.0 * _GRID_HALF_WIDTH_M / footprint) * np.clip(1.5 - 3.0 * footprint, 0.0, 1.0)
+
+    def at(self, shift: float) -> FloatArray:
+        """How much of each pixel they cover."""
+        place = self._metres + shift
+        aside = np.abs(place - np.round(place))
+        cover: FloatArray = np.clip(0.5 + (_GRID_HALF_WIDTH_M - aside) * self._slope, 0.0, 1.0) * self._faint
+        return cover
+
+
+def _rays(camera: Camera) -> list[FloatArray]:
+    """The way that each pixel looks: three arrays that go with `(height, width)`, one metre deep."""
     width, height = camera.size
-    luma = _luma(figure, camera, shift)
-    _, blue, red = to_ycbcr(figure.background)
-    frame = np.empty((height * 3 // 2, width), dtype=np.uint8)
-    frame[:height] = np.round(luma)
-    frame[height:, 0::2] = round(blue)
-    frame[height:, 1::2] = round(red)
-    return frame
-
-
-def floor_rgb(figure: Figure, camera: Camera) -> NDArray[np.uint8]:
-    """The same as RGB `(height, width, 3)`."""
-    luma = _luma(figure, camera, np.zeros(3))
-    _, blue, red = to_ycbcr(figure.background)
-    return to_rgb(luma, np.full_like(luma, blue), np.full_like(luma, red))
-
-
-def _luma(figure: Figure, camera: Camera, shift: FloatArray) -> FloatArray:
-    width, height = camera.size
-    ground = to_ycbcr(figure.background)[0]
-    floor = 0.0 if figure.floor_m is None else figure.floor_m
     across = ((np.arange(width) + 0.5 - 0.5 * width) / camera.focal_pixels)[None, :]
     up = ((0.5 * height - np.arange(height) - 0.5) / camera.focal_pixels)[:, None]
     right, above, back = camera.axes
-    way = [across * right[i] + up * above[i] - back[i] for i in range(3)]
-    falls = (way[1] < -1e-6) & (camera.eye[1] > floor)
-    far = np.where(falls, (floor - camera.eye[1]) / np.where(falls, way[1], -1.0), 0.0)
-    reach = far * np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-    # Half way faded at twice the distance to where the camera looks at the floor.
-    scale = 2.0 * float(np.hypot(*camera.eye[[0, 2]])) + 2.0 * abs(float(camera.eye[1] - floor)) + 1.0
-    seen = np.where(falls, np.exp(-np.log(2.0) * (reach / scale) ** 2), 0.0)
-    grid = np.zeros_like(seen)
-    for axis in (0, 2):
-        metres = camera.eye[axis] + shift[axis] + far * way[axis]
-        footprint = np.maximum(np.abs(np.gradient(metres, axis=0)) + np.abs(np.gradient(metres, axis=1)), 1e-6)
-        off = np.abs(metres - np.round(metres))
-        line = np.clip(0.5 + (_GRID_HALF_WIDTH_M - off) / footprint, 0.0, 1.0)
-        thin = np.minimum(1.0, 2.0 * _GRID_HALF_WIDTH_M / footprint)
-        grid = np.maximum(grid, line * thin * np.clip(1.5 - 3.0 * footprint, 0.0, 1.0))
-    shade = 1.0 - seen * (1.0 - _FLOOR_SHADE * (1.0 - grid * (1.0 - _GRID_SHADE)))
-    return np.asarray((ground - 16.0) * shade + 16.0)
+    return [across * right[i] + up * above[i] - back[i] for i in range(3)]
 
 
 def shadow_capsules(

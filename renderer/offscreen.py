@@ -24,7 +24,7 @@ from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
 from renderer.context import Context, shared_context
 from renderer.errors import RendererError
-from renderer.floor import floor_nv12, floor_rgb
+from renderer.floor import Floor
 from renderer.painter import Painter
 from renderer.shapes import Shapes, lay_out
 
@@ -119,7 +119,7 @@ def _start_rgb(target: Any, figure: Figure, camera: Camera) -> None:
     if figure.floor_m is None:
         target.clear(*(value / 255.0 for value in figure.background))
     else:
-        target.color_attachments[0].write(floor_rgb(figure, camera).tobytes(), alignment=1)
+        target.color_attachments[0].write(Floor(figure, camera).rgb().tobytes(), alignment=1)
 
 
 def _painted_rgb(target: Any, painter: Painter, data: NDArray[np.float32], size: tuple[int, int]) -> Bytes:
@@ -175,16 +175,17 @@ class _Backdrop:
         self._path = np.zeros((len(positions), 3))
         if self.moves and camera.track_seconds is not None:
             self._path = smooth_path(positions, camera.track_seconds, fps)
+        self._floor = None if self.plain else Floor(figure, camera)
         self._known: tuple[int, Bytes] | None = None
 
     def frame(self, number: int) -> Bytes:
         """The NV12 frame without the figure; not to be written to."""
         key = number if self.moves else 0
         if self._known is None or self._known[0] != key:
-            if self.plain:
+            if self._floor is None:
                 made = plain_frame(self._camera.size, self._figure.background)
             else:
-                made = floor_nv12(self._figure, self._camera, self._path[number])
+                made = self._floor.nv12(self._path[number])
             self._known = (key, made)
         return self._known[1]
 
