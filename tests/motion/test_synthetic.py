@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,26 @@ def test_values_out_of_range_are_refused(arguments: dict[str, float], message: s
 def test_event_outside_the_motion_is_refused() -> None:
     with pytest.raises(MotionError, match="event_s from 0 to the length of 5 s"):
         synthesize("stand_to_walk", seconds=5.0, event_s=6.0)
+
+
+def test_every_name_and_parameter_is_documented() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "synthetic.md").read_text(encoding="utf-8")
+    for name in NAMES:
+        assert f"`{name}`" in page, name
+        for parameter in describe(name).parameters:
+            assert f"`{parameter}`" in page, parameter
+
+
+def test_library_needs_these_names() -> None:
+    """Protocols name these in every library."""
+    shared = (
+        "walk_slow walk walk_fast jog run run_fast stand idle stand_to_walk stand_to_run walk_to_stop run_to_stop "
+        "walk_turn_left walk_turn_right run_turn_left run_turn_right box box_combination dance dance_modern "
+        "dance_turns tai_chi tai_chi_slow"
+    )
+    assert set(shared.split()) <= set(NAMES)
+
+
+def test_default_lengths_leave_room_around_events() -> None:
+    for name in ("stand_to_walk", "walk_to_stop", "run_turn_left", "walk_turn_right"):
+        assert describe(name).seconds >= 10.0

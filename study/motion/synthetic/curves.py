@@ -7,6 +7,7 @@ rates: a motion is planned on a fixed grid of `GRID_STEP` seconds and sampled fr
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -76,11 +77,16 @@ def clamped_spline(
     return np.asarray(curve(share))
 
 
-def shape_preserving(x: ArrayLike, knots: Sequence[float], values: Sequence[float]) -> FloatArray:
-    """Monotone between the knots: it never leaves the values on either side (PCHIP); held outside the knots."""
+@cache
+def _monotone(knots: tuple[float, ...], values: tuple[float, ...]) -> Any:
     from scipy.interpolate import PchipInterpolator
 
-    return np.asarray(PchipInterpolator(knots, values)(np.clip(x, knots[0], knots[-1])))
+    return PchipInterpolator(knots, values)
+
+
+def shape_preserving(x: ArrayLike, knots: tuple[float, ...], values: tuple[float, ...]) -> FloatArray:
+    """Monotone between the knots: it never leaves the values on either side (PCHIP); held outside the knots."""
+    return np.asarray(_monotone(knots, values)(np.clip(x, knots[0], knots[-1])))
 
 
 def slow_noise(
