@@ -191,6 +191,17 @@ def test_a_floor_at_another_height_is_found_and_put_right(shift: float, kind: st
     assert mend(moved, policy="refuse") is moved
 
 
+def test_a_file_with_z_up_is_told() -> None:
+    clip = swinging()
+    turn = quat.from_axis_angle([1.0, 0, 0], np.pi / 2)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.multiply(turn, rotations[:, 0])
+    lying = replace(clip, rotations=rotations, root_positions=quat.rotate(turn, clip.root_positions))
+    (defect,) = find_defects(lying)
+    assert defect.kind == "not-upright"
+    assert "stands along Z" in defect.message
+
+
 def test_policies() -> None:
     broken = turned(swinging(), "LeftForeArm", 1.2, slice(60, 61))
     assert mend(broken, policy="keep") is broken
