@@ -141,7 +141,7 @@ def compose(material: Material, analysis: Result) -> Page:
         response = Drawing(svg, caption)
     return Page(
         title=protocol.title,
-        source=protocol.source,
+        source=words.sentence(protocol.source),
         facts=_facts(material, analysis),
         warnings=tuple(
             words.warnings_of(data, manifest.synthetic, quality["simulated_participants"], quality["participants"])

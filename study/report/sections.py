@@ -86,6 +86,7 @@ def jnd_section(
             Drawing(figures.motions_figure(result, f"{anchor}-motions", mark), "The same for every motion by itself.")
         )
     shown = [threshold_table(name, result, fps)]
+    by_motion = [motion_threshold_table(name, result, fps)] if len(result["motions"]) > 1 else []
     if known:
         shown.append(recovery_table(name, result, known))
     return Section(
@@ -96,7 +97,7 @@ def jnd_section(
         drawings=tuple(drawings),
         tables=tuple(shown),
         notes=tuple(words.jnd_notes(result)),
-        folded=(percent_table(name, result), motion_threshold_table(name, result, fps), d_prime_table(name, result)),
+        folded=(percent_table(name, result), *by_motion, d_prime_table(name, result)),
     )
 
 
@@ -287,7 +288,7 @@ def preference_table(name: str, comparison: Result) -> Table:
     pooled, people, order = comparison["published"], comparison["participants"], comparison["order"]
     rows: list[dict[str, Any]] = [
         {
-            "reading": "as published, answers as independent",
+            "reading": "as published",
             "percent": pooled["percent"],
             "low": 100 * pooled["interval"]["low"],
             "high": 100 * pooled["interval"]["high"],
@@ -295,9 +296,9 @@ def preference_table(name: str, comparison: Result) -> Table:
             "statistic": pooled["chi_square"],
             "p_value": pooled["p_value"],
         },
-        {"reading": "the same, exact", "test": "binomial", "p_value": pooled["exact_p_value"]},
+        {"reading": "as published, exact", "test": "binomial", "p_value": pooled["exact_p_value"]},
         {
-            "reading": "corrected, participants as independent",
+            "reading": "corrected",
             "percent": people["mean_percent"],
             "low": people["low"],
             "high": people["high"],
@@ -305,20 +306,21 @@ def preference_table(name: str, comparison: Result) -> Table:
             "statistic": people["t"],
             "p_value": people["p_value"],
         },
-        {"reading": "the same, by ranks", "test": "Wilcoxon", "p_value": people["wilcoxon_p_value"]},
+        {"reading": "corrected, by ranks", "test": "Wilcoxon", "p_value": people["wilcoxon_p_value"]},
         {
-            "reading": "pooled, variance over participants",
+            "reading": "corrected, pooled",
             "test": f"F(1, {people['participants'] - 1})",
             "statistic": people["robust_chi_square"],
             "p_value": people["robust_p_value"],
         },
-        {"reading": "mean of both orders of presentation", "percent": order.get("balanced_percent")},
+        {"reading": "orders balanced", "percent": order.get("balanced_percent")},
     ]
     return tables.make(
         f"{name}_preference",
-        f"Percent favouring {words.readable(comparison['method_a'])} over {words.readable(comparison['method_b'])}, "
-        "as published and corrected. The published test takes all answers as independent; a participant’s answers are "
-        "not.",
+        f"Percent favouring {words.readable(comparison['method_a'])} over {words.readable(comparison['method_b'])}. "
+        "As published: all answers as independent, which a participant’s answers are not. Corrected: one share a "
+        "participant, by Student’s t and by ranks; and the pooled percentage with its variance over participants. "
+        "Orders balanced: the mean of the percentages with the first method shown first and second.",
         [
             ("reading", "reading", "text"),
             ("percent", "percent", "one"),
