@@ -26,6 +26,8 @@ VERBS = {
     "preview": "motion_commands:preview",
     "blend-length": "transition_commands:blend_length",
     "transition": "transition_commands:transition",
+    "cost-matrix": "cost_commands:cost_matrix",
+    "one-hop": "one_hop_commands:one_hop",
     "check": "study_commands:check",
     "render": "study_commands:render",
     "simulate": "study_commands:simulate",

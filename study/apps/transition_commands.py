@@ -13,7 +13,9 @@ from study.apps.console import emit, json_option, library_option
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
+    from study.transitions.blend_length import BlendLength
     from study.transitions.blending import Transition
+    from study.transitions.timewarp import WarpLength
 
 METHODS = ("fixed", "geodesic", "velocity", "timewarp")
 
@@ -32,10 +34,36 @@ def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def weights_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds `--weights` to a verb."""
+    return click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)(
+        command
+    )
+
+
+def specification_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds `--specification` to a verb."""
+    return click.option(
+        "--specification",
+        type=click.Choice(["start-end", "centre", "left"]),
+        default="start-end",
+        show_default=True,
+        help="--start and --end are the blend's first and last frame, both its middle, or both its first.",
+    )(command)
+
+
 @click.command("blend-length")
 @clip_options
 @click.option("--method", type=click.Choice(METHODS), default="geodesic", show_default=True)
 @click.option("--fixed-frames", type=click.IntRange(min=1), default=10, show_default=True, help="For --method fixed.")
+@weights_option
+@specification_option
+@click.option("--printed-sum", is_flag=True, help="With timewarp: the undivided sum that Eqs. 5 and 6 print.")
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="X.png: the costs as a picture. X.csv: the costs as numbers.",
+)
 @json_option
 def blend_length(
     source: str,
@@ -46,31 +74,62 @@ def blend_length(
     fps: float,
     method: str,
     fixed_frames: int,
+    weights: str,
+    specification: str,
+    printed_sum: bool,
+    out: Path | None,
     as_json: bool,
 ) -> None:
     """How long to blend from frame --start of SRC to frame --end of DST (Wang & Bodenheimer 2004).
 
     SRC and DST are motion files, or names of motions in --library.
     """
+    from study.transitions.blend_length import blend_length as choose
+    from study.transitions.blend_length import major_joint_differences
+    from study.transitions.timewarp import warp_length
+
+    if out is not None and out.suffix.lower() not in (".png", ".csv"):
+        raise click.UsageError(f"expected --out as a name that ends in .png or .csv, found {str(out)!r}.")
     first, second = clip_pair(source, destination, library, fps)
+    words = f"{source} frame {start} to {destination} frame {end}, {method}"
     if method == "timewarp":
-        from study.transitions.timewarp import warp_length
-
-        warped = warp_length(first, second, start, end)
-        windows = {"source_frames": warped.source_frames, "destination_frames": warped.destination_frames}
-        found: tuple[Any, ...] = (warped.blend_frames, warped.blend_s, warped.cost, warped.costs, warped.note)
+        _check_timewarp(specification)
+        warped = warp_length(first, second, start, end, weights=weights, average=not printed_sum)
+        found: BlendLength | WarpLength = warped
+        windows = (warped.source_frames, warped.destination_frames)
+        result: dict[str, Any] = {"costs": warped.costs, "shortest": warped.shortest}
+        if out is not None:
+            show_warped(warped, out, words)
     else:
-        from study.transitions.blend_length import blend_length as choose
+        chosen = choose(
+            first,
+            second,
+            start,
+            end,
+            method=method,
+            fixed_frames=fixed_frames,
+            weights=weights,
+            specification=specification,
+        )
+        found, windows = chosen, (chosen.blend_frames, chosen.blend_frames)
+        result = {"costs": chosen.costs, "joint": chosen.joint, "unclipped_s": chosen.unclipped_s}
+        if out is not None:
+            show_lengths(first, second, (start, end), chosen, out, (weights, specification), words)
+    differences = major_joint_differences(first, second, start, end)
+    keys = {"blend_frames": found.blend_frames, "blend_s": found.blend_s, "cost": found.cost, "note": found.note}
+    keys |= {"source_frames": windows[0], "destination_frames": windows[1], "method": method, "fps": fps}
+    text = f"{found.blend_frames} frames ({found.blend_s:.3f} s at {fps:g} fps), cost {found.cost:.5g}"
+    if windows[0] != windows[1]:
+        text += f", {windows[0]} of SRC over {windows[1]} of DST"
+    lines = [f"{text}; {found.note}" if found.note else text, "", "differences between the two frames, half angles:"]
+    lines += [f"  {role:12} {value:.4f}" for role, value in differences.items()]
+    result |= {**keys, "differences": differences, "file": None if out is None else str(out)}
+    emit(result, as_json, "\n".join(lines))
 
-        chosen = choose(first, second, start, end, method=method, fixed_frames=fixed_frames)
-        windows = {"source_frames": chosen.blend_frames, "destination_frames": chosen.blend_frames}
-        found = (chosen.blend_frames, chosen.blend_s, chosen.cost, chosen.costs, chosen.note)
-    keys = ("blend_frames", "blend_s", "cost", "costs", "note")
-    result = {**dict(zip(keys, found, strict=True)), **windows, "method": method, "fps": fps}
-    text = f"{found[0]} frames ({found[1]:.3f} s at {fps:g} fps), cost {found[2]:.5g}"
-    if windows["source_frames"] != windows["destination_frames"]:
-        text += f", {windows['source_frames']} of SRC over {windows['destination_frames']} of DST"
-    emit(result, as_json, f"{text}; {found[4]}" if found[4] else text)
+
+def _check_timewarp(specification: str) -> None:
+    if specification != "start-end":
+        raise click.UsageError("expected --specification start-end with timewarp: its two windows differ in length.")
 
 
 @click.command()
@@ -78,6 +137,7 @@ def blend_length(
 @click.option("--method", type=click.Choice(METHODS), help="Choose the blend length by this method.")
 @click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
 @click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
+@specification_option
 @click.option("--keep-slide", is_flag=True, help="Leave the feet as blending leaves them, sliding or not.")
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
@@ -93,6 +153,7 @@ def transition(
     method: str | None,
     frames: int | None,
     weight: str,
+    specification: str,
     keep_slide: bool,
     out: Path,
     as_json: bool,
@@ -105,7 +166,7 @@ def transition(
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
     first, second = clip_pair(source, destination, library, fps)
-    joined = join(first, second, start, end, method, frames, weight)
+    joined = join(first, second, (start, end), method, frames, weight, specification)
     slide = {}
     if not keep_slide:
         joined, planted = plant_feet(joined, first, second)
@@ -127,7 +188,13 @@ def transition(
 
 
 def join(
-    source: Clip, destination: Clip, start: int, end: int, method: str | None, frames: int | None, weight: str
+    source: Clip,
+    destination: Clip,
+    points: tuple[int, int],
+    method: str | None,
+    frames: int | None,
+    weight: str,
+    specification: str = "start-end",
 ) -> Transition:
     """The transition of so many frames, or as long as a method says."""
     from study.transitions.blend_length import blend_length as choose
@@ -135,8 +202,100 @@ def join(
     from study.transitions.timewarp import warp_length, warped_blend
 
     if method == "timewarp":
-        chosen = warp_length(source, destination, start, end)
-        windows = (chosen.source_frames, chosen.destination_frames)
-        return warped_blend(source, destination, start, end, *windows, weight=weight)
-    length = frames or choose(source, destination, start, end, method=method or "geodesic").blend_frames
-    return blend(source, destination, start, end, length, weight=weight)
+        _check_timewarp(specification)
+        warped = warp_length(source, destination, *points)
+        windows = (warped.source_frames, warped.destination_frames)
+        return warped_blend(source, destination, *points, *windows, weight=weight)
+    length = frames
+    if length is None:
+        chosen = choose(source, destination, *points, method=method or "geodesic", specification=specification)
+        length = chosen.blend_frames
+    return blend(source, destination, *points, length, weight=weight, specification=specification)
+
+
+def show_lengths(
+    source: Clip,
+    destination: Clip,
+    points: tuple[int, int],
+    chosen: BlendLength,
+    out: Path,
+    options: tuple[str, str],
+    words: str,
+) -> None:
+    """The geodesic cost of each length, of all joints and of each (2004 Figures 2, 3, 5), as a picture or as CSV."""
+    import numpy as np
+
+    from study.transitions.blend_length import blend_length as choose
+    from study.transitions.blend_length import joint_costs
+    from study.transitions.distances import frame_distance
+    from study.transitions.weights import MAJOR_ROLES, joint_weights
+    from study.transitions.windows import window
+
+    weights, specification = options
+    longest = None if chosen.blend_frames <= 2 * source.fps else chosen.blend_frames
+    curve = choose(
+        source,
+        destination,
+        *points,
+        longest=longest,
+        weights=weights,
+        specification=specification,
+        restrict=True,
+    )
+    if curve.lengths is None or curve.costs is None:
+        raise AssertionError("the geodesic method gives the cost of every length")
+    joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
+    by_joint = joint_costs(source, destination, *points, int(curve.lengths[-1]), joints, specification)
+    named = {role: row[curve.lengths - 1] for role, row in zip(MAJOR_ROLES, by_joint, strict=True)}
+    if out.suffix.lower() == ".csv":
+        columns = {"blend_frames": curve.lengths, "blend_s": curve.lengths / source.fps, "cost": curve.costs, **named}
+        _write_csv(out, columns)
+        return
+    from study.report.transition_figures import curve_picture
+
+    span = window(*points, chosen.blend_frames, specification)
+    differences = frame_distance(
+        source.rotations[span.source_start : span.source_stop],
+        destination.rotations[span.destination_start : span.destination_stop],
+        joint_weights(source.skeleton, weights),
+    )
+    curve_picture(
+        curve.lengths,
+        curve.costs,
+        out,
+        chosen=chosen.blend_frames,
+        fps=source.fps,
+        joints=named,
+        frames=(differences, span.source_start),
+        words=words,
+    )
+
+
+def show_warped(found: WarpLength, out: Path, words: str) -> None:
+    """The cost of each pair of lengths (2004 Eqs. 5, 6), as a picture or as CSV."""
+    import numpy as np
+
+    lengths = np.arange(found.shortest, found.shortest + len(found.costs))
+    if out.suffix.lower() == ".csv":
+        source, destination = np.meshgrid(lengths, lengths, indexing="ij")
+        columns = {"source_frames": source, "destination_frames": destination, "cost": found.costs}
+        _write_csv(out, {name: column.ravel() for name, column in columns.items()})
+        return
+    from study.report.transition_figures import cost_picture
+
+    cost_picture(
+        found.costs,
+        out,
+        least=(found.source_frames, found.destination_frames),
+        span=(len(lengths), len(lengths)),
+        names=("source frames in the blend", "destination frames in the blend"),
+        label=f"cost; {words}",
+        first=found.shortest,
+    )
+
+
+def _write_csv(out: Path, columns: dict[str, Any]) -> None:
+    import pandas as pd
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    pd.DataFrame(columns).to_csv(out, index=False)

@@ -1,0 +1,122 @@
+"""The verbs about one transition: cost matrices, cost curves."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.apps.cli import run
+
+
+def ask(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, object]:
+    status = run([*map(str, arguments), "--json"])
+    printed = capsys.readouterr()
+    assert status == 0, printed.err
+    answer = json.loads(printed.out)
+    assert isinstance(answer, dict)
+    return answer
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("metric", ["joint", "pointcloud"])
+def test_cost_matrix_is_written_with_its_extremes(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, metric: str
+) -> None:
+    out = tmp_path / "costs.npy"
+    answer = ask(capsys, "cost-matrix", "walk", "run", "--metric", metric, "--out", out)
+    costs = np.load(out)
+    assert list(costs.shape) == answer["shape"]
+    assert costs.min() == pytest.approx(answer["min"])
+    assert costs.max() == pytest.approx(answer["max"])
+    assert tuple(answer["argmin"]) == np.unravel_index(int(np.argmin(costs)), costs.shape)  # type: ignore[arg-type]
+    assert sorted(tmp_path.iterdir()) == [out]
+
+
+def test_cost_matrix_is_drawn_dark_where_it_is_cheap(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    from PIL import Image
+
+    out = tmp_path / "costs.png"
+    answer = ask(capsys, "cost-matrix", "walk", "stand", "--weights", "lee2002", "--out", out)
+    assert answer["weights"] == "lee2002"
+    grey = np.asarray(Image.open(out).convert("L"), dtype=float)
+    assert grey.min() < 30 < 225 < grey.max()
+
+
+def test_a_large_matrix_keeps_its_least_cost_in_the_picture() -> None:
+    from study.report.transition_figures import Reducer
+
+    costs = np.random.default_rng(0).uniform(1.0, 2.0, (700, 430)).astype(np.float32)
+    costs[611, 17] = 0.5
+    reducer = Reducer((700, 430), most=100)
+    for start in range(0, 700, 256):
+        reducer.add(range(start, min(start + 256, 700)), costs[start : start + 256])
+    assert reducer.small.shape == (100, 62)
+    assert reducer.small[611 // 7, 17 // 7] == 0.5
+    assert np.isfinite(reducer.small).all()
+    assert reducer.small[3, 4] == costs[21:28, 28:35].min()
+
+
+def test_blend_length_writes_the_curve_of_the_cost_and_of_each_joint(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "curve.csv"
+    points = ("--start", 60, "--end", 80)
+    answer = ask(capsys, "blend-length", "walk", "run", *points, "--out", out)
+    rows = rows_of(out)
+    assert [float(row["cost"]) for row in rows] == pytest.approx(answer["costs"])
+    weights = {"hip": 1.0, "knee": 0.0901, "shoulder": 0.7884, "elbow": 0.0247}
+    for row in rows:
+        parts = sum(weights[role[:-2]] * float(row[role]) for role in row if role[-2:] in (".L", ".R"))
+        assert parts == pytest.approx(float(row["cost"]), rel=1e-9)
+    picture = tmp_path / "curve.png"
+    velocity = ask(capsys, "blend-length", "walk", "run", *points, "--method", "velocity", "--out", picture)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert velocity["joint"] == max(velocity["differences"], key=velocity["differences"].get)  # type: ignore
+
+
+def test_warped_costs_come_as_numbers_averaged_or_as_printed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    tables = []
+    for option in ([], ["--printed-sum"]):
+        out = tmp_path / "warped.csv"
+        ask(
+            capsys,
+            "blend-length",
+            "walk",
+            "run",
+            "--start",
+            60,
+            "--end",
+            80,
+            "--method",
+            "timewarp",
+            *option,
+            "--out",
+            out,
+        )
+        tables.append(rows_of(out))
+    assert len(tables[0]) == 3600
+    for mean, total in zip(tables[0][::97], tables[1][::97], strict=True):
+        longer = max(int(mean["source_frames"]), int(mean["destination_frames"]))
+        assert float(total["cost"]) == pytest.approx(float(mean["cost"]) * longer, rel=1e-9)
+
+
+@pytest.mark.parametrize("specification", ["centre", "left"])
+def test_transitions_are_specified_as_section_2_compares(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, specification: str
+) -> None:
+    out = tmp_path / "joined.bvh"
+    made = ask(
+        capsys, "transition", "walk", "run", "--start", 70, "--end", 80, "--frames", 10,
+        "--specification", specification, "--out", out,
+    )  # fmt: skip
+    assert made["blend_start"] == (65 if specification == "centre" else 70)
