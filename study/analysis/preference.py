@@ -176,7 +176,7 @@ def participant_tests(chosen: FloatArray, shown: FloatArray, confidence: float =
     for_a, for_b = int((share > 0.5).sum()), int((share < 0.5).sum())
     p_value, name = test.p_value, "Student's t over participants"
     if p_value is None and test.participants > 1:
-        p_value, name = estimates.binomial_probability(for_a, for_a + for_b) or 1.0, "exact sign test over participants"
+        p_value, name = estimates.binomial_probability(for_a, for_a + for_b) or 1.0, "exact sign test"
     robust = _robust_chi_square(chosen, shown)
     low, high = test.interval.low, test.interval.high
     return {

@@ -171,27 +171,24 @@ def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
     found = []
     for study in material.protocol.studies:
         title = study.title or words.sentence(words.readable(study.name))
+        names = [transition.name for transition in material.protocol.transitions_of(study)]
         if study.name in analysis["jnd"]:
-            found.append(
-                sections.jnd_section(
-                    study.name,
-                    title,
-                    analysis["jnd"][study.name],
-                    fps=material.protocol.fps,
-                    data=str(analysis["data"]),
-                    mark=mark,
-                    known=known.get(study.name),
-                )
-            )
+            result = _in_order(analysis["jnd"][study.name], names)
+            truth, data, fps = known.get(study.name), str(analysis["data"]), material.protocol.fps
+            found.append(sections.jnd_section(study.name, title, result, fps=fps, data=data, mark=mark, known=truth))
         elif study.name in analysis["preference"]:
-            found.append(sections.preference_section(study.name, title, analysis["preference"][study.name], mark=mark))
+            comparisons = [_in_order(comparison, names) for comparison in analysis["preference"][study.name]]
+            found.append(sections.preference_section(study.name, title, comparisons, mark=mark))
         elif study.name in analysis["ratings"]:
-            found.append(
-                sections.ratings_section(
-                    study.name, title, analysis["ratings"][study.name], mark=mark, points=study.scale_points
-                )
-            )
+            rows, points = analysis["ratings"][study.name], study.scale_points
+            found.append(sections.ratings_section(study.name, title, rows, mark=mark, points=points))
     return found
+
+
+def _in_order(result: Result, names: Sequence[str]) -> Result:
+    """The result with its motions in the protocol's order rather than that of the first participant's plan."""
+    places = {name: place for place, name in enumerate(names)}
+    return {**result, "motions": sorted(result["motions"], key=lambda row: places.get(row["motion"], len(places)))}
 
 
 def _who(analysis: Result) -> str:
@@ -244,6 +241,8 @@ def _shown_sentence(manifest: Manifest) -> str:
         f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} from {motions}, {manifest.size[0]} × "
         f"{manifest.size[1]} pixels at {manifest.fps:g} frames per second."
     )
+    if not manifest.videos:
+        text += " None of them has a video in this folder: nobody can have seen them."
     if extended:
         text += (
             f" In {'all' if extended == len(manifest.records) else extended} of them a motion was too short for what "

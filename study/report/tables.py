@@ -13,7 +13,7 @@ from typing import Any, Literal
 LONGEST_SHORT = 30
 """Longer text may break into lines. [characters]"""
 
-WIDTH_OF_TEXT = 92
+WIDTH_OF_TEXT = 100
 """Characters that a table may take in a row before it stands out into the margins."""
 
 Kind = Literal["text", "count", "one", "two", "three", "percent", "p"]

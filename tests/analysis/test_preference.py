@@ -112,7 +112,7 @@ def test_everybody_of_one_mind(preference_study: Callable[..., pd.DataFrame]) ->
     (result,) = compare(preference_study(np.random.default_rng(2), participants=12, share=1.0))
     people = result["participants"]
     assert (people["t"], people["low"]) == (None, None)
-    assert people["test"] == "exact sign test over participants"
+    assert people["test"] == "exact sign test"
     assert people["p_value"] == pytest.approx(2 * 0.5**12)
     assert result["published"]["interval"]["low"] < 0.97
 
