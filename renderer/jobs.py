@@ -8,6 +8,7 @@ however many workers there are.
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 import time
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -52,7 +54,7 @@ class RenderJob:
     camera: Camera
     fps: float | Fraction = 30
     preset: str = "veryfast"
-    crf: int = 16
+    crf: int = 18
 
 
 @dataclass(frozen=True)
@@ -164,8 +166,13 @@ def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[Vi
     # The longest first, so that no worker is left with a long one at the end.
     order = sorted(range(len(jobs)), key=lambda i: -len(jobs[i].positions))
     finished = False
+    # Workers read jobs from files. Sent through the pool's queue a job is larger than its pipe: when workers end early
+    # the thread that feeds the pipe waits for a reader for ever, and so does the interpreter at its exit.
+    folder = TemporaryDirectory(prefix="segue-jobs-", ignore_cleanup_errors=True)
     try:
-        waiting: dict[Future[VideoInfo], int] = {pool.submit(run_job, jobs[i]): i for i in order}
+        waiting: dict[Future[VideoInfo], int] = {
+            pool.submit(_run_stored, _store(jobs[i], Path(folder.name) / f"{i}.job")): i for i in order
+        }
         while waiting:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 done[waiting.pop(future)] = tell(future.result())
@@ -177,11 +184,23 @@ def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[Vi
         ) from error
     finally:
         _stop(pool, finished)
+        folder.cleanup()
         if not finished:
             for job in jobs:
                 with suppress(OSError):
                     discard_unfinished(Path(job.path))
     return [done[i] for i in range(len(jobs))]
+
+
+def _store(job: RenderJob, path: Path) -> str:
+    path.write_bytes(pickle.dumps(job))
+    return str(path)
+
+
+def _run_stored(path: str) -> VideoInfo:
+    """Make the video of a job that this program's other process has just stored."""
+    job: RenderJob = pickle.loads(Path(path).read_bytes())
+    return run_job(job)
 
 
 def _stop(pool: ProcessPoolExecutor, finished: bool) -> None:

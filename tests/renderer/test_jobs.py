@@ -127,3 +127,35 @@ def test_an_interruption_leaves_whole_videos_only(tmp_path: Path, how: signal.Si
             assert sum(1 for _ in container.decode(video=0)) == 90
     if how == signal.SIGINT:
         assert list(out.glob(".*.part")) == []
+
+
+NO_GL = """
+import os, sys
+import numpy as np
+from pathlib import Path
+from renderer.camera import frame_group
+from renderer.figure import make_figure
+from renderer.jobs import RenderJob, render_many
+
+if __name__ == "__main__":
+    bones = np.array([[i, i + 1] for i in range(11)])
+    clip = np.cumsum(np.random.default_rng(1).normal(0, 0.01, (4000, 12, 3)), axis=0)
+    camera = frame_group([clip], size=(64, 64))
+    figure = make_figure(bones, ["centre"] * 12)
+    os.environ["SEGUE_GL"] = "nosuch"
+    render_many([RenderJob(Path(sys.argv[1]) / f"{i}.mp4", clip, figure, camera) for i in range(8)], 2)
+"""
+
+
+def test_workers_that_all_fail_are_not_waited_for(tmp_path: Path) -> None:
+    """Jobs larger than a pipe's buffer once left the interpreter waiting for ever at its exit."""
+    script = tmp_path / "no_gl.py"
+    script.write_text(NO_GL, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    ended = subprocess.run(
+        [sys.executable, script, tmp_path], env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert ended.returncode == 1
+    assert "RendererError" in ended.stderr
+    assert "nosuch" in ended.stderr
+    assert not list(tmp_path.glob("*.mp4"))
