@@ -93,9 +93,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            segue.main(list(sys.argv[1:] if arguments is None else arguments), prog_name="segue", standalone_mode=False)
-    except click.exceptions.Exit as stop:
-        return stop.exit_code
+            given = list(sys.argv[1:] if arguments is None else arguments)
+            # Without its standalone mode click returns the status of a verb that asks to exit.
+            status = segue.main(given, prog_name="segue", standalone_mode=False)
+            return status if isinstance(status, int) else 0
     except click.ClickException as refusal:
         click.echo(f"segue: {refusal.format_message()}", err=True)
         return 2
@@ -113,7 +114,6 @@ def run(arguments: Sequence[str] | None = None) -> int:
         traceback.print_exc()
         click.echo(f"segue: a fault of Segue's own ({type(fault).__name__}); please report the lines above.", err=True)
         return 1
-    return 0
 
 
 def main() -> None:

@@ -123,3 +123,24 @@ def test_inspect_finds_what_is_wrong_with_a_real_file(capsys: pytest.CaptureFixt
     kinds = {defect["kind"] for defect in answer["defects"]}  # type: ignore[attr-defined]
     assert len(kinds) >= 2, "the added T-pose frame and the flipping hips are both there"
     assert answer["fps"] == 120.0
+
+
+def test_check_lists_what_can_not_be_shown_and_says_so_by_its_status(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    protocol = tmp_path / "far.toml"
+    published = (ROOT / "protocols" / "demo.toml").read_text(encoding="utf-8")
+    protocol.write_text(published.replace('"walk"', '"walkk"'), encoding="utf-8")
+    assert run(["check", str(protocol)]) == 2
+    printed = capsys.readouterr()
+    assert "'walkk'" in printed.out
+    assert "Did you mean" in printed.out
+
+
+@pytest.mark.gl
+def test_doctor_s_status_says_that_nothing_can_draw(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SEGUE_GL", "nosuch")
+    assert run(["doctor", "--quiet"]) == 2
+    assert capsys.readouterr().out == ""
