@@ -63,6 +63,8 @@ def turn(
     running = float(gait.running_share(speed))
     wide = abs(float(angle)) / 90.0
     long = (1.75 - 0.25 * running) * (0.55 + 0.45 * wide)
+    # No sharper than half a g inward, which a running person leans into by 27 degrees.
+    long = max(long, 1.875 * np.radians(abs(float(angle))) * 0.8 * float(speed) / 5.0)
     heading = np.radians(float(angle)) * smooth_step(times, middle - 0.5 * long, middle + 0.5 * long)
     slower = (0.18 + 0.04 * running) * min(1.0, wide) * bump(times, middle - 0.8 * long, middle, middle + 0.8 * long)
     return travel(Course(times, float(speed) * (1.0 - slower), heading), rng)
@@ -70,7 +72,7 @@ def turn(
 
 def _ramp_s(speed: float) -> float:
     """Seconds from standing to speed: two to three steps of walking (Jian et al. 1993), four to five of running."""
-    return float(1.30 + 0.22 * max(0.0, speed - 1.3))
+    return float(1.30 + 0.33 * max(0.0, speed - 1.3))
 
 
 def _event(seconds: float, event_s: float | None) -> float:

@@ -7,7 +7,7 @@ support lies ahead of the body when it brakes, outside when it turns: Winter 199
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,9 @@ FloatArray = NDArray[np.float64]
 
 GRAVITY = 9.81
 _AHEAD_S = 0.30
+# How far ahead of the hips a foot may land, and how far behind them leave, as a leg of this body reaches.
+_AHEAD_M = 0.44
+_BEHIND_M = 0.66
 MARGIN_S = 2.0
 """The motion is planned this much longer at both ends, so that steps under way at the edges are whole."""
 
@@ -98,7 +101,9 @@ def travel(course: Course, rng: np.random.Generator) -> Targets:
     pull = blur(slope(slope(path)), 0.10)
     support = path - 0.60 * (0.55 * body.STATURE / GRAVITY) * pull
     phase = _phase(course, person)
-    contacts = _contacts(course, person, phase, pace, support, rng)
+    ahead = np.column_stack([np.sin(course.heading), np.cos(course.heading)])
+    shift = np.sum((support - path) * ahead, axis=1)
+    contacts = _contacts(_Going(course, running_integral(course.speed), pace, support, shift), person, phase, rng)
     return _whole_body(course, person, rng, pace, path, pull, phase, contacts)
 
 
@@ -118,64 +123,82 @@ def _phase(course: Course, person: Person) -> FloatArray:
     return np.asarray(phase - np.interp(lift, times, phase) + first)
 
 
+@dataclass(frozen=True)
+class _Going:
+    """A course as the feet see it, all `(n, ...)` on the grid."""
+
+    course: Course
+    way: FloatArray
+    """Distance gone, metres."""
+    pace: FloatArray
+    """Speed as the rhythm feels it."""
+    support: FloatArray
+    """`(n, 2)` where support would be on average: the path, shifted as balance asks."""
+    shift: FloatArray
+    """How far the support is shifted ahead."""
+
+    def at(self, time: float, values: FloatArray) -> float:
+        return float(np.interp(time, self.course.times, values))
+
+    def when(self, way: float) -> float:
+        """The first time at which so far has been gone; for ever where it never is."""
+        return float(np.interp(way, self.way, self.course.times, right=FOREVER))
+
+
 def _contacts(
-    course: Course,
-    person: Person,
-    phase: FloatArray,
-    pace: FloatArray,
-    support: FloatArray,
-    rng: np.random.Generator,
+    going: _Going, person: Person, phase: FloatArray, rng: np.random.Generator
 ) -> tuple[list[Contact], list[Contact]]:
     """Footprints of both feet from the rhythm and the path."""
-    times = course.times
+    course, times = going.course, going.course.times
     sides: tuple[list[Contact], list[Contact]] = ([], [])
     lift = -FOREVER if course.start is None else course.start + 0.30
     for side in (LEFT, RIGHT):
-        offset = 0.5 * side
         for count in range(int(np.floor(phase[0])) - 1, int(np.ceil(phase[-1])) + 2):
-            strike_phase = count + offset
+            strike_phase = count + 0.5 * side
             start = float(np.interp(strike_phase, phase, times, left=-FOREVER, right=FOREVER))
-            stance = float(gait.by_speed("stance", np.max(np.interp([start, start + 0.2], times, pace))))
+            stance = float(gait.by_speed("stance", max(going.at(start, going.pace), going.at(start + 0.2, going.pace))))
             stop = float(np.interp(strike_phase + stance, phase, times, left=-FOREVER, right=FOREVER))
             if stop <= max(lift, times[0]) or start >= times[-1]:
                 continue
             if start < lift:
                 start = -FOREVER
-            sides[side].append(_contact(side, start, stop, course, person, pace, support, rng))
+            sides[side].append(_contact(side, start, _latest(going, start, stop), going, person, rng))
     return _settled(sides[0], course), _settled(sides[1], course)
 
 
-def _contact(
-    side: int,
-    start: float,
-    stop: float,
-    course: Course,
-    person: Person,
-    pace: FloatArray,
-    support: FloatArray,
-    rng: np.random.Generator,
-) -> Contact:
-    times = course.times
+def _latest(going: _Going, start: float, stop: float) -> float:
+    """When a foot leaves the floor: as the rhythm says, or before, when the body has gone as far as a leg allows."""
+    if start > -FOREVER:
+        return min(stop, going.when(going.at(start, going.way) + _AHEAD_M + _BEHIND_M))
+    if going.course.start is not None:
+        return min(stop, going.when(going.at(going.course.start, going.way) + _BEHIND_M))
+    return stop
 
-    def at(time: float, values: FloatArray) -> float:
-        return float(np.interp(time, times, values))
 
-    noise = person.step_noise * np.clip(rng.standard_normal(2), -2, 2)
-    v_start, v_stop = at(start, pace), at(stop, pace)
-    v = 0.5 * (v_start + v_stop)
-    share = float(gait.landing_share(v))
-    over = (
-        stop - 0.6 / float(gait.stride_rate(v_stop)) * (1 - share)
-        if start <= -FOREVER
-        else start + share * (stop - start)
-    )
+def _passing(going: _Going, start: float, stop: float, share: float) -> float:
+    """When the body passes over a foot that is down from `start` to `stop`, within the reach of the leg."""
+    course = going.course
+    if start <= -FOREVER:
+        # Standing, or beyond the margin of the plan.
+        return course.start if course.start is not None else stop - 0.3
     if stop >= FOREVER:
-        over = min(start + 0.3, times[-1])
-    yaw = at(over, course.heading)
+        return min(start + 0.3, float(course.times[-1]))
+    first, last = going.at(start, going.way), going.at(stop, going.way)
+    shift = going.at(start + share * (stop - start), going.shift)
+    place = max(first + share * (last - first), last - _BEHIND_M - shift)
+    return min(going.when(min(place, first + _AHEAD_M - shift)), stop)
+
+
+def _contact(side: int, start: float, stop: float, going: _Going, person: Person, rng: np.random.Generator) -> Contact:
+    noise = person.step_noise * np.clip(rng.standard_normal(2), -2, 2)
+    v_start, v_stop = going.at(start, going.pace), going.at(stop, going.pace)
+    v = 0.5 * (v_start + v_stop)
+    over = _passing(going, start, stop, float(gait.landing_share(v)))
+    yaw = going.at(over, going.course.heading)
     aside = OUTWARD[side] * (float(gait.by_speed("half_width", v)) * person.width + 0.5 * noise[0])
     along = noise[1] * (1.0 if start > -FOREVER else 0.0)
-    x = at(over, support[:, 0]) + aside * np.cos(yaw) + along * np.sin(yaw)
-    z = at(over, support[:, 1]) - aside * np.sin(yaw) + along * np.cos(yaw)
+    x = going.at(over, going.support[:, 0]) + aside * np.cos(yaw) + along * np.sin(yaw)
+    z = going.at(over, going.support[:, 1]) - aside * np.sin(yaw) + along * np.cos(yaw)
     running = float(gait.running_share(v))
     return Contact(
         start=start,
@@ -201,8 +224,6 @@ def _contact(
 
 def _settled(contacts: list[Contact], course: Course) -> list[Contact]:
     """The same contacts, ended for good with the first that lies where the body comes to stand."""
-    from dataclasses import replace
-
     if course.stop is None:
         return on_grid(contacts, course.times)
     last = contacts[-1]
@@ -301,7 +322,7 @@ def _height(
     spring-mass model: Blickhan 1989), so its size follows from the step rate.
     """
     walking, limit, _ = hip_height(contacts, times, level, pelvis_angles)
-    running = gait.running_share(pace)
+    running = blur(gait.running_share(pace), 0.12)
     swing = 0.98 * person.bounce * GRAVITY / (4 * np.pi * gait.stride_rate(pace)) ** 2
     stance = gait.by_speed("stance", pace)
     middle = 0.851 - 0.008 * (pace - 3.3)

@@ -2,7 +2,7 @@
 
 After descriptions of the 24-form: single steps take some four seconds, knees stay bent by 30-60 degrees, nearly half
 of the time is spent on one leg or passing to it, and the feet are set down before they are loaded (Wu et al. 2004;
-Wu & Hitt 2005). The moves are free renderings of well-known ones; no master would call this a form.
+Law & Li 2014). The moves are free renderings of well-known ones; no master would call this a form.
 """
 
 from __future__ import annotations
