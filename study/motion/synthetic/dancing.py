@@ -237,12 +237,14 @@ def _points(dancer: _Dancer, time: float) -> None:
         other = 1 - side
         score.weight.move(on - 0.5 * dancer.beat, on + 0.4 * dancer.beat, 0.6 * sign)
         _hips(dancer, on, side, 1.2)
-        score.hands[side].move(on - 0.6 * dancer.beat, on + 0.12, [0.36, 0.45, 0.10, 1.2])
+        # By way of the front, so that the hand keeps clear of its shoulder.
+        ahead = [0.10, 0.08, 0.40, 0.95]
+        score.sweep(side, on - 0.8 * dancer.beat, on + 0.15, ahead, [0.36, 0.45, 0.10, 1.2])
         score.hands[other].move(on - 0.6 * dancer.beat, on + 0.15, [0.10, -0.33, 0.10, 0.8])
         down = on + dancer.beat
         _hips(dancer, down, other, 0.7)
         score.weight.move(down - 0.5 * dancer.beat, down + 0.4 * dancer.beat, -0.3 * sign)
-        score.hands[side].move(down - 0.5 * dancer.beat, down + 0.15, [-0.20, -0.22, 0.30, 0.7])
+        score.sweep(side, down - 0.65 * dancer.beat, down + 0.18, ahead, [-0.20, -0.22, 0.30, 0.7])
         if count == 1:
             score.hands[side].move(down + 0.2, down + dancer.beat, _WAIST)
             side = other
