@@ -1,7 +1,7 @@
 """The draw pass: capsules on the screen, painted into whatever framebuffer is bound.
 
 A `Painter` belongs to one GL context and knows nothing of files, frames or windows: `offscreen` paints luma and chroma
-with it, a window can paint RGB.
+with it, a window paints the screen.
 """
 
 from __future__ import annotations
@@ -16,10 +16,15 @@ from renderer.errors import RendererError
 from renderer.shapes import FLOATS
 
 TARGETS = ("luma", "chroma", "rgb")
+"""What is painted offscreen: the first row of the framebuffer is the top of the picture."""
+
+SCREEN = "screen"
+"""The same colours as `rgb`, for a window, where the first row is the bottom: both where a capsule lies and which pixel
+is being painted count from the top."""
 
 # Pixels beyond a capsule that its smooth edge touches: half of one, or of a sample of two pixels that lies half a pixel
 # aside, and something for the rounding of the corners.
-_EDGE = {"luma": 0.75, "chroma": 1.75, "rgb": 0.75}
+_EDGE = {"luma": 0.75, "chroma": 1.75, "rgb": 0.75, SCREEN: 0.75}
 
 # The light: how much brighter in the middle, towards the light (screen axes, y down), and darker at the rim.
 _CONSTANTS = {
@@ -63,22 +68,20 @@ class Painter:
         self._vertices.write(np.repeat(flat, 4, axis=0))
         return len(flat)
 
-    def paint(self, target: str, capsules: int, size: tuple[int, int], *, top_first: bool = True) -> None:
+    def paint(self, target: str, capsules: int, size: tuple[int, int]) -> None:
         """Paint the loaded capsules, in their order, over what the bound framebuffer holds.
 
         Parameters
         ----------
         target
-            `"luma"` and `"chroma"` for the planes of NV12, or `"rgb"`.
+            `"luma"` and `"chroma"` for the planes of NV12, `"rgb"` to be read, or `"screen"` to be shown.
         capsules
             How many of those loaded.
         size
             Width and height of the picture in pixels of luma.
-        top_first
-            Whether the framebuffer's first row is the picture's top (to be read) or its bottom (to be shown).
         """
         program = self._programs[target]
-        flip = 1.0 if top_first else -1.0
+        flip = -1.0 if target == SCREEN else 1.0
         program["scale"].value = (2.0 / size[0], 2.0 / size[1] * flip)
         program["origin"].value = (-1.0, -flip)
         self._gl.enable_only(self._gl.BLEND)
@@ -108,13 +111,14 @@ def _content(buffer: Any, program: Any) -> list[tuple[Any, ...]]:
 
 
 def _compile(gl: Any, target: str) -> Any:
-    if target not in TARGETS:
-        raise RendererError(f"Expected a target of {', '.join(TARGETS)}, got {target!r}.")
+    if target not in (*TARGETS, SCREEN):
+        raise RendererError(f"Expected a target of {', '.join((*TARGETS, SCREEN))}, got {target!r}.")
     # `precise` came with GLSL 4.00. Mesa's software renderers never fuse, so 3.30 gives the same pixels there.
     version, precise = ("400", "precise") if gl.version_code >= 400 else ("330", "")
-    head = f"#version {version}\n#define PRECISE {precise}\n#define {target.upper()} 1\n"
+    head = f"#version {version}\n#define PRECISE {precise}\n#define {'RGB' if target == SCREEN else target.upper()} 1\n"
     head += f"#define EDGE {_EDGE[target]}\n"
     head += "".join(f"#define {name} ({value!r})\n" for name, value in _CONSTANTS.items())
     folder = resources.files("renderer.shaders")
     vertex, fragment = ((folder / f"capsule.{kind}").read_text(encoding="utf-8") for kind in ("vert", "frag"))
-    return gl.program(vertex_shader=head + vertex, fragment_shader=head + fragment)
+    from_top = "layout(origin_upper_left) in vec4 gl_FragCoord;\n" if target == SCREEN else ""
+    return gl.program(vertex_shader=head + vertex, fragment_shader=head + from_top + fragment)
