@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.analysis import estimates
 
@@ -19,6 +20,15 @@ MANY_MISSED = 0.1
 MANY_FAST = 0.1
 LONG_RUN = 20
 FEWEST_FOR_UNIFORM = 8
+
+
+def _times(given: pd.DataFrame) -> NDArray[np.float64]:
+    """The response times that are known, seconds."""
+    import pandas as pd
+
+    if "response_s" not in given:
+        return np.zeros(0)
+    return pd.to_numeric(given["response_s"], errors="coerce").dropna().to_numpy(dtype=np.float64)
 
 
 def _longest_run(answers: list[str]) -> int:
@@ -44,15 +54,16 @@ def participant_table(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> pd
     -------
     DataFrame
         `participant`, `simulated`, `trials`, `answered`, `missed`, `missed_percent`, `median_response_s`, `too_fast`,
-        `longest_run` (of one and the same answer), `false_alarms`, `same_pairs` (same-different pairs with no
-        difference), `flags` (in words, empty where there is nothing to say).
+        `shown_badly` (answers after a stimulus that stalled or was hidden), `longest_run` (of one and the same answer),
+        `false_alarms`, `same_pairs` (same-different pairs with no difference), `flags` (in words, empty where there is
+        nothing to say).
     """
     import pandas as pd
 
     rows = []
     for name, part in answers.groupby(answers["participant"].astype(str), sort=True):
         given = part[part["answer"].notna()]
-        times = pd.to_numeric(given["response_s"], errors="coerce").dropna() if "response_s" in part else pd.Series([])
+        times = _times(given)
         row: dict[str, Any] = {
             "participant": str(name),
             "simulated": bool(part["simulated"].astype(bool).any()) if "simulated" in part else False,
@@ -60,8 +71,9 @@ def participant_table(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> pd
             "answered": len(given),
             "missed": len(part) - len(given),
             "missed_percent": 100 * (len(part) - len(given)) / len(part),
-            "median_response_s": float(times.median()) if len(times) else None,
+            "median_response_s": float(np.median(times)) if len(times) else None,
             "too_fast": int((times < fastest_s).sum()),
+            "shown_badly": int((~given["shown_well"].astype(bool)).sum()) if "shown_well" in given else 0,
             "longest_run": _longest_run([str(answer) for answer in given["answer"]]),
         }
         row |= _false_alarms(given)
@@ -100,16 +112,15 @@ def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> dict[str, An
     -------
     dict
         `participants`, `simulated_participants`, `trials`, `answered`, `missed`, `missed_percent`, `too_fast`,
-        `fastest_s`, `response_s` (quantiles 5, 25, 50, 75, 95), `flagged` (participants), `rules` (in words), `table`
-        (one entry a participant, as `participant_table`).
+        `shown_badly`, `fastest_s`, `response_s` (quantiles 5, 25, 50, 75, 95), `flagged` (participants), `rules` (in
+        words), `table` (one entry a participant, as `participant_table`).
     """
-    import pandas as pd
-
     if answers.empty:
         counts = dict.fromkeys(("participants", "simulated_participants", "trials", "answered", "missed"), 0)
         rest: dict[str, Any] = {
             "missed_percent": None,
             "too_fast": 0,
+            "shown_badly": 0,
             "fastest_s": fastest_s,
             "response_s": {},
             "flagged": 0,
@@ -117,9 +128,9 @@ def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> dict[str, An
         return {**counts, **rest, "rules": _rules(fastest_s), "table": []}
     table = participant_table(answers, fastest_s)
     given = answers[answers["answer"].notna()]
-    times = pd.to_numeric(given["response_s"], errors="coerce").dropna() if "response_s" in given else pd.Series([])
+    times = _times(given)
     levels = (5, 25, 50, 75, 95)
-    quantiles = np.percentile(times.to_numpy(dtype=np.float64), levels) if len(times) else []
+    quantiles = np.percentile(times, levels) if len(times) else []
     summary = {
         "participants": len(table),
         "simulated_participants": int(table["simulated"].sum()),
@@ -128,6 +139,7 @@ def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> dict[str, An
         "missed": len(answers) - len(given),
         "missed_percent": 100 * (len(answers) - len(given)) / len(answers),
         "too_fast": int(table["too_fast"].sum()),
+        "shown_badly": int(table["shown_badly"].sum()),
         "fastest_s": fastest_s,
         "response_s": {str(level): float(value) for level, value in zip(levels, quantiles, strict=False)},
         "flagged": int((table["flags"] != "").sum()),

@@ -228,6 +228,9 @@ def _quality_sentence(quality: Result) -> str:
             f" Half of the answers came within {times['50']:.2f} s, nine in ten between {times['5']:.2f} and "
             f"{times['95']:.2f} s."
         )
+    if quality["shown_badly"]:
+        badly = words.number(quality["shown_badly"], "answer")
+        text += f" {badly} followed a stimulus that stalled or was hidden, and count all the same."
     return text + f" {words.number(quality['flagged'], 'participant')} flagged; nobody was left out."
 
 
@@ -242,7 +245,7 @@ def _shown_sentence(manifest: Manifest) -> str:
         f"{manifest.size[1]} pixels at {manifest.fps:g} frames per second."
     )
     if not manifest.videos:
-        text += " None of them has a video in this folder: nobody can have seen them."
+        text += " There is no video of them in this folder: nobody can have seen them."
     if extended:
         text += (
             f" In {'all' if extended == len(manifest.records) else extended} of them a motion was too short for what "

@@ -100,6 +100,7 @@ def test_quality_counts_what_is_missing_and_implausible(same_different_study: Si
     quick = answers["participant"] == "p01"
     answers.loc[quick, "response_s"] = 0.05
     answers.loc[answers["participant"] == "p02", "answer"] = "same"
+    answers["shown_well"] = answers.index != 60
     result = quality(answers)
     first, second, third = result["table"]
     assert first["missed"] == 10
@@ -109,3 +110,12 @@ def test_quality_counts_what_is_missing_and_implausible(same_different_study: Si
     assert 'always "same"' in third["flags"]
     assert result["missed"] == 10
     assert result["flagged"] == 3
+    assert result["shown_badly"] == second["shown_badly"] == 1
+
+
+def test_quality_without_times(same_different_study: Simulate) -> None:
+    answers = same_different_study(np.random.default_rng(5), participants=2).drop(columns=["response_s", "simulated"])
+    result = quality(answers)
+    assert result["response_s"] == {}
+    assert result["table"][0]["median_response_s"] is None
+    assert result["simulated_participants"] == 0
