@@ -130,7 +130,7 @@ def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> dict[str, An
     given = answers[answers["answer"].notna()]
     times = _times(given)
     levels = (5, 25, 50, 75, 95)
-    quantiles = np.percentile(times, levels) if len(times) else []
+    quantiles: list[float] = np.percentile(times, levels).tolist() if len(times) else []
     summary = {
         "participants": len(table),
         "simulated_participants": int(table["simulated"].sum()),
