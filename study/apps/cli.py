@@ -27,6 +27,8 @@ VERBS = {
     "blend-length": "transition_commands:blend_length",
     "transition": "transition_commands:transition",
     "cost-matrix": "cost_commands:cost_matrix",
+    "label": "weight_commands:label",
+    "fit-weights": "weight_commands:fit_weights",
     "one-hop": "one_hop_commands:one_hop",
     "check": "study_commands:check",
     "render": "study_commands:render",

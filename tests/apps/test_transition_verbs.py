@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from pathlib import Path
 
@@ -120,3 +121,34 @@ def test_transitions_are_specified_as_section_2_compares(
         "--specification", specification, "--out", out,
     )  # fmt: skip
     assert made["blend_start"] == (65 if specification == "centre" else 70)
+
+
+@pytest.mark.gl
+def test_labelling_goes_on_where_it_stopped_and_gives_weights(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = tmp_path / "labels.csv"
+    verb = ("label", "walk", "dance", "--strips", "--best", 1, "--random", 1, "--out", table)
+
+    def answers(text: str) -> None:
+        monkeypatch.setattr("sys.stdin", io.StringIO(text))
+
+    answers("g\nb\ns\nq\n")
+    first = ask(capsys, *verb)
+    assert (first["good"], first["bad"], first["skip"], first["known"]) == (1, 1, 1, 0)
+    answers("g\nb\n")  # and then the terminal closes
+    second = ask(capsys, *verb)
+    assert (second["good"], second["bad"], second["known"]) == (1, 1, 3)
+    assert second["left"] == first["left"] - 2  # type: ignore[operator]
+    rows = rows_of(table)
+    assert [row["label"] for row in rows] == ["good", "bad", "skip", "good", "bad"]
+    assert len({(row["source_frame"], row["destination_frame"]) for row in rows}) == 5
+    assert len(list((tmp_path / "labels").glob("*.png"))) >= 5
+    fitted = ask(capsys, "fit-weights", table, "--transfer", "walk", "jog")
+    weights = fitted["weights"]
+    assert isinstance(weights, dict)
+    assert max(weights.values()) == 1.0
+    assert weights["hip.L"] == weights["hip.R"]
+    assert (fitted["good"], fitted["bad"]) == (2, 2)
+    assert {"mean_frames", "median_frames", "deviations"} == set(fitted["cross_validation"])  # type: ignore[call-overload]
+    assert fitted["transfer"]["of"] == 4  # type: ignore[index]
