@@ -101,7 +101,7 @@ def strip_of_video(path: Path, blend_start: int, blend_stop: int) -> bytes:
     from PIL import Image
 
     frames = _frames(path)
-    places = np.unique(np.linspace(0, len(frames) - 1, POSES).round().astype(int))
+    places = _moments(len(frames), blend_start, blend_stop)
     cells = _cropped([frames[place] for place in places])
     blended = [blend_start <= place < blend_stop for place in places]
     picture = np.concatenate([_underlined(cell, inside) for cell, inside in zip(cells, blended, strict=True)], axis=1)
@@ -111,6 +111,15 @@ def strip_of_video(path: Path, blend_start: int, blend_stop: int) -> bytes:
     buffer = io.BytesIO()
     small.save(buffer, format="png", optimize=True)
     return buffer.getvalue()
+
+
+def _moments(frames: int, blend_start: int, blend_stop: int) -> NDArray[np.intp]:
+    """Frames evenly spaced in time; where a short blend would fall between two of them, the nearer one moves into it."""
+    places = np.unique(np.linspace(0, frames - 1, POSES).round().astype(np.intp))
+    middle = (blend_start + blend_stop) // 2
+    if blend_start < blend_stop <= frames and not ((places >= blend_start) & (places < blend_stop)).any():
+        places[np.abs(places - middle).argmin()] = middle
+    return places
 
 
 def _frames(path: Path) -> list[Bytes]:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from study.report import words
-from study.report.media import strip_of_video
+from study.report.media import _moments, strip_of_video
 from study.report.tables import as_csv, as_json, make, p_value, written
 
 
@@ -110,3 +110,10 @@ def test_a_strip_shows_the_figure_and_underlines_the_blend(tmp_path: Path) -> No
     blue = (foot[:, 2] - foot[:, 0]) > 80
     assert blue[: len(blue) // 2 - 4].all()
     assert not blue[len(blue) // 2 + 4 :].any()
+
+
+def test_a_short_blend_is_in_the_strip_all_the_same() -> None:
+    places = _moments(65, 30, 33)
+    assert len(places) == 10
+    assert ((places >= 30) & (places < 33)).sum() == 1
+    assert list(places) == sorted(places)
