@@ -114,7 +114,7 @@ def strip_of_video(path: Path, blend_start: int, blend_stop: int) -> bytes:
 
 
 def _moments(frames: int, blend_start: int, blend_stop: int) -> NDArray[np.intp]:
-    """Frames evenly spaced in time; where a short blend would fall between two of them, the nearer one moves into it."""
+    """Frames evenly spaced in time; where a short blend would fall between two, the nearer one moves into it."""
     places = np.unique(np.linspace(0, frames - 1, POSES).round().astype(np.intp))
     middle = (blend_start + blend_stop) // 2
     if blend_start < blend_stop <= frames and not ((places >= blend_start) & (places < blend_stop)).any():
