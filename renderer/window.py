@@ -1,0 +1,563 @@
+"""A window: draws figures and pictures live, times every flip, and hands over keys with their times.
+
+In go figures as positions `(frames, points, 3)` in metres and pictures as RGB; out come the times at which each was
+presented, and events (keys, clicks, focus, size, asks to close), each with the time at which it arrived. All times are
+glfw's: seconds of the machine's steady clock since the window was opened.
+
+A flip is timed after the swap, once the pixels are done (`glFinish`). Where swaps wait for the display, they pace the
+window. Virtual displays report a refresh rate of 0 and swaps there wait for nothing; an own frame clock takes their
+place, and `Pacing.measured` is False: what reaches an eye, and when, is not known then.
+
+The window is single-sampled: the capsules smooth their own edges, and multisampling costs a software renderer 10 ms a
+frame.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import Camera, check_positions
+from renderer.capsules import Figure
+from renderer.errors import RendererError
+from renderer.floor import Floor
+from renderer.painter import SCREEN, Painter
+from renderer.shapes import Shapes, lay_out
+
+RGB = tuple[int, int, int]
+Size = tuple[int, int]
+
+OWN_CLOCK_HZ = 60.0
+"""The rate of the own frame clock where the display names none."""
+
+_TRIAL_SWAPS, _WARM_UP = 40, 10
+_SPIN_S = 0.001
+
+NO_DISPLAY = (
+    "Expected a display to open a window on, found none that works ({reason}). Run it at the machine's own screen, "
+    "name the display (DISPLAY or WAYLAND_DISPLAY), or use a virtual one (xvfb-run); `segue serve` needs no display."
+)
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key went down: a letter or digit as it is printed on the key, or `space`, `enter`, `escape`, `left`, ..."""
+
+    name: str
+    time_s: float
+
+
+@dataclass(frozen=True)
+class Typed:
+    """A character was typed; for text fields. It comes besides its `Key`."""
+
+    character: str
+    time_s: float
+
+
+@dataclass(frozen=True)
+class Click:
+    """The left mouse button went down; place in pixels of the picture from the top left corner."""
+
+    x: float
+    y: float
+    time_s: float
+
+
+@dataclass(frozen=True)
+class Focus:
+    """The window got the keyboard, or lost it."""
+
+    focused: bool
+    time_s: float
+
+
+@dataclass(frozen=True)
+class Resized:
+    """The picture has another size, in pixels, or was damaged: what it shows must be drawn again."""
+
+    size: Size
+    time_s: float
+
+
+@dataclass(frozen=True)
+class CloseAsked:
+    """Somebody asked the window to close; it stays until it is closed."""
+
+    time_s: float
+
+
+Event = Key | Typed | Click | Focus | Resized | CloseAsked
+
+
+@dataclass(frozen=True)
+class Pacing:
+    """What flips follow.
+
+    Parameters
+    ----------
+    refresh_hz
+        Flips per second.
+    reported_hz
+        What the display says of itself; 0 where it says nothing.
+    swap_s
+        The median time between swaps when the window was opened, seconds.
+    own_clock
+        Whether flips follow the own frame clock, since swaps wait for nothing.
+    """
+
+    refresh_hz: float
+    reported_hz: float
+    swap_s: float
+    own_clock: bool
+
+    @property
+    def measured(self) -> bool:
+        """Whether the times of flips are those of the display."""
+        return not self.own_clock
+
+    @property
+    def period_s(self) -> float:
+        """Seconds from one flip to the next."""
+        return 1.0 / self.refresh_hz
+
+
+def find_pacing(swap_intervals_s: NDArray[np.float64], reported_hz: float) -> Pacing:
+    """What to pace flips by, from trial swaps and the refresh rate that the display reports.
+
+    The reported rate is a whole number (59 for 59.94), so the measured one is taken where both agree within a tenth.
+    Swaps that come faster wait for nothing; slower ones do wait, and the machine only misses some at the start.
+    """
+    swap_s = float(np.median(swap_intervals_s))
+    if reported_hz <= 0:
+        return Pacing(OWN_CLOCK_HZ, 0.0, swap_s, own_clock=True)
+    if swap_s < 0.9 / reported_hz:
+        return Pacing(reported_hz, reported_hz, swap_s, own_clock=True)
+    agrees = swap_s < 1.1 / reported_hz
+    return Pacing(1.0 / swap_s if agrees else reported_hz, reported_hz, swap_s, own_clock=False)
+
+
+def next_flip(last_flip_s: float, period_s: float, now_s: float) -> float:
+    """When the next flip can be, if it is asked for now: the first whole number of periods after the last one.
+
+    Half a millisecond is left for the swap itself.
+    """
+    periods = max(1.0, np.ceil((now_s + 0.0005 - last_flip_s) / period_s))
+    return float(last_flip_s + periods * period_s)
+
+
+class Picture:
+    """An RGB picture in the window's memory; made by `Window.picture`."""
+
+    def __init__(self, texture: Any) -> None:
+        self.texture = texture
+        self.size: Size = texture.size
+
+    def release(self) -> None:
+        """Free it."""
+        self.texture.release()
+
+
+class Drawing:
+    """A figure's motion ready to be drawn frame by frame; made by `Window.drawing`."""
+
+    def __init__(self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, fill: bool) -> None:
+        if figure.floor_m is not None and camera.track_seconds is not None:
+            raise RendererError("Expected a camera that stands still for a figure on a floor in a window; give one.")
+        self.positions, self.figure, self.camera, self.fps, self.fill = positions, figure, camera, fps, fill
+        self.frames = len(positions)
+        self.size: Size | None = None
+        self.place = (0, 0, *camera.size)
+        self.shapes: Shapes | None = None
+        self.floor: NDArray[np.uint8] | None = None
+
+    def fit(self, size: Size) -> bool:
+        """Lay the motion out for a window of that size; False where that was done before."""
+        if self.size == size:
+            return False
+        camera = fitted_camera(self.camera, size, self.fill)
+        width, height = camera.size
+        self.place = ((size[0] - width) // 2, (size[1] - height) // 2, width, height)
+        self.shapes = lay_out(self.positions, self.figure, camera, self.fps)
+        self.shapes.data[..., 12:14] += np.array(self.place[:2], dtype=np.float32)
+        self.floor = None if self.figure.floor_m is None else Floor(self.figure, camera).rgb()
+        self.size = size
+        return True
+
+
+def fitted_camera(camera: Camera, size: Size, fill: bool) -> Camera:
+    """The camera with its picture as large as a window allows, or no larger than it was made (`fill` False)."""
+    width, height = camera.size
+    scale = min(size[0] / width, size[1] / height)
+    if not fill:
+        scale = min(scale, 1.0)
+    wide, high = (max(16, int(edge * scale) // 2 * 2) for edge in (width, height))
+    return replace(camera, size=(wide, high), focal_pixels=camera.focal_pixels * min(wide / width, high / height))
+
+
+_COPY_VERTEX = """#version 330
+out vec2 place;
+void main() {
+    place = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    gl_Position = vec4(place * 2.0 - 1.0, 0.0, 1.0);
+}
+"""
+_COPY_FRAGMENT = """#version 330
+uniform sampler2D picture;
+in vec2 place;
+out vec4 painted;
+void main() { painted = texture(picture, vec2(place.x, 1.0 - place.y)); }
+"""
+
+
+class Window:
+    """An open window; made by `open_window`, closed by `close` or `with`. Draw, then `flip`."""
+
+    def __init__(self, handle: Any, gl: Any, monitor: dict[str, Any], reported_hz: float, full_screen: bool) -> None:
+        import glfw
+
+        self._glfw, self._handle, self.gl = glfw, handle, gl
+        self._monitor, self.full_screen = monitor, full_screen
+        self._events: list[Event] = []
+        self._painter = Painter(gl, (SCREEN,))
+        self._copy = gl.program(vertex_shader=_COPY_VERTEX, fragment_shader=_COPY_FRAGMENT)
+        self._copy_array = gl.vertex_array(self._copy, [])
+        self._floor: tuple[Drawing, Picture] | None = None
+        self._beat_s = float(glfw.get_time())
+        self._listen()
+        self.pacing = Pacing(OWN_CLOCK_HZ, 0.0, 0.0, own_clock=False)
+        self.pacing = find_pacing(self._trial_swaps(), reported_hz)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # What it is
+
+    @property
+    def size(self) -> Size:
+        """Width and height of what is drawn, pixels."""
+        width, height = self._glfw.get_framebuffer_size(self._handle)
+        return max(1, width), max(1, height)
+
+    @property
+    def scale(self) -> float:
+        """How many pixels a unit of text takes: 1 on plain displays, 2 on dense ones."""
+        return max(1.0, float(self._glfw.get_window_content_scale(self._handle)[1]))
+
+    @property
+    def focused(self) -> bool:
+        """Whether keys come here."""
+        return bool(self._glfw.get_window_attrib(self._handle, self._glfw.FOCUSED))
+
+    def describe(self) -> dict[str, Any]:
+        """Display, rates, sizes and what draws, for the record of a session."""
+        return {
+            **self._monitor,
+            "full_screen": self.full_screen,
+            "viewport": list(self.size),
+            "content_scale": self.scale,
+            "refresh_hz": round(self.pacing.refresh_hz, 4),
+            "reported_hz": self.pacing.reported_hz,
+            "swap_ms": round(self.pacing.swap_s * 1000, 3),
+            "own_clock": self.pacing.own_clock,
+            "timing_measured": self.pacing.measured,
+            "gl_renderer": self.gl.info["GL_RENDERER"],
+            "gl_version": self.gl.info["GL_VERSION"],
+            "glfw": _text(self._glfw.get_version_string()),
+        }
+
+    # Time
+
+    def now(self) -> float:
+        """Seconds of the window's clock."""
+        return float(self._glfw.get_time())
+
+    def next_flip_s(self) -> float:
+        """When a flip that is asked for now will be presented, as far as one can tell."""
+        return next_flip(self._beat_s, self.pacing.period_s, self.now())
+
+    def flip(self) -> float:
+        """Present what was drawn; returns when that was."""
+        target_s = self.next_flip_s()
+        if self.pacing.own_clock:
+            self._wait_for(target_s)
+        self._glfw.swap_buffers(self._handle)
+        self.gl.finish()
+        presented_s = self.now()
+        self._beat_s = presented_s
+        if self.pacing.own_clock:
+            # Counted from when it was due, so that lateness does not add up.
+            self._beat_s = target_s + self.pacing.period_s * ((presented_s - target_s) // self.pacing.period_s)
+        return presented_s
+
+    def _wait_for(self, moment_s: float) -> None:
+        """Sleep for the most part, then watch the clock: sleeping alone may be a millisecond late."""
+        left = moment_s - self.now()
+        if left > _SPIN_S:
+            time.sleep(left - _SPIN_S)
+        while self.now() < moment_s:
+            pass
+
+    def _trial_swaps(self) -> NDArray[np.float64]:
+        """Times between swaps of an empty window, after some to warm up."""
+        times = []
+        for _ in range(_WARM_UP + _TRIAL_SWAPS):
+            self.clear((128, 128, 128))
+            times.append(self.flip())
+        return np.diff(times)[_WARM_UP:]
+
+    # Drawing
+
+    def picture(self, rgb: NDArray[np.uint8]) -> Picture:
+        """Load an RGB picture `(height, width, 3)`; the first row is the top."""
+        height, width, _ = rgb.shape
+        return Picture(self.gl.texture((width, height), 3, np.ascontiguousarray(rgb).tobytes(), alignment=1))
+
+    def drawing(
+        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, *, fill: bool = True
+    ) -> Drawing:
+        """Lay out a motion `(frames, points, 3)` for this window, which takes a while; before the trial, that is.
+
+        `fill` makes the picture as large as the window allows; else it has the size that the camera was made for.
+        """
+        made = Drawing(check_positions(positions), figure, camera, fps, fill)
+        made.fit(self.size)
+        return made
+
+    def clear(self, colour: RGB) -> None:
+        """Make the whole window one colour."""
+        self.gl.screen.use()
+        self.gl.viewport = (0, 0, *self.size)
+        self.gl.clear(*(value / 255.0 for value in colour))
+
+    def paint(self, picture: Picture, background: RGB) -> None:
+        """Show a picture in the middle of the window, pixel for pixel."""
+        self.clear(background)
+        width, height = self.size
+        wide, high = picture.size
+        self._copy_to(picture, ((width - wide) // 2, (height - high) // 2, wide, high))
+
+    def paint_frame(self, drawing: Drawing, frame: int) -> None:
+        """Draw one frame of a motion on its figure's background."""
+        drawing.fit(self.size)
+        self.clear(drawing.figure.background)
+        left, top, wide, high = drawing.place
+        self.gl.scissor = (left, self.size[1] - top - high, wide, high)
+        if drawing.floor is not None:
+            self._paint_floor(drawing)
+        assert drawing.shapes is not None, "fit lays it out"
+        self.gl.viewport = (0, 0, *self.size)
+        self._painter.paint(SCREEN, self._painter.load(drawing.shapes.data[frame]), self.size)
+        self.gl.scissor = None
+
+    def _paint_floor(self, drawing: Drawing) -> None:
+        if self._floor is None or self._floor[0] is not drawing or self._floor[1].size != drawing.place[2:]:
+            if self._floor is not None:
+                self._floor[1].release()
+            assert drawing.floor is not None, "asked for only where there is one"
+            self._floor = (drawing, self.picture(drawing.floor))
+        left, top, wide, high = drawing.place
+        self._copy_to(self._floor[1], (left, self.size[1] - top - high, wide, high))
+
+    def _copy_to(self, picture: Picture, place: tuple[int, int, int, int]) -> None:
+        self.gl.disable(self.gl.BLEND)
+        self.gl.viewport = place
+        picture.texture.filter = (self.gl.NEAREST, self.gl.NEAREST)
+        picture.texture.use(0)
+        self._copy_array.render(self.gl.TRIANGLE_STRIP, vertices=4)
+        self.gl.viewport = (0, 0, *self.size)
+
+    # What people do
+
+    def poll(self) -> tuple[Event, ...]:
+        """What happened since the last call."""
+        self._glfw.poll_events()
+        return self._taken()
+
+    def wait(self, timeout_s: float | None = None) -> tuple[Event, ...]:
+        """Sleep until something happens, or until the time is over; an event is timed as soon as it arrives."""
+        if not self._events:
+            if timeout_s is None:
+                self._glfw.wait_events()
+            elif timeout_s > 0:
+                self._glfw.wait_events_timeout(timeout_s)
+            else:
+                self._glfw.poll_events()
+        return self._taken()
+
+    def cursor(self, visible: bool) -> None:
+        """Show or hide the mouse pointer."""
+        glfw = self._glfw
+        glfw.set_input_mode(self._handle, glfw.CURSOR, glfw.CURSOR_NORMAL if visible else glfw.CURSOR_HIDDEN)
+
+    def close(self) -> None:
+        """Close the window and free what it holds."""
+        if self._handle is None:
+            return
+        self._painter.release()
+        self.gl.release()
+        self._glfw.destroy_window(self._handle)
+        self._glfw.terminate()
+        self._handle = None
+
+    def _taken(self) -> tuple[Event, ...]:
+        taken, self._events = tuple(self._events), []
+        return taken
+
+    def _listen(self) -> None:
+        """Have glfw hand over events; each takes its time first of all."""
+        glfw, handle = self._glfw, self._handle
+
+        def add(event: Event) -> None:
+            self._events.append(event)
+
+        def key(_: Any, token: int, scancode: int, action: int, modifiers: int) -> None:
+            at = glfw.get_time()
+            if action == glfw.PRESS and not modifiers & (glfw.MOD_CONTROL | glfw.MOD_ALT | glfw.MOD_SUPER):
+                add(Key(key_name(token, glfw.get_key_name(token, scancode)), at))
+
+        def button(_: Any, which: int, action: int, __: int) -> None:
+            at = glfw.get_time()
+            if which == glfw.MOUSE_BUTTON_LEFT and action == glfw.PRESS:
+                x, y = glfw.get_cursor_pos(handle)
+                wide = max(1, glfw.get_window_size(handle)[0])
+                ratio = self.size[0] / wide
+                add(Click(x * ratio, y * ratio, at))
+
+        def close(_: Any) -> None:
+            at = glfw.get_time()
+            glfw.set_window_should_close(handle, False)
+            add(CloseAsked(at))
+
+        glfw.set_key_callback(handle, key)
+        glfw.set_char_callback(handle, lambda _, code: add(Typed(chr(code), glfw.get_time())))
+        glfw.set_mouse_button_callback(handle, button)
+        glfw.set_window_close_callback(handle, close)
+        glfw.set_window_focus_callback(handle, lambda _, on: add(Focus(bool(on), glfw.get_time())))
+        glfw.set_framebuffer_size_callback(handle, lambda _, w, h: add(Resized((w, h), glfw.get_time())))
+        glfw.set_window_refresh_callback(handle, lambda _: add(Resized(self.size, glfw.get_time())))
+
+
+_NAMED_KEYS = {
+    32: "space", 256: "escape", 257: "enter", 335: "enter", 258: "tab", 259: "backspace",
+    262: "right", 263: "left", 264: "down", 265: "up",
+}  # fmt: skip
+"""glfw's numbers of the keys that have no character; they are part of its interface."""
+
+
+def key_name(token: int, printed: str | None) -> str:
+    """A key's name: of letters the one that is printed on it in this layout, of digits the digit in every layout.
+
+    Parameters
+    ----------
+    token
+        glfw's number, which is the key's character on a US keyboard.
+    printed
+        What the keyboard's layout says that the key gives; None where it gives no character.
+    """
+    if token in _NAMED_KEYS:
+        return _NAMED_KEYS[token]
+    if 48 <= token <= 57:
+        return chr(token)
+    if 320 <= token <= 329:  # the digits of the keypad
+        return str(token - 320)
+    if printed and len(printed) == 1 and printed.isprintable():
+        return printed.lower()
+    return chr(token).lower() if 32 < token < 127 else f"key-{token}"
+
+
+def open_window(title: str = "Segue", *, full_screen: bool = True, size: Size = (1280, 800)) -> Window:
+    """Open a window of OpenGL 3.3 or later.
+
+    Parameters
+    ----------
+    title
+        For the window's frame.
+    full_screen
+        Take the whole primary display at its present mode; else a window that can be resized.
+    size
+        Of the window, where it is one.
+
+    Raises
+    ------
+    RendererError
+        Where there is no display, or none that draws OpenGL 3.3.
+    """
+    glfw = _load_glfw()
+    if not glfw.init():
+        raise RendererError(NO_DISPLAY.format(reason=_last_error(glfw)))
+    try:
+        monitor = glfw.get_primary_monitor()
+        if not monitor:
+            raise RendererError(NO_DISPLAY.format(reason="no monitor is connected"))
+        mode = glfw.get_video_mode(monitor)
+        handle = _create(glfw, title, (mode.size.width, mode.size.height) if full_screen else size, full_screen)
+        glfw.make_context_current(handle)
+        glfw.swap_interval(1)
+        import moderngl
+
+        create: Any = moderngl.create_context  # its stub types every keyword as a dict
+        gl = create(require=330)
+        glfw.show_window(handle)
+        glfw.focus_window(handle)
+        about = {
+            "display": _text(glfw.get_monitor_name(monitor)),
+            "display_mm": list(glfw.get_monitor_physical_size(monitor)),
+            "display_pixels": [mode.size.width, mode.size.height],
+        }
+        return Window(handle, gl, about, float(mode.refresh_rate), full_screen)
+    except BaseException:
+        glfw.terminate()
+        raise
+
+
+def _load_glfw() -> Any:
+    try:
+        import glfw
+    except ImportError as error:
+        raise RendererError(
+            f"Expected the library glfw to open a window with, found none ({error}); install the Python package glfw."
+        ) from error
+    glfw.ERROR_REPORTING = "ignore"  # asked for with get_error, and reported in our own words
+    return glfw
+
+
+def _create(glfw: Any, title: str, size: Size, full_screen: bool) -> Any:
+    """A window with a context: the system's own kind, else by EGL."""
+    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+    glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
+    glfw.window_hint(glfw.SAMPLES, 0)
+    glfw.window_hint(glfw.DEPTH_BITS, 0)
+    glfw.window_hint(glfw.VISIBLE, False)
+    # A full-screen window that loses the keyboard stays where it is: somebody else's click must not hide a study.
+    glfw.window_hint(glfw.AUTO_ICONIFY, False)
+    monitor = glfw.get_primary_monitor() if full_screen else None
+    reasons = []
+    for kind in (glfw.NATIVE_CONTEXT_API, glfw.EGL_CONTEXT_API):
+        glfw.window_hint(glfw.CONTEXT_CREATION_API, kind)
+        handle = glfw.create_window(*size, title, monitor, None)
+        if handle:
+            return handle
+        reasons.append(_last_error(glfw))
+    raise RendererError(
+        f"Expected a display that draws OpenGL 3.3, found none ({'; '.join(reasons)}); install the graphics driver, "
+        "or on Debian and Ubuntu libgl1-mesa-dri, which draws by the processor."
+    )
+
+
+def _last_error(glfw: Any) -> str:
+    code, description = glfw.get_error()
+    return _text(description) or f"glfw error {code}"
+
+
+def _text(value: bytes | str | None) -> str:
+    return value.decode(errors="replace") if isinstance(value, bytes) else value or ""
