@@ -34,8 +34,8 @@ from renderer.camera import Camera, frame_group
 from renderer.context import open_context
 from renderer.figure import Figure, make_figure
 from renderer.jobs import RenderJob, default_workers, render_many
-from renderer.offscreen import render_frames
-from renderer.video import frame_rate, open_encoder, render_video
+from renderer.offscreen import paste_frames, render_frames
+from renderer.video import CRF, PRESET, frame_rate, open_encoder, render_video
 
 SIZES = ((640, 480), (1280, 720))
 PRESETS = ("veryfast", "ultrafast")
@@ -112,7 +112,7 @@ def _run(what: str, size: tuple[int, int], preset: str, repeats: int) -> tuple[f
         if what == "ours":
             render_video(target, clip.positions, clip.figure, camera, fps=FPS, preset=preset)
         else:
-            with open_encoder(target, size, frame_rate(FPS), preset, 18) as encode:
+            with open_encoder(target, size, frame_rate(FPS), preset, CRF) as encode:
                 for frame in _worker["frames"][size]:
                     encode(frame)
     busy = time.process_time() - busy
@@ -180,15 +180,23 @@ def study(clip: Clip, workers: int) -> dict[str, Any]:
 # ---- peers ------------------------------------------------------------------------------------------------------
 
 
-def draw_ours(clip: Clip, size: tuple[int, int], target: Path, frames: int) -> None:
-    render_video(target, clip.positions[:frames], clip.figure, clip.camera(size), fps=FPS)
+def draw_ours(clip: Clip, size: tuple[int, int], target: Path | None, frames: int) -> None:
+    if target is None:
+        for _ in paste_frames(clip.positions[:frames], clip.figure, clip.camera(size), None, 16, None):
+            pass
+    else:
+        render_video(target, clip.positions[:frames], clip.figure, clip.camera(size), fps=FPS)
 
 
-def _write_rgb(target: Path, size: tuple[int, int], pictures: Any) -> None:
+def _write_rgb(target: Path | None, size: tuple[int, int], pictures: Any) -> None:
+    if target is None:
+        for _ in pictures:
+            pass
+        return
     import av
 
     with av.open(str(target), "w") as out:
-        stream = out.add_stream("libx264", rate=FPS, options={"preset": "veryfast", "crf": "18"})
+        stream = out.add_stream("libx264", rate=FPS, options={"preset": PRESET, "crf": str(CRF)})
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
         stream.codec_context.thread_count = 1
@@ -198,7 +206,7 @@ def _write_rgb(target: Path, size: tuple[int, int], pictures: Any) -> None:
         out.mux(stream.encode())
 
 
-def draw_matplotlib(clip: Clip, size: tuple[int, int], target: Path, frames: int) -> None:
+def draw_matplotlib(clip: Clip, size: tuple[int, int], target: Path | None, frames: int) -> None:
     import matplotlib
 
     matplotlib.use("Agg")
@@ -224,7 +232,7 @@ def draw_matplotlib(clip: Clip, size: tuple[int, int], target: Path, frames: int
     plt.close(figure)
 
 
-def draw_pyvista(clip: Clip, size: tuple[int, int], target: Path, frames: int) -> None:
+def draw_pyvista(clip: Clip, size: tuple[int, int], target: Path | None, frames: int) -> None:
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
@@ -243,7 +251,7 @@ def draw_pyvista(clip: Clip, size: tuple[int, int], target: Path, frames: int) -
     plotter.close()
 
 
-def draw_pyrender(clip: Clip, size: tuple[int, int], target: Path, frames: int) -> None:
+def draw_pyrender(clip: Clip, size: tuple[int, int], target: Path | None, frames: int) -> None:
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
     import pyrender
     import trimesh
@@ -285,7 +293,7 @@ def _along(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     return pose
 
 
-DRAW: dict[str, Callable[[Clip, tuple[int, int], Path, int], None]] = {
+DRAW: dict[str, Callable[[Clip, tuple[int, int], Path | None, int], None]] = {
     "ours": draw_ours,
     "matplotlib": draw_matplotlib,
     "pyvista": draw_pyvista,
@@ -293,17 +301,18 @@ DRAW: dict[str, Callable[[Clip, tuple[int, int], Path, int], None]] = {
 }
 
 
-def _time_peer(name: str, size: tuple[int, int]) -> float:
-    """Seconds a frame, in a process of its own: two GL libraries in one process disturb each other."""
+def _time_peer(name: str, size: tuple[int, int], encode: bool) -> tuple[float, float]:
+    """Seconds a frame by the clock and of the processor, in a process of its own: two GL libraries in one disturb."""
     clip: Clip = _worker["clip"]
-    target = Path(_worker["folder"]) / "x.mp4"
-    start = time.perf_counter()
+    target = Path(_worker["folder"]) / "x.mp4" if encode else None
+    start, busy = time.perf_counter(), time.process_time()
     DRAW[name](clip, size, target, len(clip.positions))
-    return (time.perf_counter() - start) / len(clip.positions)
+    frames = len(clip.positions)
+    return (time.perf_counter() - start) / frames, (time.process_time() - busy) / frames
 
 
 def peers(clip: Clip, turns: int) -> list[dict[str, Any]]:
-    """Seconds a frame to an mp4 at 640x480, one process each, ours and theirs in turns."""
+    """The clip at 640x480 to an mp4, and to pictures alone: one process each, ours and theirs in turns."""
     rows: list[dict[str, Any]] = []
     spawn = get_context("spawn")
     with spawn.Pool(1, _start, (clip, None)) as own:
@@ -311,27 +320,30 @@ def peers(clip: Clip, turns: int) -> list[dict[str, Any]]:
             if importlib.util.find_spec(name) is None:
                 rows.append({"peer": name, "missing": HOW_TO_GET[name]})
                 continue
-            ours, theirs = [], []
             with spawn.Pool(1, _start, (clip, None)) as other:
                 try:
-                    for _ in range(turns + 1):
-                        ours.append(own.apply(_time_peer, ("ours", SIZES[0])))
-                        theirs.append(other.apply_async(_time_peer, (name, SIZES[0])).get(timeout=300))
+                    rows += [_beside(own, other, name, goal, turns, encode) for encode in (True, False)]
                 except Exception as error:  # a peer that can't draw here is reported, not a failure of the benchmark
                     why = f"found, but it fails here: {type(error).__name__}: {error}"
                     rows.append({"peer": name, "missing": why})
-                    continue
-            mine, peer = statistics.median(ours[1:]), statistics.median(theirs[1:])
-            rows.append(
-                {
-                    "peer": name,
-                    "ours_ms": round(1e3 * mine, 2),
-                    "peer_ms": round(1e3 * peer, 2),
-                    "times_faster": round(peer / mine, 1),
-                    "goal": goal,
-                }
-            )
     return rows
+
+
+def _beside(own: Any, other: Any, name: str, goal: int, turns: int, encode: bool) -> dict[str, Any]:
+    ours, theirs = [], []
+    for _ in range(turns + 1):
+        ours.append(own.apply(_time_peer, ("ours", SIZES[0], encode)))
+        theirs.append(other.apply_async(_time_peer, (name, SIZES[0], encode)).get(timeout=300))
+    (mine, mine_cpu), (peer, peer_cpu) = (np.median(times[1:], axis=0).tolist() for times in (ours, theirs))
+    return {
+        "peer": name,
+        "to": "mp4" if encode else "pictures",
+        "ours_ms": round(1e3 * mine, 2),
+        "peer_ms": round(1e3 * peer, 2),
+        "times_faster": round(peer / mine, 1),
+        "times_less_cpu": round(peer_cpu / mine_cpu, 1),
+        "goal": goal,
+    }
 
 
 def main() -> None:
@@ -374,7 +386,8 @@ def main() -> None:
         if "missing" in row:
             print("{peer}: {missing}".format(**row))
         else:
-            print("{peer}: {peer_ms} ms a frame, ours {ours_ms}: {times_faster} times (goal {goal})".format(**row))
+            times = "{peer} to {to}: {peer_ms} ms a frame, ours {ours_ms}: {times_faster} times".format(**row)
+            print(times + " (goal {goal}; by processor time {times_less_cpu})".format(**row))
 
 
 if __name__ == "__main__":

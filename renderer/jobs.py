@@ -31,7 +31,7 @@ from renderer.capsules import Figure
 from renderer.context import os_environ_defaults
 from renderer.errors import RendererError
 from renderer.files import discard_unfinished
-from renderer.video import VideoInfo, render_video
+from renderer.video import CRF, PRESET, VideoInfo, render_video
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +53,8 @@ class RenderJob:
     figure: Figure
     camera: Camera
     fps: float | Fraction = 30
-    preset: str = "veryfast"
-    crf: int = 18
+    preset: str = PRESET
+    crf: int = CRF
 
 
 @dataclass(frozen=True)

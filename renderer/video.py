@@ -33,6 +33,10 @@ from renderer.offscreen import BATCH, paste_frames
 
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
+# Measured on a walking stick figure of 130 frames at 640x480, all at crf 18: ultrafast keeps the figure best (47.6 dB,
+# 46.3 superfast, 45.0 veryfast) in the least time (1.0, 1.6 and 1.9), and takes 456 kB instead of 356 or 286.
+PRESET, CRF = "ultrafast", 18
+
 # ISO/IEC 23091-2: 1 is BT.709 for primaries, transfer and matrix; 1 in FFmpeg's range enumeration is limited.
 _BT709, _LIMITED = 1, 1
 
@@ -103,8 +107,8 @@ def render_video(
     *,
     size: tuple[int, int] | None = None,
     fps: float | Fraction = 30,
-    preset: str = "veryfast",
-    crf: int = 18,
+    preset: str = PRESET,
+    crf: int = CRF,
     batch: int = BATCH,
     context: Context | None = None,
 ) -> VideoInfo:
@@ -144,8 +148,8 @@ def write_video(
     *,
     size: tuple[int, int],
     fps: float | Fraction = 30,
-    preset: str = "veryfast",
-    crf: int = 18,
+    preset: str = PRESET,
+    crf: int = CRF,
 ) -> VideoInfo:
     """Encode NV12 frames `(height * 3 / 2, width)`; each array may be reused once the next is asked for.
 
