@@ -129,7 +129,7 @@ def gather(folder: Path) -> Material:
 
 def compose(material: Material, analysis: Result) -> Page:
     """Turn material and analysis into what the page shows."""
-    from study.report import figures, media, sections
+    from study.report import figures, media, shown
 
     protocol, manifest, answers = material.protocol, material.manifest, material.answers
     data, quality = str(analysis["data"]), analysis["quality"]
@@ -152,9 +152,9 @@ def compose(material: Material, analysis: Result) -> Page:
         quality_sentence=_quality_sentence(quality),
         strips=tuple(media.embed_strips(manifest)),
         videos=tuple(tuple(pair) for pair in media.embed_videos(manifest)),
-        stimuli=sections.stimulus_table(manifest),
-        motions=sections.motion_table(manifest),
-        participants=sections.participant_table(analysis, material.sessions),
+        stimuli=shown.stimulus_table(manifest),
+        motions=shown.motion_table(manifest),
+        participants=shown.participant_table(analysis, material.sessions),
         shown_sentence=_shown_sentence(manifest),
         methods=tuple(words.methods_paragraph(protocol, manifest, analysis, _who(analysis))),
         versions=_versions(material),
@@ -165,9 +165,9 @@ def compose(material: Material, analysis: Result) -> Page:
 
 def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
     """One section a study, in the protocol's order."""
-    from study.report import sections
+    from study.report import sections, shown
 
-    known = sections.known_truth(material.sessions)
+    known = shown.known_truth(material.sessions)
     found = []
     for study in material.protocol.studies:
         title = study.title or words.sentence(words.readable(study.name))

@@ -1,21 +1,13 @@
-"""Sections of the page: the analysis, the manifest and the protocol in; headlines, figures, tables and notes out."""
+"""One section a study: results of the analysis in; headlines, figures, tables and notes out."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from study.report import figures, tables, words
 from study.report.tables import Table
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.experiment.stimuli import Manifest
-    from study.experiment.stimulus_set import MotionUse
 
 Result = Mapping[str, Any]
 
@@ -387,130 +379,3 @@ def ratings_section(name: str, title: str, rows: Sequence[Result], *, mark: str,
     return Section(
         f"study-{name}", title, "rating", (headline,) if headline else (), (drawing,) if rows else (), (table,), ()
     )
-
-
-# What was shown, and to whom
-
-
-def stimulus_table(manifest: Manifest) -> Table:
-    """Return every stimulus: method, lengths, motions, hash."""
-    rows = [
-        {
-            "id": record.id,
-            "transition": words.readable(record.transition),
-            "category": record.category,
-            "method": record.method,
-            "optimal_frames": record.optimal_frames,
-            "difference_frames": record.difference_frames,
-            "blend_frames": record.blend_frames,
-            "frames": record.frames,
-            "source": _motion_in_words(record.source),
-            "destination": _motion_in_words(record.destination),
-            "notes": "; ".join(record.notes),
-        }
-        for record in manifest.records
-    ]
-    return tables.make(
-        "stimuli",
-        "Every stimulus, in frames. k is the length that the method gives; the blend is k and the difference.",
-        [
-            ("transition", "transition", "text"),
-            ("category", "category", "text"),
-            ("method", "method", "text"),
-            ("optimal_frames", "k", "count"),
-            ("difference_frames", "difference", "count"),
-            ("blend_frames", "blend", "count"),
-            ("frames", "in all", "count"),
-            ("source", "from", "text"),
-            ("destination", "to", "text"),
-            ("notes", "notes", "text"),
-            ("id", "hash", "text"),
-        ],
-        rows,
-        files_only=("category", "notes", "id"),
-    )
-
-
-def _motion_in_words(use: MotionUse) -> str:
-    """The motion and its trial; no folder of the machine that rendered it."""
-    return words.readable(use.motion) + (f" ({Path(use.file).stem})" if use.file else "")
-
-
-def motion_table(manifest: Manifest) -> Table:
-    """Return every motion that was used: its file, where it was blended, and by how much it was extended."""
-    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
-    for record in manifest.records:
-        for role, use in (("from", record.source), ("to", record.destination)):
-            key = (record.transition, role, use.motion, use.file, use.frame, use.added_before, use.added_after)
-            rows[key] = {
-                "transition": words.readable(record.transition),
-                "role": role,
-                "motion": words.readable(use.motion),
-                "file": Path(use.file).name,
-                "frame": use.frame,
-                "frames": use.frames,
-                "added_before": use.added_before,
-                "added_after": use.added_after,
-                "changes": "; ".join(note for note in use.notes if note.startswith(("extended", "mirrored"))),
-                "notes": "; ".join(use.notes),
-            }
-    return tables.make(
-        "motions",
-        "Every motion, in frames of the study: its file, the frame at which the blend starts or ends, its length, and "
-        "the frames that were added before and after it where it was too short.",
-        [
-            ("transition", "transition", "text"),
-            ("role", "", "text"),
-            ("motion", "motion", "text"),
-            ("file", "file", "text"),
-            ("frame", "at", "count"),
-            ("frames", "of", "count"),
-            ("added_before", "added before", "count"),
-            ("added_after", "after", "count"),
-            ("changes", "how", "text"),
-            ("notes", "all notes", "text"),
-        ],
-        list(rows.values()),
-        files_only=("notes", *(() if any(row["changes"] for row in rows.values()) else ("changes",))),
-    )
-
-
-def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
-    """Return one row a participant: when, how many answers, how fast, what was noticed."""
-    started = {}
-    if len(sessions) and "started_at" in sessions:
-        started = {str(row.participant): str(row.started_at)[:16] for row in sessions.itertuples()}
-    rows = [
-        {**row, "kind": "simulated" if row["simulated"] else "person", "started": started.get(row["participant"], "")}
-        for row in analysis["quality"]["table"]
-    ]
-    return tables.make(
-        "participants",
-        "Participants. Flags follow the rules above; nobody was left out.",
-        [
-            ("participant", "participant", "text"),
-            ("kind", "kind", "text"),
-            ("started", "started (UTC)", "text"),
-            ("trials", "asked", "count"),
-            ("answered", "answered", "count"),
-            ("missed", "missed", "count"),
-            ("median_response_s", "median time, s", "two"),
-            ("too_fast", "too fast", "count"),
-            ("false_alarms", "false alarms", "count"),
-            ("same_pairs", "of same pairs", "count"),
-            ("flags", "flags", "text"),
-        ],
-        rows,
-        files_only=("too_fast",) if analysis["data"] == "mixed" else ("too_fast", "kind"),
-    )
-
-
-def known_truth(sessions: pd.DataFrame) -> dict[str, Any]:
-    """Return what is known of the simulated observers by study; empty where sessions disagree or people took part."""
-    if not len(sessions) or "truth_json" not in sessions or not sessions["simulated"].astype(bool).all():
-        return {}
-    texts = set(sessions["truth_json"].dropna())
-    if len(texts) != 1 or sessions["truth_json"].isna().any():
-        return {}
-    studies = json.loads(texts.pop()).get("studies", {})
-    return dict(studies)
