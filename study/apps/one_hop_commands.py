@@ -272,6 +272,7 @@ def play(
 
     CLIPs are the table's, in its order; where none are given, motions of --library by the table's names.
     """
+    from study.apps.one_hop_drawing import draw_played
     from study.experiment.drawing import draw_clip
     from study.motion.bvh import write_bvh
     from study.transitions.one_hop.play import Trigger
@@ -285,6 +286,8 @@ def play(
     played = play_machine(loaded, held, wishes, first=start, method=method)
     if out.suffix.lower() == ".bvh":
         write_bvh(played.clip, out)
+    elif out.suffix.lower() == ".png":
+        draw_played(played, out)
     else:
         draw_clip(played.clip, out)
     segments = [

@@ -136,7 +136,12 @@ class _Tape:
 
     def _record(self, part: Clip, kind: str, clip_start: int, number: int | None = None) -> None:
         clip = self.number if number is None else number
-        self.segments.append(Segment(kind, clip, self.length, self.length + part.frames, clip_start))
+        stop = self.length + part.frames
+        last = self.segments[-1] if self.segments else None
+        if last is not None and (last.kind, last.clip) == (kind, clip) and kind != "blend":
+            self.segments[-1] = replace(last, stop=stop)  # a stay goes on where the clip already played
+        else:
+            self.segments.append(Segment(kind, clip, self.length, stop, clip_start))
         self.recorded.append(part)
         self.length += part.frames
 
