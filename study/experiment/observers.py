@@ -106,6 +106,8 @@ def respond(who: Person, trial: Trial, step: sitting.Step) -> tuple[str | None, 
 
 def _judge(who: Person, trial: Trial, step: sitting.Step, rng: np.random.Generator) -> tuple[str, float]:
     """The answer, and how easy it was from 0 to 1."""
+    if trial.role == "check":
+        return trial.expected, 1.0
     if trial.task == "same-different":
         different = float(probability_different(who.settings.same_different, float(trial.difference_frames or 0)))
         return ("different" if rng.random() < different else "same"), abs(2 * different - 1)
@@ -195,7 +197,7 @@ def simulate(
         before = stored_answers(responses, record.id)
         found += len(before)
         who = person(settings, plan.participant, seed)
-        state = sitting.open_session(protocol, plan, before)
+        state = sitting.open_session(protocol, plan, before, passed=("consent", "form"))
         while (step := sitting.current(state)).kind != "done":
             if step.kind != "answer":
                 state = sitting.advanced(state)
@@ -244,4 +246,4 @@ def _answer(
 
 def questions(protocol: Protocol, plan: Plan) -> int:
     """How many answers a plan asks for."""
-    return sum(max(1, len(protocol.study(trial.study).items)) for trial in plan.trials)
+    return sum(1 if trial.role == "check" else max(1, len(protocol.study(trial.study).items)) for trial in plan.trials)

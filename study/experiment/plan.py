@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
@@ -57,7 +58,8 @@ class Trial:
     """One trial: what is shown first and second, and what the answer will mean.
 
     `trial` counts from 1 over the whole sitting, `repeat` from 1. `reference_first` is None outside same-different
-    studies, `a_first` outside preference studies, and `second` is empty where one stimulus is rated.
+    studies, `a_first` outside preference studies, and `second` is empty where one stimulus is rated. `role` is `trial`,
+    `practice` (counts for nothing) or `check` (asks for `expected`, whatever is shown).
     """
 
     trial: int
@@ -74,6 +76,8 @@ class Trial:
     method_a: str
     method_b: str
     a_first: bool | None
+    role: str = "trial"
+    expected: str = ""
 
 
 @dataclass(frozen=True)
@@ -151,8 +155,13 @@ def draw_plan(
             raise SessionError(
                 f"Expected pairs for the study {study.name!r}, found none; prepare this protocol's stimuli."
             )
+        shown: list[Trial] = []
         for repeat in range(1, study.repeats + 1):
-            trials += _draw_set(study, own, repeat, rng, group)
+            shown += _draw_set(study, own, repeat, rng, group)
+        # Practice and checks draw from generators of their own, so that they leave the trials as they are.
+        practice = _draw_practice(study, own, generator(seed, "practice", protocol.name, participant, study.name))
+        checks = generator(seed, "checks", protocol.name, participant, study.name)
+        trials += [*practice, *_with_checks(study, shown, checks)]
     numbered = tuple(replace(trial, trial=number) for number, trial in enumerate(trials, start=1))
     return Plan(protocol.name, protocol.sha256, participant, seed, group, numbered)
 
@@ -178,6 +187,58 @@ def _draw_set(
     else:
         shown = [(pair, group % 2 == 0) for pair in pairs]
     return [_comparison(shown[i][0], shown[i][1], repeat) for i in rng.permutation(len(shown))]
+
+
+def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Generator) -> list[Trial]:
+    """Practice trials: at random, but in same-different studies half the same and half as different as can be."""
+    if not study.practice:
+        return []
+    chosen = [pairs[i] for i in rng.permutation(len(pairs))]
+    if study.task == "same-different":
+        same = [pair for pair in chosen if not pair.difference_frames]
+        differ = sorted(
+            (pair for pair in chosen if pair.difference_frames), key=lambda pair: -abs(pair.difference_frames or 0)
+        )
+        kinds = [kind for kind in (differ, same) if kind]
+        chosen = [kind[i % len(kind)] for i in range(study.practice) for kind in kinds][: study.practice]
+    chosen = [chosen[i % len(chosen)] for i in range(study.practice)]
+    order = rng.permutation(study.practice)
+    sides = rng.integers(0, 2, study.practice)
+    if study.task == "rating":
+        trials = [_rating(chosen[i], 0) for i in order]
+    else:
+        trials = [_comparison(chosen[i], bool(sides[i]), 0) for i in order]
+    return [replace(trial, role="practice") for trial in trials]
+
+
+def _with_checks(study: StudySpec, trials: Sequence[Trial], rng: np.random.Generator) -> list[Trial]:
+    """The trials with attention checks among them: copies of trials that ask for a stated answer."""
+    mixed = list(trials)
+    for _ in range(study.attention_checks):
+        model = trials[int(rng.integers(len(trials)))]
+        legal = legal_answers(study)
+        check = replace(model, role="check", expected=legal[int(rng.integers(len(legal)))])
+        mixed.insert(int(rng.integers(1, len(mixed) + 1)), check)
+    return mixed
+
+
+def legal_answers(study: StudySpec) -> tuple[str, ...]:
+    """The answers that count in a study."""
+    if study.task == "same-different":
+        return ("same", "different")
+    if study.task == "preference":
+        return ("first", "second")
+    return tuple(str(point) for point in range(study.scale_points))
+
+
+def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
+    """How many groups of participants the orders `by-group` tell apart; 1 where there are none."""
+    groups = 1
+    for study in protocol.studies:
+        if study.order == "by-group":
+            own = sum(pair.study == study.name for pair in pairs)
+            groups = math.lcm(groups, max(own, 1) if study.task == "rating" else 2)
+    return groups
 
 
 def _comparison(pair: Pair, a_first: bool, repeat: int) -> Trial:

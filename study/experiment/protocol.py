@@ -16,24 +16,19 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from study.errors import ProtocolError
 from study.experiment.protocol_errors import KeyMismatchError, explain, full_location, line_of
+from study.experiment.protocol_parts import Consent, FormField, Keys, Slug, Texts
+from study.experiment.protocol_parts import Part as _Part
 
 Method = Literal["fixed", "geodesic", "velocity", "cut"]
 Task = Literal["same-different", "preference", "rating"]
 Order = Literal["both", "random", "balanced", "by-group"]
 
-Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class _Part(BaseModel):
-    """What all parts of a protocol share: no unknown keys, no silent conversions, nothing changes later."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class Colours(_Part):
@@ -184,6 +179,13 @@ class StudySpec(_Part):
     repeats: int = Field(default=1, ge=1, le=1000, description="How often the whole set is shown.")
     question: str = Field(default="", description="What the participant is asked after each pair or stimulus.")
     instructions: str = Field(default="", description="What the participant reads before the study.")
+    example: bool = Field(default=True, description="Whether the instructions can show one stimulus as an example.")
+    practice: int = Field(
+        default=0, ge=0, le=100, description="Trials with feedback before the study; they count for nothing. [trials]"
+    )
+    attention_checks: int = Field(
+        default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
+    )
     scale_points: int = Field(default=5, ge=2, le=11, description="Points of the rating scale, counted from 0.")
     items: Annotated[tuple[Item, ...], Field(strict=False)] = Field(
         default=(), description="Questions of a rating study."
@@ -199,14 +201,6 @@ class StudySpec(_Part):
     def methods(self) -> tuple[Method, ...]:
         """The methods whose blend lengths this study shows."""
         return (self.reference,) if self.comparison is None else (self.reference, self.comparison)
-
-
-class Texts(_Part):
-    """What is said at the start and at the end."""
-
-    welcome: str = Field(default="", description="Read before the first study.")
-    break_text: str = Field(default="", description="Read at a break.")
-    debrief: str = Field(default="", description="Read at the end.")
 
 
 class AnalysisSettings(_Part):
@@ -232,6 +226,15 @@ class Protocol(_Part):
     stimuli: StimulusSettings = Field(default=StimulusSettings(), description="How stimuli are built and drawn.")
     timing: Timing = Field(default=Timing(), description="Times of a trial.")
     points: Points = Field(default=Points(), description="How transition points are chosen.")
+    language: Annotated[str, Field(pattern=r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$")] = Field(
+        default="en", description="Language of the texts, such as en, de or pt-BR; for screen readers."
+    )
+    touch: bool = Field(default=True, description="Whether tablets and telephones may take part.")
+    consent: Consent = Field(default=Consent(), description="What participants agree to.")
+    form: Annotated[tuple[FormField, ...], Field(strict=False)] = Field(
+        default=(), description="Questions about the participant, one `[[form]]` each."
+    )
+    keys: Keys = Field(default=Keys(), description="Keys that answer.")
     texts: Texts = Field(default=Texts(), description="What participants read.")
     analysis: AnalysisSettings = Field(default=AnalysisSettings(), description="Decisions about the analysis.")
     transitions: Annotated[tuple[TransitionSpec, ...], Field(strict=False, min_length=1)] = Field(
@@ -341,7 +344,7 @@ def _check_once(values: Sequence[object], what: str, *location: int | str) -> No
 
 def _check_names(protocol: Protocol) -> None:
     """Refuse names that stand twice, and studies that name transitions that there are not."""
-    for kind in ("transitions", "studies"):
+    for kind in ("transitions", "studies", "form"):
         names = [part.name for part in getattr(protocol, kind)]
         for index, name in enumerate(names):
             if name in names[:index]:

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from study.experiment.protocol import Protocol
 from study.experiment.protocol_errors import model_at, parts
 
-_REPEATED = ("transitions", "studies", "studies.items")
+_REPEATED = ("transitions", "studies", "studies.items", "form")
 _WORDS = {int: "whole number", float: "number", str: "text", bool: "true or false"}
 
 
@@ -52,7 +52,9 @@ def _default(field: FieldInfo) -> str:
     value = field.default
     if value is None or value in ((), ""):
         return "–"
-    if isinstance(value, (bool, str)):
+    if isinstance(value, str):
+        return f"`{value}`"
+    if isinstance(value, bool):
         return f"`{str(value).lower()}`"
     return f"`{value:g}`" if isinstance(value, (int, float)) else "its own"
 

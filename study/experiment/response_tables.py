@@ -87,6 +87,8 @@ answers = sa.Table(
     sa.Column("response_s", sa.Float),
     sa.Column("shown_well", sa.Boolean, nullable=False),
     sa.Column("answered_at", UtcTime, nullable=False),
+    sa.Column("role", sa.Text, nullable=False, server_default="trial"),
+    sa.Column("expected", sa.Text, nullable=False, server_default=""),
     sa.UniqueConstraint("session_id", "trial", "item", "attempt", name="one_answer_a_showing"),
     sa.CheckConstraint("(answer IS NULL) = missed", name="missed_has_no_answer"),
 )
@@ -101,10 +103,62 @@ events = sa.Table(
     sa.Column("at", UtcTime, nullable=False),
 )
 
+# How each stimulus was really shown; a trial that was begun again has several rows of one attempt.
+presentations = sa.Table(
+    "presentations",
+    metadata,
+    sa.Column("id", sa.Integer, primary_key=True),
+    sa.Column("session_id", sa.ForeignKey("sessions.id"), nullable=False, index=True),
+    sa.Column("trial", sa.Integer, nullable=False),
+    sa.Column("attempt", sa.Integer, nullable=False),
+    sa.Column("place", sa.Text, nullable=False),
+    sa.Column("stimulus", sa.Text, nullable=False),
+    sa.Column("method", sa.Text, nullable=False),
+    sa.Column("frames_expected", sa.Integer),
+    sa.Column("frames_presented", sa.Integer),
+    sa.Column("longest_gap_frames", sa.Float),
+    sa.Column("shown_well", sa.Boolean, nullable=False),
+    sa.Column("detail_json", sa.Text),
+    sa.Column("at", UtcTime, nullable=False),
+)
+
+form_values = sa.Table(
+    "form_values",
+    metadata,
+    sa.Column("session_id", sa.ForeignKey("sessions.id"), primary_key=True),
+    sa.Column("name", sa.Text, primary_key=True),
+    sa.Column("value", sa.Text, nullable=False),
+    sa.Column("at", UtcTime, nullable=False),
+)
+
+# Participants in the browser: how they are known again, and what the recruiting service said. Tokens only as hashes.
+participants = sa.Table(
+    "participants",
+    metadata,
+    sa.Column("session_id", sa.ForeignKey("sessions.id"), primary_key=True),
+    sa.Column("token_sha256", sa.Text, nullable=False, unique=True),
+    sa.Column("withdrawal_sha256", sa.Text, nullable=False, unique=True),
+    sa.Column("secret", sa.Text, nullable=False),
+    sa.Column("group_number", sa.Integer, nullable=False),
+    sa.Column("parameters_json", sa.Text, nullable=False),
+    sa.Column("parameters_sha256", sa.Text, unique=True),
+    sa.Column("began_at", UtcTime, nullable=False),
+    sa.Column("seen_at", UtcTime, nullable=False),
+)
+
+# What is left of a session whose participant withdrew.
+withdrawals = sa.Table(
+    "withdrawals",
+    metadata,
+    sa.Column("session_id", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("answers", sa.Integer, nullable=False),
+    sa.Column("at", UtcTime, nullable=False),
+)
+
 
 def make_first_tables(connection: sa.Connection) -> None:
     """Version 1: sessions, answers, events."""
-    metadata.create_all(connection)
+    metadata.create_all(connection, tables=[sessions, answers, events])
 
 
 def keep_answers_append_only(connection: sa.Connection) -> None:
@@ -120,7 +174,40 @@ def keep_answers_append_only(connection: sa.Connection) -> None:
         )
 
 
-MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (make_first_tables, keep_answers_append_only)
+def tell_practice_and_checks_apart(connection: sa.Connection) -> None:
+    """Version 3: the role of each trial, and what an attention check asks for; all earlier ones were trials."""
+    there = {column["name"] for column in sa.inspect(connection).get_columns("answers")}
+    for name, default in (("role", "trial"), ("expected", "")):
+        if name not in there:
+            connection.execute(sa.text(f"ALTER TABLE answers ADD COLUMN {name} TEXT NOT NULL DEFAULT '{default}'"))
+
+
+def make_participant_tables(connection: sa.Connection) -> None:
+    """Version 4: how stimuli were shown, the form, participants in the browser, withdrawals."""
+    metadata.create_all(connection, tables=[presentations, form_values, participants, withdrawals])
+
+
+def let_participants_withdraw(connection: sa.Connection) -> None:
+    """Version 5: answers may be deleted after their withdrawal was written down, and only then."""
+    if connection.dialect.name != "sqlite":
+        return
+    connection.execute(sa.text("DROP TRIGGER IF EXISTS answers_no_delete"))
+    connection.execute(
+        sa.text(
+            "CREATE TRIGGER answers_no_delete BEFORE DELETE ON answers "
+            "WHEN NOT EXISTS (SELECT 1 FROM withdrawals WHERE session_id = OLD.session_id) "
+            "BEGIN SELECT RAISE(ABORT, 'answers are append-only'); END"
+        )
+    )
+
+
+MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (
+    make_first_tables,
+    keep_answers_append_only,
+    tell_practice_and_checks_apart,
+    make_participant_tables,
+    let_participants_withdraw,
+)
 
 
 def migrate(engine: sa.Engine, place: str) -> None:

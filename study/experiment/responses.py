@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -21,8 +21,16 @@ from study.errors import SessionError
 from study.experiment.plan import Plan, Trial, plan_from_json
 from study.experiment.protocol import Protocol
 from study.experiment.rendering import ANSWERS, write_whole
-from study.experiment.response_tables import answers, events, migrate, sessions
-from study.experiment.session import Answer
+from study.experiment.response_tables import (
+    answers,
+    events,
+    form_values,
+    migrate,
+    presentations,
+    sessions,
+    withdrawals,
+)
+from study.experiment.session import Answer, right_answer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,6 +42,7 @@ ANSWER_COLUMNS = (
     "participant", "simulated", "study", "task", "trial", "attempt", "item", "repeat", "pair", "motion", "category",
     "first", "second", "difference_frames", "reference_first", "method_a", "method_b", "a_first", "answer", "missed",
     "correct", "chose_a", "response_s", "shown_well", "answered_at",
+    "role", "expected",
 )  # fmt: skip
 
 
@@ -51,6 +60,37 @@ class SessionRecord:
     plan: Plan
     protocol_sha256: str
     truth: Mapping[str, Any] | None
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """How one stimulus of a trial was really shown.
+
+    Parameters
+    ----------
+    place
+        `first` or `second`.
+    method
+        What timed it: `requestVideoFrameCallback`, `swap`, or the name of a fallback, which measured nothing.
+    frames_expected, frames_presented, longest_gap_frames
+        Frames of the stimulus, frames that were seen to be presented, and the longest time between two of them in
+        frames (1 is perfect); None where it was not measured.
+    shown_well
+        Whether no gap was above one and a half frames, and no frame was missing.
+    detail
+        Anything else, such as the times of all frames in milliseconds.
+    """
+
+    trial: int
+    attempt: int
+    place: str
+    stimulus: str
+    method: str
+    frames_expected: int | None
+    frames_presented: int | None
+    longest_gap_frames: float | None
+    shown_well: bool
+    detail: Mapping[str, Any] | None = None
 
 
 class Responses:
@@ -155,12 +195,21 @@ def begin_session(
                 library_synthetic=library_synthetic,
                 truth_json=None if truth is None else json.dumps(truth, sort_keys=True),
                 started_at=clock(),
+                **_fresh_id(connection),
                 **_versions(),
             )
             .returning(sessions.c.id)
         ).scalar_one()
         connection.execute(sa.insert(events).values(session_id=key, kind="started", at=clock()))
     return SessionRecord(key, plan.participant, simulated, plan, protocol.sha256, truth)
+
+
+def _fresh_id(connection: sa.Connection) -> dict[str, int]:
+    """SQLite would give the number of the latest session to the next one when that session is withdrawn."""
+    if connection.dialect.name != "sqlite":
+        return {}
+    latest = [sa.func.coalesce(sa.func.max(column), 0) for column in (sessions.c.id, withdrawals.c.session_id)]
+    return {"id": 1 + max(connection.execute(sa.select(one)).scalar_one() for one in latest)}
 
 
 def _versions() -> dict[str, str]:
@@ -244,8 +293,15 @@ def stored_answers(responses: Responses, session_id: int) -> tuple[Answer, ...]:
     )
 
 
-def record_answer(responses: Responses, record: SessionRecord, answer: Answer, *, clock: Clock = _utc_now) -> bool:
-    """Commit one answer; it is on disk when this returns.
+def record_answer(
+    responses: Responses,
+    record: SessionRecord,
+    answer: Answer,
+    shown: Sequence[Presentation] = (),
+    *,
+    clock: Clock = _utc_now,
+) -> bool:
+    """Commit one answer, with how its stimuli were shown; it is on disk when this returns.
 
     Returns
     -------
@@ -257,10 +313,9 @@ def record_answer(responses: Responses, record: SessionRecord, answer: Answer, *
     SessionError
         Where another answer to the same showing of the same trial is there: answers are never overwritten.
     """
-    values = {**_trial_values(record.plan.trial(answer.trial)), **_answer_values(record.plan, answer)}
     try:
         with responses.engine.begin() as connection:
-            connection.execute(sa.insert(answers).values(session_id=record.id, answered_at=clock(), **values))
+            insert_answer(connection, record, answer, shown, clock())
     except sa.exc.IntegrityError as error:
         if answer in stored_answers(responses, record.id):
             return False
@@ -269,6 +324,53 @@ def record_answer(responses: Responses, record: SessionRecord, answer: Answer, *
             f"found that one is stored already; {answer.value!r} was not. Open the session again to see what is due."
         ) from error
     return True
+
+
+def insert_answer(
+    connection: sa.Connection, record: SessionRecord, answer: Answer, shown: Sequence[Presentation], at: datetime
+) -> None:
+    """The rows of one answer within a transaction of the caller's."""
+    values = {**_trial_values(record.plan.trial(answer.trial)), **_answer_values(record.plan, answer)}
+    connection.execute(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values})
+    if shown:
+        rows = [{"session_id": record.id, "at": at, **_presentation_values(one)} for one in shown]
+        connection.execute(_INSERT_PRESENTATION, rows)
+
+
+_INSERT_ANSWER, _INSERT_PRESENTATION = sa.insert(answers), sa.insert(presentations)
+
+
+def _presentation_values(shown: Presentation) -> dict[str, Any]:
+    values = asdict(shown)
+    detail = values.pop("detail")
+    return {**values, "detail_json": None if detail is None else json.dumps(detail, separators=(",", ":"))}
+
+
+def record_form(
+    responses: Responses, record: SessionRecord, values: Mapping[str, str], *, clock: Clock = _utc_now
+) -> None:
+    """Store what was filled into the form (`session.filled`), once; sent twice it is stored once."""
+    rows = [{"session_id": record.id, "name": name, "value": value, "at": clock()} for name, value in values.items()]
+    with responses.engine.begin() as connection:
+        if rows and not stored_form(responses, record.id, connection):
+            connection.execute(sa.insert(form_values), rows)
+        connection.execute(sa.insert(events).values(session_id=record.id, kind="form", at=clock()))
+
+
+def stored_form(responses: Responses, session_id: int, connection: sa.Connection | None = None) -> dict[str, str]:
+    """What a participant filled into the form, field by field."""
+    query = sa.select(form_values.c.name, form_values.c.value).where(form_values.c.session_id == session_id)
+    if connection is not None:
+        return {row.name: row.value for row in connection.execute(query)}
+    with responses.engine.connect() as own:
+        return {row.name: row.value for row in own.execute(query)}
+
+
+def steps_passed(responses: Responses, record: SessionRecord) -> tuple[str, ...]:
+    """Which of `consent` and `form` are behind a participant, for `session.open_session`; front ends record both."""
+    query = sa.select(events.c.kind).where(events.c.session_id == record.id, events.c.kind.in_(("consent", "form")))
+    with responses.engine.connect() as connection:
+        return tuple(sorted(set(connection.execute(query).scalars())))
 
 
 def record_event(
@@ -296,9 +398,10 @@ def _answer_values(plan: Plan, answer: Answer) -> dict[str, Any]:
     """The answer's own columns, with what it means: correct (same-different), method a chosen (preference)."""
     trial = plan.trial(answer.trial)
     correct = chose_a = None
-    if answer.value is not None and trial.task == "same-different":
-        correct = (answer.value == "different") == (trial.difference_frames != 0)
-    if answer.value is not None and trial.task == "preference":
+    right = right_answer(trial)
+    if answer.value is not None and right is not None:
+        correct = answer.value == right
+    if answer.value is not None and trial.task == "preference" and trial.role != "check":
         chose_a = (answer.value == "first") == trial.a_first
     return {
         "item": answer.item,
@@ -313,12 +416,18 @@ def _answer_values(plan: Plan, answer: Answer) -> dict[str, Any]:
 
 
 def answers_frame(
-    responses: Responses, *, all_attempts: bool = False, protocol_sha256: str | None = None
+    responses: Responses,
+    *,
+    all_attempts: bool = False,
+    roles: Sequence[str] = ("trial",),
+    protocol_sha256: str | None = None,
 ) -> pd.DataFrame:
     """All answers as one table, one row an answer, in `ANSWER_COLUMNS`.
 
     Parameters
     ----------
+    roles
+        Which trials: `trial`, and where asked for `practice` and `check`, which no analysis counts.
     all_attempts
         With it every showing of a trial; without, the last one of each.
     protocol_sha256
@@ -336,6 +445,7 @@ def answers_frame(
     )
     if protocol_sha256 is not None:
         query = query.where(sessions.c.protocol_sha256 == protocol_sha256)
+    query = query.where(answers.c.role.in_(roles))
     with responses.engine.connect() as connection:
         rows = connection.execute(query.order_by(answers.c.session_id, answers.c.id)).mappings().all()
     hashes = sorted({row["protocol_sha256"] for row in rows})
@@ -359,6 +469,7 @@ def answers_frame(
 
 
 def export_csv(responses: Responses, path: str | Path) -> Path:
-    """Write all answers, every showing, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
-    write_whole(Path(path), answers_frame(responses, all_attempts=True).to_csv(index=False).encode())
+    """Write all answers, every showing and every role, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
+    table = answers_frame(responses, all_attempts=True, roles=("trial", "practice", "check"))
+    write_whole(Path(path), table.to_csv(index=False).encode())
     return Path(path)

@@ -1,22 +1,59 @@
 """Session: what comes next, and what is a legal answer. Pure: it shows nothing, waits for nothing, stores nothing.
 
-A plan, a protocol and the answers so far come in; steps go out, one after another. A front end (window, browser or
-simulated observer) shows the current step and then says either that it was shown (`advanced`) or what was answered
-(`answered`, `missed`). A trial is: first stimulus, gap, second stimulus, the questions, pause (2004 section 4.2).
-Starting and resuming are one thing: `open_session` with the answers that there are.
+A plan, a protocol and the answers so far come in; steps go out, one after another: consent, form, welcome, and for
+each study its instructions, practice, trials and breaks; at the end the debriefing. A front end (window, browser or
+simulated observer) shows the current step and then says that it was shown (`advanced`), what was filled in (`filled`),
+or what was answered (`answered`, `missed`). A trial is: first stimulus, gap, second stimulus, the questions, pause
+(2004 section 4.2). Starting and resuming are one thing: `open_session` with the answers that there are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from study.errors import SessionError
-from study.experiment.plan import Plan, Trial
+from study.experiment.plan import Plan, Trial, legal_answers
 from study.experiment.protocol import Protocol, StudySpec
+from study.experiment.protocol_parts import FormField
 
-Kind = Literal["instructions", "first", "gap", "second", "answer", "pause", "break", "debrief", "done"]
+__all__ = [
+    "Answer",
+    "Kind",
+    "Session",
+    "Step",
+    "advanced",
+    "answer_keys",
+    "answer_words",
+    "answered",
+    "current",
+    "filled",
+    "legal_answers",
+    "missed",
+    "open_session",
+    "progress",
+    "right_answer",
+]
+
+Kind = Literal[
+    "consent",
+    "form",
+    "instructions",
+    "first",
+    "gap",
+    "second",
+    "answer",
+    "feedback",
+    "pause",
+    "break",
+    "debrief",
+    "done",
+]
+
+LONGEST_TEXT = 1000
+"""Characters of a text that a participant may write in the form."""
 
 MAX_ATTEMPTS = 2
 """A trial that was shown badly is queued again at the end of its study, this many times in all."""
@@ -50,13 +87,14 @@ class Step:
     Parameters
     ----------
     kind
-        `first` and `second` play a stimulus to its end; `gap` and `pause` wait; `answer` asks; the others are read.
+        `first` and `second` play a stimulus to its end; `gap` and `pause` wait; `answer` asks; `form` is filled in;
+        the others are read. Passing over `consent` means agreeing.
     study
         Name of the study; empty before the first and after the last.
     text
         What the participant reads.
     stimulus
-        Id of the stimulus to play.
+        Id of the stimulus to play; with `instructions`, of the example that can be played.
     duration_s
         How long a gap, pause or answer window lasts; None for as long as it takes.
     trial, attempt
@@ -67,6 +105,8 @@ class Step:
         The answers that count.
     low, high
         Words at the ends of a rating scale.
+    role
+        What the trial is for: `trial`, `practice` or `check`; empty outside trials.
     """
 
     kind: Kind
@@ -80,6 +120,7 @@ class Step:
     legal: tuple[str, ...] = ()
     low: str = ""
     high: str = ""
+    role: str = ""
 
 
 @dataclass(frozen=True)
@@ -92,14 +133,22 @@ class Session:
     position: int = 0
 
 
-def open_session(protocol: Protocol, plan: Plan, answers: Iterable[Answer] = ()) -> Session:
-    """A sitting at its start, or where its answers left it; a trial half answered is shown again from its start."""
+def open_session(
+    protocol: Protocol, plan: Plan, answers: Iterable[Answer] = (), *, passed: Collection[str] = ()
+) -> Session:
+    """A sitting at its start, or where its answers left it; a trial half answered is shown again from its start.
+
+    Parameters
+    ----------
+    passed
+        Which of `consent` and `form` are behind the participant.
+    """
     if plan.protocol_sha256 != protocol.sha256:
         raise SessionError(
             f"Expected the protocol under which the plan was drawn (sha256 {plan.protocol_sha256[:12]}), found "
             f"{protocol.name!r} with {protocol.sha256[:12]}; use the protocol.toml of the results folder."
         )
-    return Session(plan, protocol, _steps(protocol, plan, tuple(answers)))
+    return Session(plan, protocol, _steps(protocol, plan, tuple(answers), passed))
 
 
 def current(session: Session) -> Step:
@@ -115,8 +164,10 @@ def progress(session: Session) -> tuple[int, int]:
 
 
 def advanced(session: Session) -> Session:
-    """After the current step was shown, read or waited for."""
+    """After the current step was shown, read, agreed to or waited for."""
     step = current(session)
+    if step.kind == "form":
+        raise SessionError("Expected what was filled into the form; call filled.")
     if step.kind == "answer":
         raise SessionError(
             f"Expected an answer to trial {step.trial} ({', '.join(step.legal)}), or that it was missed; "
@@ -125,6 +176,44 @@ def advanced(session: Session) -> Session:
     if step.kind == "done":
         raise SessionError("Expected no further step: the session is done.")
     return replace(session, position=session.position + 1)
+
+
+def filled(session: Session, values: Mapping[str, str]) -> tuple[Session, dict[str, str]]:
+    """After the form was filled in: the session and what is stored, field by field; empty ones are left out.
+
+    Raises
+    ------
+    SessionError
+        Where no form is shown now, for fields that it does not have, and for values that a field does not take.
+    """
+    if current(session).kind != "form":
+        raise SessionError(f"Expected no form now: the session is at {current(session).kind!r}.")
+    fields = {field.name: field for field in session.protocol.form}
+    if strays := sorted(set(values) - set(fields)):
+        raise SessionError(f"Expected the form's fields {', '.join(fields)}, found {', '.join(map(repr, strays))}.")
+    taken = {name: _field_value(field, values.get(name, "").strip()) for name, field in fields.items()}
+    return replace(session, position=session.position + 1), {name: value for name, value in taken.items() if value}
+
+
+def _field_value(field: FormField, value: str) -> str:
+    if not value:
+        if field.required:
+            raise SessionError(f"Expected {field.name} to be filled in, found nothing.")
+        return ""
+    if field.kind == "choice" and value not in field.choices:
+        raise SessionError(f"Expected one of {', '.join(field.choices)} as {field.name}, found {value!r}.")
+    if field.kind == "number":
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        least = -math.inf if field.least is None else field.least
+        most = math.inf if field.most is None else field.most
+        if not (math.isfinite(number) and least <= number <= most):
+            raise SessionError(f"Expected a number from {least:g} to {most:g} as {field.name}, found {value!r}.")
+    if len(value) > LONGEST_TEXT:
+        raise SessionError(f"Expected at most {LONGEST_TEXT} characters as {field.name}, found {len(value)}.")
+    return value
 
 
 def answered(session: Session, value: str, response_s: float, *, shown_well: bool = True) -> tuple[Session, Answer]:
@@ -160,33 +249,67 @@ def _asked(session: Session) -> Step:
 
 
 def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
-    """Move on; where the trial was shown badly, add it once more to the end of its study."""
-    following = session.steps[session.position + 1 :]
+    """Move on; where the trial was shown badly, add it once more to the end of its study. Practice gets feedback."""
+    here, following = session.steps[session.position], session.steps[session.position + 1 :]
     trial_goes_on = bool(following) and following[0].kind == "answer" and following[0].trial == answer.trial
     session = replace(session, position=session.position + 1)
-    if answer.shown_well or answer.attempt >= MAX_ATTEMPTS or trial_goes_on:
-        return session, answer
     trial = session.plan.trial(answer.trial)
+    if trial.role == "practice" and not trial_goes_on:
+        feedback = Step("feedback", here.study, _feedback(session.protocol, trial, answer), role=trial.role)
+        steps = (*session.steps[: session.position], feedback, *following)
+        session = replace(session, steps=steps)
+    if not _comes_again(trial, answer.attempt, answer.shown_well) or trial_goes_on:
+        return session, answer
     end = max(i for i, step in enumerate(session.steps) if step.study == trial.study) + 1
     repeat = _trial_steps(session.protocol, trial, answer.attempt + 1, frozenset())
     return replace(session, steps=(*session.steps[:end], *repeat, *session.steps[end:])), answer
 
 
-def legal_answers(study: StudySpec) -> tuple[str, ...]:
-    """The answers that count in a study."""
-    if study.task == "same-different":
-        return ("same", "different")
-    if study.task == "preference":
-        return ("first", "second")
-    return tuple(str(point) for point in range(study.scale_points))
+def _comes_again(trial: Trial, attempt: int, shown_well: bool) -> bool:
+    return not shown_well and attempt < MAX_ATTEMPTS and trial.role != "practice"
 
 
-def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer]) -> tuple[Step, ...]:
+def right_answer(trial: Trial) -> str | None:
+    """What the right answer to a trial is; None where none is right."""
+    if trial.role == "check":
+        return trial.expected
+    if trial.task == "same-different":
+        return "different" if trial.difference_frames else "same"
+    return None
+
+
+def _feedback(protocol: Protocol, trial: Trial, answer: Answer) -> str:
+    texts, right = protocol.texts, right_answer(trial)
+    if answer.missed:
+        return texts.missed
+    if right is None:
+        return texts.practice_noted
+    if answer.value == right:
+        return texts.practice_right
+    return texts.practice_wrong.replace("{answer}", answer_words(protocol, right))
+
+
+def answer_words(protocol: Protocol, value: str) -> str:
+    """What stands on the button of an answer; points of a scale are their own words."""
+    return str(getattr(protocol.texts, value, value))
+
+
+def answer_keys(protocol: Protocol, legal: Sequence[str]) -> dict[str, str]:
+    """The key of each legal answer; points of a scale have their digit, and 10 has none."""
+    keys = {value: getattr(protocol.keys, value, value) for value in legal}
+    return {value: key for value, key in keys.items() if len(key) == 1}
+
+
+def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Collection[str]) -> tuple[Step, ...]:
     """All that is left to do, in order."""
     known = {trial.trial for trial in plan.trials}
     if strays := sorted({answer.trial for answer in answers} - known):
         raise SessionError(f"Expected answers to the plan's trials 1 to {len(plan.trials)}, found trials {strays}.")
     steps: list[Step] = []
+    if protocol.consent.text and "consent" not in passed:
+        steps.append(Step("consent", text=protocol.consent.text.strip()))
+    if protocol.form and "form" not in passed:
+        steps.append(Step("form", text=protocol.texts.form.strip()))
     if not answers and protocol.texts.welcome:
         steps.append(Step("instructions", text=protocol.texts.welcome.strip()))
     for name in dict.fromkeys(trial.study for trial in plan.trials):
@@ -200,38 +323,41 @@ def _study_steps(protocol: Protocol, plan: Plan, study: StudySpec, answers: Sequ
     steps: list[Step] = []
     again: list[Step] = []
     break_after = protocol.timing.break_after
+    count = 0
     for trial in plan.trials:
+        count += trial.role != "practice"
         if trial.study != study.name:
             continue
-        attempt, done = _state(study, [answer for answer in answers if answer.trial == trial.trial])
+        attempt, done = _state(study, trial, [answer for answer in answers if answer.trial == trial.trial])
         if done is None:
             continue
         (again if attempt > 1 else steps).extend(_trial_steps(protocol, trial, attempt, done))
         last = trial.trial == len(plan.trials)
-        if break_after and trial.trial % break_after == 0 and not last and attempt == 1:
+        if break_after and count % break_after == 0 and not last and attempt == 1 and trial.role != "practice":
             steps.append(Step("break", study.name, protocol.texts.break_text.strip()))
     steps += again
     if steps and study.instructions:
-        steps.insert(0, Step("instructions", study.name, study.instructions.strip()))
+        example = next(trial.first for trial in plan.trials if trial.study == study.name) if study.example else ""
+        steps.insert(0, Step("instructions", study.name, study.instructions.strip(), stimulus=example))
     return steps
 
 
-def _state(study: StudySpec, answers: Sequence[Answer]) -> tuple[int, frozenset[str] | None]:
+def _state(study: StudySpec, trial: Trial, answers: Sequence[Answer]) -> tuple[int, frozenset[str] | None]:
     """Which showing of a trial is due and which of its items are answered; None for the items where it is finished."""
-    items = {item.name for item in study.items} or {""}
+    items = {""} if trial.role == "check" else {item.name for item in study.items} or {""}
     attempt = max((answer.attempt for answer in answers), default=1)
     latest = [answer for answer in answers if answer.attempt == attempt]
     done = frozenset(answer.item for answer in latest)
     if not items <= done:
         return attempt, done
-    if all(answer.shown_well for answer in latest) or attempt >= MAX_ATTEMPTS:
+    if not _comes_again(trial, attempt, all(answer.shown_well for answer in latest)):
         return attempt, None
     return attempt + 1, frozenset()
 
 
 def _trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset[str]) -> list[Step]:
     study, timing = protocol.study(trial.study), protocol.timing
-    base = Step("first", trial.study, stimulus=trial.first, trial=trial.trial, attempt=attempt)
+    base = Step("first", trial.study, stimulus=trial.first, trial=trial.trial, attempt=attempt, role=trial.role)
     steps = [base]
     if trial.second:
         steps.append(replace(base, kind="gap", stimulus="", duration_s=timing.gap_s))
@@ -240,7 +366,10 @@ def _trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset
     # A rating is a questionnaire: it has no answer window (2003 section 4.2).
     window_s = None if study.task == "rating" else timing.answer_s
     ask = replace(base, kind="answer", stimulus="", text=study.question, duration_s=window_s, legal=legal)
-    if study.items:
+    if trial.role == "check":
+        words = protocol.texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected))
+        steps.append(replace(ask, text=words))
+    elif study.items:
         steps += [
             replace(ask, item=item.name, text=item.question, low=item.low, high=item.high)
             for item in study.items

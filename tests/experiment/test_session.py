@@ -9,8 +9,10 @@ from study.experiment.plan import draw_plan
 from study.experiment.protocol import parse_protocol
 from study.experiment.session import (
     advanced,
+    answer_keys,
     answered,
     current,
+    filled,
     missed,
     open_session,
     progress,
@@ -182,3 +184,93 @@ def test_another_protocol_or_stray_answers_are_refused(opened):
 
     with pytest.raises(SessionError, match=r"trials 1 to 8, found trials \[99\]"):
         open_session(opened.protocol, opened.plan, [replace(answers[0], trial=99)])
+
+
+PEOPLE = """
+consent = { text = "Do you agree?" }
+keys = { same = "g" }
+
+[[form]]
+name = "age"
+label = "Age"
+kind = "number"
+least = 18
+required = true
+
+[[form]]
+name = "vision"
+label = "Vision"
+kind = "choice"
+choices = ["good", "poor"]
+
+[stimuli]"""
+
+
+@pytest.fixture
+def with_people(toy_protocol, toy_stimuli):
+    text = toy_protocol.text.replace("[stimuli]", PEOPLE.lstrip(), 1).replace(
+        'order = "both"', 'order = "both"\npractice = 4\nattention_checks = 2'
+    )
+    protocol = parse_protocol(text)
+    return protocol, draw_plan(protocol, toy_stimuli.pairs, "p01")
+
+
+def test_consent_and_form_come_first_and_once(with_people):
+    protocol, plan = with_people
+    session = open_session(protocol, plan)
+    assert (current(session).kind, current(session).text) == ("consent", "Do you agree?")
+    session = advanced(session)
+    assert current(session).kind == "form"
+    with pytest.raises(SessionError, match="call filled"):
+        advanced(session)
+    for values, why in (
+        ({}, "age to be filled in"),
+        ({"age": "17"}, "from 18 to inf as age, found '17'"),
+        ({"age": "nan"}, "from 18 to inf"),
+        ({"age": "20", "vision": "none"}, "one of good, poor as vision"),
+        ({"age": "20", "other": "1"}, "fields age, vision, found 'other'"),
+    ):
+        with pytest.raises(SessionError, match=why):
+            filled(session, values)
+    session, values = filled(session, {"age": " 30 ", "vision": ""})
+    assert values == {"age": "30"}
+    assert current(session).kind == "instructions"
+    with pytest.raises(SessionError, match="Expected no form now"):
+        filled(session, {"age": "30"})
+    assert current(open_session(protocol, plan, passed=("consent",))).kind == "form"
+    assert current(open_session(protocol, plan, passed=("consent", "form"))).kind == "instructions"
+
+
+def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people):
+    protocol, plan = with_people
+    assert [trial.role for trial in plan.trials[:4]] == ["practice"] * 4
+    assert sorted(bool(trial.difference_frames) for trial in plan.trials[:4]) == [False, False, True, True]
+    checks = [trial for trial in plan.trials if trial.role == "check"]
+    assert len(checks) == 2
+    seen = []
+    run(open_session(protocol, plan, passed=("consent", "form")), seen=seen)
+    assert [step.kind for step in seen].count("feedback") == 4
+    said = {step.text for step in seen if step.kind == "feedback"}
+    assert said == {"That was right.", "That was not right: they were Different."}
+    for trial in checks:
+        step = next(step for step in seen if step.trial == trial.trial and step.kind == "answer")
+        assert step.text.endswith(f"Please answer: {trial.expected.capitalize()}")
+    assert answer_keys(protocol, ("same", "different")) == {"same": "g", "different": "d"}
+    assert "10" not in answer_keys(protocol, [str(i) for i in range(11)])
+
+
+def test_practice_and_checks_leave_the_trials_as_they_are(with_people, opened):
+    from dataclasses import replace
+
+    def trials(plan):
+        return [replace(trial, trial=0) for trial in plan.trials if trial.role == "trial"]
+
+    assert trials(with_people[1]) == trials(opened.plan)
+
+
+def test_practice_is_not_repeated(with_people):
+    protocol, plan = with_people
+    session = open_session(protocol, plan, passed=("consent", "form"))
+    _, answer = answered(to_question(session), "same", 1.0, shown_well=False)
+    assert answer.trial == 1
+    assert current(to_question(open_session(protocol, plan, [answer], passed=("consent", "form")))).trial == 2

@@ -1,0 +1,219 @@
+"""Participants: who takes part in the browser, known by unguessable tokens; groups filled evenly; withdrawal.
+
+A responses database and a token come in; stored participants go out. Tokens and withdrawal codes are stored as hashes
+only, so the database does not let anyone in. Withdrawing deletes all that a session holds and leaves one audit line.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import sqlalchemy as sa
+
+from study.experiment.response_tables import (
+    answers,
+    events,
+    form_values,
+    participants,
+    presentations,
+    sessions,
+    withdrawals,
+)
+from study.experiment.responses import Clock, Responses
+
+DROPPED_AFTER = timedelta(hours=1)
+"""A session that is not finished and was not heard of for so long counts as dropped out."""
+
+CODE_LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
+
+
+def _utc_now() -> datetime:
+    return datetime.now(UTC)
+
+
+def new_token() -> str:
+    """An unguessable token of 256 bits, safe in addresses and cookies."""
+    return secrets.token_urlsafe(32)
+
+
+def new_code() -> str:
+    """A code of 79 bits that a person can copy by hand: four groups of four letters without lookalikes."""
+    letters = [secrets.choice(CODE_LETTERS) for _ in range(16)]
+    return "-".join("".join(letters[i : i + 4]) for i in range(0, 16, 4))
+
+
+def hashed(token: str) -> str:
+    """What is stored in place of a token."""
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Participant:
+    """A participant in the browser: the session, the secret that addresses are made from, and what the link said."""
+
+    session_id: int
+    secret: str
+    group: int
+    parameters: Mapping[str, str]
+
+
+def enrol(
+    responses: Responses,
+    session_id: int,
+    *,
+    token: str,
+    withdrawal_code: str,
+    group: int = 0,
+    parameters: Mapping[str, str] | None = None,
+    identified: bool = False,
+    clock: Clock = _utc_now,
+) -> Participant:
+    """Store a participant's tokens (as hashes), group and parameters.
+
+    Parameters
+    ----------
+    identified
+        Whether the parameters name one person, who is then enrolled once.
+    """
+    given = dict(parameters or {})
+    secret = secrets.token_hex(32)
+    row = {
+        "session_id": session_id,
+        "token_sha256": hashed(token),
+        "withdrawal_sha256": hashed(withdrawal_code),
+        "secret": secret,
+        "group_number": group,
+        "parameters_json": json.dumps(given, sort_keys=True),
+        "parameters_sha256": _parameters_key(given) if identified else None,
+        "began_at": clock(),
+        "seen_at": clock(),
+    }
+    with responses.engine.begin() as connection:
+        connection.execute(sa.insert(participants).values(row))
+    return Participant(session_id, secret, group, given)
+
+
+def _parameters_key(parameters: Mapping[str, str]) -> str:
+    return hashed(json.dumps(dict(parameters), sort_keys=True))
+
+
+def find_by_token(responses: Responses, token: str) -> Participant | None:
+    """The participant with a token, or None."""
+    return _find(responses, participants.c.token_sha256 == hashed(token))
+
+
+def find_by_parameters(responses: Responses, parameters: Mapping[str, str]) -> Participant | None:
+    """The participant who came by a link with these parameters, where they name one person; or None."""
+    return _find(responses, participants.c.parameters_sha256 == _parameters_key(parameters))
+
+
+def _find(responses: Responses, condition: sa.ColumnElement[bool]) -> Participant | None:
+    with responses.engine.connect() as connection:
+        row = connection.execute(sa.select(participants).where(condition)).mappings().one_or_none()
+    if row is None:
+        return None
+    return Participant(row["session_id"], row["secret"], row["group_number"], json.loads(row["parameters_json"]))
+
+
+def give_token(responses: Responses, participant: Participant, token: str) -> None:
+    """Replace a participant's token: the same person in another browser; the old token is of no use any more."""
+    change = sa.update(participants).where(participants.c.session_id == participant.session_id)
+    with responses.engine.begin() as connection:
+        connection.execute(change.values(token_sha256=hashed(token)))
+
+
+def seen(responses: Responses, session_ids: Collection[int], *, clock: Clock = _utc_now) -> None:
+    """Participants were heard of just now."""
+    if session_ids:
+        change = sa.update(participants).where(participants.c.session_id.in_(session_ids))
+        with responses.engine.begin() as connection:
+            connection.execute(change.values(seen_at=clock()))
+
+
+def finished_sessions() -> sa.Select[tuple[int]]:
+    """Ids of the sessions that are finished."""
+    return sa.select(events.c.session_id).where(events.c.kind == "finished")
+
+
+def filled_groups(
+    responses: Responses, groups: int, *, dropped_after: timedelta = DROPPED_AFTER, clock: Clock = _utc_now
+) -> list[int]:
+    """How many participants each group has, finished or at it; drop-outs and those who declined are given back."""
+    left = sa.select(events.c.session_id).where(events.c.kind.in_(("declined", "left")))
+    query = (
+        sa.select(participants.c.group_number, sa.func.count())
+        .where(
+            sa.or_(
+                participants.c.session_id.in_(finished_sessions()),
+                sa.and_(participants.c.seen_at > clock() - dropped_after, participants.c.session_id.not_in(left)),
+            )
+        )
+        .group_by(participants.c.group_number)
+    )
+    with responses.engine.connect() as connection:
+        counts = {row[0]: row[1] for row in connection.execute(query)}
+    return [counts.get(group, 0) for group in range(groups)]
+
+
+def overview(responses: Responses) -> list[dict[str, Any]]:
+    """One mapping a session in the browser, newest first: who is where; for the researcher's eyes."""
+    count = (
+        sa.select(sa.func.count()).where(answers.c.session_id == sessions.c.id).correlate(sessions).scalar_subquery()
+    )
+    query = (
+        sa.select(
+            sessions.c.id,
+            sessions.c.participant,
+            participants.c.group_number,
+            participants.c.parameters_json,
+            participants.c.began_at,
+            participants.c.seen_at,
+            count.label("answers"),
+        )
+        .join(participants, participants.c.session_id == sessions.c.id)
+        .order_by(sessions.c.id.desc())
+    )
+    with responses.engine.connect() as connection:
+        rows = connection.execute(query).mappings().all()
+        kinds = connection.execute(
+            sa.select(events.c.session_id, events.c.kind, sa.func.count()).group_by(events.c.session_id, events.c.kind)
+        ).all()
+    happened: dict[int, dict[str, int]] = {}
+    for session_id, kind, number in kinds:
+        happened.setdefault(session_id, {})[kind] = number
+    return [{**row, "events": happened.get(row["id"], {})} for row in rows]
+
+
+def withdraw(responses: Responses, withdrawal_code: str, *, clock: Clock = _utc_now) -> int | None:
+    """Delete all that is stored of the participant with a withdrawal code; one audit line stays.
+
+    Returns
+    -------
+    int or None
+        The session that was deleted, or None for a code that no participant has.
+    """
+    code = withdrawal_code.strip().lower()
+    with responses.engine.begin() as connection:
+        if connection.dialect.name == "sqlite":
+            connection.execute(sa.text("PRAGMA secure_delete = ON"))
+        query = sa.select(participants.c.session_id).where(participants.c.withdrawal_sha256 == hashed(code))
+        session_id = connection.execute(query).scalar_one_or_none()
+        if session_id is None:
+            return None
+        count = connection.execute(sa.select(sa.func.count()).where(answers.c.session_id == session_id)).scalar_one()
+        line = {"session_id": session_id, "answers": count, "at": clock()}
+        connection.execute(sa.insert(withdrawals).values(line))
+        for table in (answers, presentations, form_values, events, participants):
+            connection.execute(sa.delete(table).where(table.c.session_id == session_id))
+        connection.execute(sa.delete(sessions).where(sessions.c.id == session_id))
+    if responses.engine.dialect.name == "sqlite":
+        # What was deleted is still in the write-ahead log until it is folded into the file.
+        with responses.engine.connect() as connection:
+            connection.execute(sa.text("PRAGMA wal_checkpoint(TRUNCATE)"))
+    return int(session_id)

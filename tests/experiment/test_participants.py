@@ -1,0 +1,130 @@
+"""Participants of the browser: tokens, even groups, drop-outs given back, withdrawal that leaves one line."""
+
+from __future__ import annotations
+
+import sqlite3
+from datetime import UTC, datetime, timedelta
+
+import pytest
+import sqlalchemy as sa
+
+from study.experiment import participants as people
+from study.experiment.plan import draw_plan
+from study.experiment.response_tables import answers, presentations, sessions, withdrawals
+from study.experiment.responses import (
+    Presentation,
+    begin_session,
+    open_responses,
+    record_answer,
+    record_event,
+    record_form,
+    stored_answers,
+    stored_form,
+)
+from study.experiment.session import Answer
+
+NOW = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+@pytest.fixture
+def responses(tmp_path):
+    with open_responses(tmp_path) as opened:
+        yield opened
+
+
+@pytest.fixture
+def enrol(responses, toy_protocol, toy_stimuli):
+    def enrol(name, group=0, at=NOW, **more):
+        record = begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group))
+        people.enrol(
+            responses, record.id, token=f"token {name}", withdrawal_code=f"code {name}", group=group,
+            clock=lambda: at, **more,
+        )  # fmt: skip
+        return record
+
+    return enrol
+
+
+def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol, tmp_path):
+    record = enrol("p1", parameters={"PROLIFIC_PID": "abc"}, identified=True)
+    found = people.find_by_token(responses, "token p1")
+    assert (found.session_id, found.group, found.parameters) == (record.id, 0, {"PROLIFIC_PID": "abc"})
+    assert people.find_by_parameters(responses, {"PROLIFIC_PID": "abc"}) == found
+    assert people.find_by_token(responses, "token p2") is None
+    people.give_token(responses, found, "another")
+    assert people.find_by_token(responses, "token p1") is None
+    assert people.find_by_token(responses, "another") == found
+    responses.close()
+    assert b"token p1" not in (tmp_path / "responses.sqlite").read_bytes()
+
+
+def test_tokens_and_codes_do_not_repeat():
+    assert len({people.new_token() for _ in range(1000)} | {people.new_code() for _ in range(1000)}) == 2000
+    assert len(people.new_token()) == 43
+
+
+def test_groups_count_who_is_there_and_give_back_who_is_gone(responses, enrol):
+    finished, gone, here, declined = (
+        enrol("a", 0),
+        enrol("b", 1),
+        enrol("c", 2, NOW + timedelta(hours=5)),
+        enrol("d", 3),
+    )
+    record_event(responses, finished, "finished")
+    record_event(responses, declined, "declined")
+    later = lambda: NOW + timedelta(hours=5, minutes=1)  # noqa: E731
+    assert people.filled_groups(responses, 4, clock=lambda: NOW) == [1, 1, 1, 0]
+    assert people.filled_groups(responses, 4, clock=later) == [1, 0, 1, 0]
+    people.seen(responses, [gone.id], clock=later)
+    assert people.filled_groups(responses, 4, clock=later) == [1, 1, 1, 0]
+    assert here.id
+
+
+def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol, tmp_path):
+    stays, leaves = enrol("stays"), enrol("leaves")
+    for record in (stays, leaves):
+        shown = Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True, {"mark": f"mark of {record.participant}"})
+        record_answer(responses, record, Answer(1, "", 1, "same", 1.0), [shown])
+        record_form(responses, record, {"remark": f"words of {record.participant}"})
+    assert people.withdraw(responses, "no such code", clock=lambda: NOW) is None
+    assert people.withdraw(responses, " CODE leaves ", clock=lambda: NOW) == leaves.id
+    with responses.engine.connect() as connection:
+        assert connection.execute(sa.select(sessions.c.participant)).scalars().all() == ["stays"]
+        assert connection.execute(sa.select(presentations.c.session_id)).scalars().all() == [stays.id]
+        assert connection.execute(sa.select(withdrawals)).all() == [(leaves.id, 1, NOW)]
+    assert stored_form(responses, stays.id) == {"remark": "words of stays"}
+    assert len(stored_answers(responses, stays.id)) == 1
+    responses.close()
+    whole = (tmp_path / "responses.sqlite").read_bytes()
+    assert b"words of stays" in whole
+    assert b"words of leaves" not in whole
+    assert b"mark of leaves" not in whole
+
+
+def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(responses, enrol):
+    stays, leaves = enrol("stays"), enrol("leaves")
+    record_answer(responses, stays, Answer(1, "", 1, "same", 1.0))
+    people.withdraw(responses, "code leaves")
+    assert enrol("next").id == leaves.id + 1
+    with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:
+        connection.execute(sa.delete(answers))
+
+
+def test_a_database_of_version_2_is_brought_up_to_date(tmp_path, toy_protocol, toy_stimuli):
+    """As Segue 0.1 wrote it: no roles, no participants."""
+    path = tmp_path / "responses.sqlite"
+    with open_responses(path) as responses:
+        record = begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01"))
+        record_answer(responses, record, Answer(1, "", 1, "same", 1.0))
+    with sqlite3.connect(path) as raw:
+        for table in ("presentations", "form_values", "participants", "withdrawals"):
+            raw.execute("DROP TRIGGER IF EXISTS answers_no_delete")
+            raw.execute(f"DROP TABLE {table}")
+        for column in ("role", "expected"):
+            raw.execute(f"ALTER TABLE answers DROP COLUMN {column}")
+        raw.execute("DELETE FROM schema_version WHERE version > 2")
+    raw.close()
+    with open_responses(path) as responses:
+        assert stored_answers(responses, record.id) == (Answer(1, "", 1, "same", 1.0),)
+        with responses.engine.connect() as connection:
+            assert connection.execute(sa.select(answers.c.role)).scalars().all() == ["trial"]
