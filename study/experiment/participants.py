@@ -7,6 +7,7 @@ only, so the database does not let anyone in. Withdrawing deletes all that a ses
 from __future__ import annotations
 
 import hashlib
+import hmac
 import json
 import secrets
 from collections.abc import Collection, Mapping
@@ -42,12 +43,6 @@ def new_token() -> str:
     return secrets.token_urlsafe(32)
 
 
-def new_code() -> str:
-    """A code of 79 bits that a person can copy by hand: four groups of four letters without lookalikes."""
-    letters = [secrets.choice(CODE_LETTERS) for _ in range(16)]
-    return "-".join("".join(letters[i : i + 4]) for i in range(0, 16, 4))
-
-
 def hashed(token: str) -> str:
     """What is stored in place of a token."""
     return hashlib.sha256(token.encode()).hexdigest()
@@ -62,13 +57,24 @@ class Participant:
     group: int
     parameters: Mapping[str, str]
 
+    @property
+    def withdrawal_code(self) -> str:
+        """The code with which this participant can withdraw; made from the secret, so it can be shown again."""
+        return _code(self.secret)
+
+
+def _code(secret: str) -> str:
+    """A code of 79 bits that a person can copy by hand: four groups of four letters without lookalikes."""
+    number = int.from_bytes(hmac.digest(secret.encode(), b"withdrawal", "sha256"))
+    letters = [CODE_LETTERS[number // len(CODE_LETTERS) ** i % len(CODE_LETTERS)] for i in range(16)]
+    return "-".join("".join(letters[i : i + 4]) for i in range(0, 16, 4))
+
 
 def enrol(
     responses: Responses,
     session_id: int,
     *,
     token: str,
-    withdrawal_code: str,
     group: int = 0,
     parameters: Mapping[str, str] | None = None,
     identified: bool = False,
@@ -86,7 +92,7 @@ def enrol(
     row = {
         "session_id": session_id,
         "token_sha256": hashed(token),
-        "withdrawal_sha256": hashed(withdrawal_code),
+        "withdrawal_sha256": hashed(_code(secret)),
         "secret": secret,
         "group_number": group,
         "parameters_json": json.dumps(given, sort_keys=True),
@@ -199,13 +205,20 @@ def withdraw(responses: Responses, withdrawal_code: str, *, clock: Clock = _utc_
         The session that was deleted, or None for a code that no participant has.
     """
     code = withdrawal_code.strip().lower()
-    with responses.engine.begin() as connection:
-        if connection.dialect.name == "sqlite":
-            connection.execute(sa.text("PRAGMA secure_delete = ON"))
+    with responses.engine.connect() as connection:
         query = sa.select(participants.c.session_id).where(participants.c.withdrawal_sha256 == hashed(code))
         session_id = connection.execute(query).scalar_one_or_none()
         if session_id is None:
             return None
+    erase(responses, int(session_id), clock=clock)
+    return int(session_id)
+
+
+def erase(responses: Responses, session_id: int, *, clock: Clock = _utc_now) -> None:
+    """Delete all that is stored of a session; one audit line stays."""
+    with responses.engine.begin() as connection:
+        if connection.dialect.name == "sqlite":
+            connection.execute(sa.text("PRAGMA secure_delete = ON"))
         count = connection.execute(sa.select(sa.func.count()).where(answers.c.session_id == session_id)).scalar_one()
         line = {"session_id": session_id, "answers": count, "at": clock()}
         connection.execute(sa.insert(withdrawals).values(line))
@@ -216,4 +229,3 @@ def withdraw(responses: Responses, withdrawal_code: str, *, clock: Clock = _utc_
         # What was deleted is still in the write-ahead log until it is folded into the file.
         with responses.engine.connect() as connection:
             connection.execute(sa.text("PRAGMA wal_checkpoint(TRUNCATE)"))
-    return int(session_id)

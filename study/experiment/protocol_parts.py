@@ -103,7 +103,74 @@ class Texts(Part):
         description="The question of an attention check; {answer} is what to answer.",
     )
     form: str = Field(default="A few questions about you", description="Heading of the form.")
+    skip: str = Field(default="Skip", min_length=1, description="Button that leaves a question of the form empty.")
+    not_taken: str = Field(default="Please check this.", description="After something that the form does not take.")
+    space_key: str = Field(default="Space", description="Name of the space bar, on buttons of the window.")
+    enter_key: str = Field(default="Enter", description="Name of the Enter key, on buttons of the window.")
+    stop_question: str = Field(default="Do you want to stop?", description="Before the window closes.")
+    stop_note: str = Field(
+        default="Your answers so far are stored. You can go on later where you stopped.",
+        description="Read with that question.",
+    )
+    stop: str = Field(default="Stop", min_length=1, description="Button that stops and closes the window.")
+    stay: str = Field(default="Go on", min_length=1, description="Button that stays.")
+    away: str = Field(
+        default="The window was left. Click here, then go on when you are ready.",
+        description="Read when the window has lost the keyboard before a trial.",
+    )
+    close: str = Field(default="Close", min_length=1, description="Button that closes the window at the end.")
     finished: str = Field(default="That was all. Your answers are stored.", description="Read when all is done.")
+
+    progress: str = Field(default="{done} of {total} done", description="How far the participant is.")
+    press: str = Field(default="key {key}", description="Beside an answer's button; {key} is its key.")
+    wait: str = Field(default="One moment, please.", description="While films are loaded.")
+    waiting: str = Field(
+        default="The connection is interrupted. Your answer is kept and will be sent; please leave this page open.",
+        description="While the server can't be reached.",
+    )
+    film_fault: str = Field(
+        default="A film could not be shown. Nothing of what you did is lost.", description="When a film can't be shown."
+    )
+    try_again: str = Field(default="Try again", min_length=1, description="Button that loads a film again.")
+    skip: str = Field(default="Go on without it", min_length=1, description="Button that passes over such a trial.")
+    elsewhere: str = Field(
+        default="This study is open in another tab or window. Please go on there.",
+        description="In a second tab of one participant.",
+    )
+    take_over: str = Field(default="Go on here instead", min_length=1, description="Button of a second tab.")
+    full: str = Field(
+        default="Thank you for your interest. This study has all the participants that it needs.",
+        description="When no more participants are taken.",
+    )
+    taken: str = Field(
+        default="This link was used already. Please go on in the browser in which you began.",
+        description="When another browser opens a participant's link.",
+    )
+    no_touch: str = Field(
+        default="Please take part on a computer with a keyboard.", description="On tablets where they are not allowed."
+    )
+    no_film: str = Field(
+        default="This browser can't play the films. Please use a current Chrome, Edge, Firefox or Safari.",
+        description="Where the browser can't play the stimuli at all.",
+    )
+    reduced_motion: str = Field(
+        default="Your device asks for little motion. This study shows short films of a moving figure, and can't do "
+        "without.",
+        description="Where a participant's device asks for reduced motion.",
+    )
+    withdrawal: str = Field(
+        default="With this code you can have your answers deleted at any time:",
+        description="Above the code, at the end.",
+    )
+    withdraw: str = Field(default="Delete my answers", min_length=1, description="Button of the withdrawal page.")
+    withdraw_code: str = Field(default="Your code", description="Label of the code on the withdrawal page.")
+    withdrawn: str = Field(default="Your answers were deleted.", description="After withdrawing.")
+    no_code: str = Field(
+        default="There is no such code. Please check it; there may be nothing left to delete.",
+        description="For a wrong code on the withdrawal page.",
+    )
+    completion: str = Field(default="Your completion code:", description="Above the completion code.")
+    back: str = Field(default="Finish", min_length=1, description="Button that leads back to the recruiting site.")
 
     @model_validator(mode="after")
     def _check_has_answer(self) -> Self:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from datetime import UTC, datetime, timedelta
 
@@ -36,13 +37,14 @@ def responses(tmp_path):
 def enrol(responses, toy_protocol, toy_stimuli):
     def enrol(name, group=0, at=NOW, **more):
         record = begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group))
-        people.enrol(
-            responses, record.id, token=f"token {name}", withdrawal_code=f"code {name}", group=group,
-            clock=lambda: at, **more,
-        )  # fmt: skip
+        people.enrol(responses, record.id, token=f"token {name}", group=group, clock=lambda: at, **more)
         return record
 
     return enrol
+
+
+def code_of(responses, name):
+    return people.find_by_token(responses, f"token {name}").withdrawal_code
 
 
 def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol, tmp_path):
@@ -59,8 +61,11 @@ def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol
 
 
 def test_tokens_and_codes_do_not_repeat():
-    assert len({people.new_token() for _ in range(1000)} | {people.new_code() for _ in range(1000)}) == 2000
+    assert len({people.new_token() for _ in range(1000)}) == 1000
     assert len(people.new_token()) == 43
+    codes = {people.Participant(1, str(secret), 0, {}).withdrawal_code for secret in range(1000)}
+    assert len(codes) == 1000
+    assert all(re.fullmatch(r"([a-z2-9]{4}-){3}[a-z2-9]{4}", code) for code in codes)
 
 
 def test_groups_count_who_is_there_and_give_back_who_is_gone(responses, enrol):
@@ -87,7 +92,7 @@ def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol, tmp_
         record_answer(responses, record, Answer(1, "", 1, "same", 1.0), [shown])
         record_form(responses, record, {"remark": f"words of {record.participant}"})
     assert people.withdraw(responses, "no such code", clock=lambda: NOW) is None
-    assert people.withdraw(responses, " CODE leaves ", clock=lambda: NOW) == leaves.id
+    assert people.withdraw(responses, f" {code_of(responses, 'leaves').upper()} ", clock=lambda: NOW) == leaves.id
     with responses.engine.connect() as connection:
         assert connection.execute(sa.select(sessions.c.participant)).scalars().all() == ["stays"]
         assert connection.execute(sa.select(presentations.c.session_id)).scalars().all() == [stays.id]
@@ -104,7 +109,7 @@ def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol, tmp_
 def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(responses, enrol):
     stays, leaves = enrol("stays"), enrol("leaves")
     record_answer(responses, stays, Answer(1, "", 1, "same", 1.0))
-    people.withdraw(responses, "code leaves")
+    people.withdraw(responses, code_of(responses, "leaves"))
     assert enrol("next").id == leaves.id + 1
     with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:
         connection.execute(sa.delete(answers))
