@@ -2,10 +2,10 @@
 
     python benchmarks/fit_weights.py FOLDER SOURCE DESTINATION [SOURCE DESTINATION]... --transfer SOURCE DESTINATION
 
-Nobody's judgement is in this: a cut is called good or bad by the weights of Wang & Bodenheimer 2003, Table 1 (good: among
-the cheapest of its two clips; bad: near one cost for all clips, with some spread). 16 good and 26 bad ones as in the paper.
-What is measured is how well the least squares finds the weights again, and how far the best transitions move when one
-label is left out; the paper has under one frame on average, median zero, and 41 of 42 on a motion not trained on.
+Nobody's judgement is in this: a cut is called good or bad by the weights of Wang & Bodenheimer 2003, Table 1 (good:
+among the cheapest of its two clips; bad: near one cost for all clips, with some spread), 16 good and 26 bad ones as in
+the paper. What is measured is how well the least squares finds the weights again, and how far the best transitions move
+when one label is left out; the paper has under one frame on average, median zero, and 41 of 42 on another motion.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ VERBS = {
     "label": "weight_commands:label",
     "fit-weights": "weight_commands:fit_weights",
     "one-hop": "one_hop_commands:one_hop",
+    "advise": "advise_command:advise",
     "check": "study_commands:check",
     "render": "study_commands:render",
     "simulate": "study_commands:simulate",

@@ -1,9 +1,10 @@
-"""Geodesic blend lengths by the thousand: all start and end frames that one wants of two clips at once.
+"""Blend lengths by the thousand: all start and end frames that one wants of two clips at once.
 
-In: two clips of one rig at one frame rate, many start frames and as many end frames. Out: the cheapest length and its
-cost for each. The same as `study.transitions.blend_length` gives one by one (2004 Eqs. 1 and 2): in the table of
-distances of all frames, the window of every length lies on the diagonal that begins at the source's start frame, or
-ends at the destination's end frame, so running sums along the diagonals serve all transitions of the two clips.
+In: two clips of one rig at one frame rate, many start frames and as many end frames. Out: the length by the geodesic or
+the velocity method and its cost for each. The same as `study.transitions.blend_length` gives one by one (2004 Eqs. 1 to
+4): in the table of distances of all frames, the window of every length lies on the diagonal that begins at the source's
+start frame, or ends at the destination's end frame, so running sums along the diagonals serve all transitions of the
+two clips.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from study.errors import TransitionError
 from study.motion.clip import Clip
-from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames
-from study.transitions.distances import check_same_rig, distance_matrix
-from study.transitions.weights import joint_weights
+from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames, joint_speeds
+from study.transitions.distances import check_same_rig, distance_matrix, joint_differences
+from study.transitions.weights import MAJOR_ROLES, joint_weights
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -59,6 +60,62 @@ def geodesic_lengths(
     TransitionError
         Where the clips don't supply the longest blend at some of the frames; the message says how many.
     """
+    starts, ends, low, high = _transitions(source, destination, start_frames, end_frames, shortest, longest)
+    sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
+    lengths = np.arange(low, high + 1)
+    best, cost = np.empty(len(starts), dtype=np.int64), np.empty(len(starts))
+    block = max(1, _BLOCK // len(lengths))
+    for at in range(0, len(starts), block):
+        i, j = starts[at : at + block, None], ends[at : at + block, None]
+        # Pairs (i, j-b+1) to (i+b-1, j): the sum to the last of them less the sum to the one before the first.
+        costs = (sums[i + lengths, j + 1] - sums[i, j + 1 - lengths]) / lengths
+        found = np.argmin(costs, axis=1)
+        best[at : at + block] = lengths[found]
+        cost[at : at + block] = costs[np.arange(len(found)), found]
+    return best, cost
+
+
+def velocity_lengths(
+    source: Clip,
+    destination: Clip,
+    start_frames: ArrayLike,
+    end_frames: ArrayLike,
+    *,
+    shortest: int | None = None,
+    longest: int | None = None,
+    weights: str | Mapping[str, float] = "wang2003",
+) -> tuple[IntArray, FloatArray]:
+    """The velocity method's blend length of many transitions between two clips, and what it costs by Eq. 1.
+
+    Parameters, returns and errors are those of `geodesic_lengths`; lengths outside the range are clipped to it.
+    """
+    starts, ends, low, high = _transitions(source, destination, start_frames, end_frames, shortest, longest)
+    joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
+    speeds = [joint_speeds(clip, joints) for clip in (source, destination)]
+    sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
+    lengths = np.empty(len(starts), dtype=np.int64)
+    block = max(1, _BLOCK // (16 * len(joints)))
+    for at in range(0, len(starts), block):
+        i, j = starts[at : at + block], ends[at : at + block]
+        differences = joint_differences(source.rotations[i][:, joints], destination.rotations[j][:, joints])
+        most = np.argmax(differences, axis=1)
+        rows = np.arange(len(i))
+        speed = 0.5 * (speeds[0][i, most] + speeds[1][j, most])
+        gap = differences[rows, most]
+        seconds = np.divide(gap, speed, out=np.where(gap > 0, np.inf, 0.0), where=speed > 0)
+        lengths[at : at + block] = np.rint(np.clip(seconds * source.fps, low, high))
+    return lengths, (sums[starts + lengths, ends + 1] - sums[starts, ends + 1 - lengths]) / lengths
+
+
+def _transitions(
+    source: Clip,
+    destination: Clip,
+    start_frames: ArrayLike,
+    end_frames: ArrayLike,
+    shortest: int | None,
+    longest: int | None,
+) -> tuple[IntArray, IntArray, int, int]:
+    """The frames as arrays, and the range of lengths, all of it checked."""
     check_same_rig(source, destination)
     low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
     high = default_frames(source.fps, LONGEST_S) if longest is None else longest
@@ -78,18 +135,7 @@ def geodesic_lengths(
             f"supply blends of {high} frames; {np.count_nonzero(lacking)} of {len(starts)} transitions do not, the "
             f"first from {starts[first]} to {ends[first]}."
         )
-    sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
-    lengths = np.arange(low, high + 1)
-    best, cost = np.empty(len(starts), dtype=np.int64), np.empty(len(starts))
-    block = max(1, _BLOCK // len(lengths))
-    for at in range(0, len(starts), block):
-        i, j = starts[at : at + block, None], ends[at : at + block, None]
-        # Pairs (i, j-b+1) to (i+b-1, j): the sum to the last of them less the sum to the one before the first.
-        costs = (sums[i + lengths, j + 1] - sums[i, j + 1 - lengths]) / lengths
-        found = np.argmin(costs, axis=1)
-        best[at : at + block] = lengths[found]
-        cost[at : at + block] = costs[np.arange(len(found)), found]
-    return best, cost
+    return starts, ends, low, high
 
 
 def _diagonal_sums(distances: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from study.errors import TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import Clip
+from study.motion.clip import Clip, trim
 from study.transitions.distances import check_same_rig, frame_distance, half_angle_squares, joint_differences
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 from study.transitions.windows import check_frames, longest_available, shortfall, window
@@ -253,16 +253,22 @@ def major_joint_differences(source: Clip, destination: Clip, start_frame: int, e
     return {role: float(value) for role, value in zip(MAJOR_ROLES, differences, strict=True)}
 
 
-def joint_speed(clip: Clip, frame: int, joint: int) -> float:
-    """Half-angle speed of a joint at a frame, radians a second: over the frames on either side, where there are both.
+def joint_speeds(clip: Clip, joints: IntArray) -> FloatArray:
+    """Half-angle speed of joints at each frame, `(frames, joints)`, radians a second.
 
-    Half angles, so that Eq. 4 divides a half angle by a half-angle speed and gives seconds.
+    Over the frames on either side, where there are both; half angles, so that Eq. 4 divides a half angle by a
+    half-angle speed and gives seconds.
     """
-    first, last = max(frame - 1, 0), min(frame + 1, clip.frames - 1)
-    if first == last:
-        return 0.0
-    turned = quat.half_angle_between(clip.rotations[first, joint], clip.rotations[last, joint])
-    return float(turned) * clip.fps / (last - first)
+    frames = np.arange(clip.frames)
+    before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, clip.frames - 1)
+    turned = quat.half_angle_between(clip.rotations[before][:, joints], clip.rotations[after][:, joints])
+    return np.asarray(turned * clip.fps / np.maximum(after - before, 1)[:, None])
+
+
+def joint_speed(clip: Clip, frame: int, joint: int) -> float:
+    """`joint_speeds` of one joint at one frame."""
+    near = range(max(frame - 1, 0), min(frame + 2, clip.frames))
+    return float(joint_speeds(trim(clip, near.start, near.stop), np.array([joint]))[frame - near.start, 0])
 
 
 def _velocity(source: Clip, destination: Clip, frames: tuple[int, int], low: int, high: int) -> BlendLength:

@@ -152,3 +152,22 @@ def test_labelling_goes_on_where_it_stopped_and_gives_weights(
     assert (fitted["good"], fitted["bad"]) == (2, 2)
     assert {"mean_frames", "median_frames", "deviations"} == set(fitted["cross_validation"])  # type: ignore[call-overload]
     assert fitted["transfer"]["of"] == 4  # type: ignore[index]
+
+
+@pytest.mark.gl
+def test_advice_comes_as_table_csv_json_and_strips(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    answer = ask(capsys, "advise", "walk", "run", "box", "--out", tmp_path)
+    advice = answer["advice"]
+    assert isinstance(advice, list)
+    assert len(advice) == 6
+    assert answer["cyclic"] == {"walk": True, "run": True, "box": False}
+    methods = {(row["source"], row["destination"]): row["method"] for row in advice}
+    assert methods["walk", "box"] == methods["walk", "run"] == "geodesic"
+    rows = rows_of(tmp_path / "advice.csv")
+    assert [int(row["blend_frames"]) for row in rows] == [row["blend_frames"] for row in advice]
+    assert json.loads((tmp_path / "advice.json").read_text(encoding="utf-8")) == answer
+    for row in advice:
+        assert Path(row["strip"]).read_bytes().startswith(b"\x89PNG")
+    assert run(["advise", "dance", "box", "--no-strips"]) == 0
+    assert "velocity" in capsys.readouterr().out
+    assert run(["advise", "walk"]) == 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from study.errors import TransitionError
-from study.transitions.batch import geodesic_lengths
+from study.transitions.batch import geodesic_lengths, velocity_lengths
 from study.transitions.blend_length import blend_length
 
 
@@ -45,3 +45,14 @@ def test_a_range_of_lengths_is_kept(make_walk):
 def test_frames_that_are_not_there_are_counted(make_walk, starts, ends, message):
     with pytest.raises(TransitionError, match=message):
         geodesic_lengths(make_walk(100), make_walk(100), starts, ends)
+
+
+def test_velocity_lengths_are_those_found_one_by_one(make_walk):
+    source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
+    rng = np.random.default_rng(2)
+    starts, ends = rng.integers(0, 60, 40), rng.integers(29, 80, 40)
+    lengths, costs = velocity_lengths(source, destination, starts, ends, longest=30)
+    for i, j, length, cost in zip(starts, ends, lengths, costs, strict=True):
+        one = blend_length(source, destination, int(i), int(j), method="velocity", longest=30)
+        assert length == one.blend_frames
+        assert cost == pytest.approx(one.cost, abs=1e-12)

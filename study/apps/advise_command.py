@@ -1,0 +1,145 @@
+"""`segue advise`: for each pair of clips, where to blend and for how long."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import permutations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.clips import load_clip
+from study.apps.console import emit, json_option, library_option, progress, say
+
+if TYPE_CHECKING:
+    from study.motion.clip import Clip
+    from study.transitions.advice import Advice
+
+HEADINGS = ("from", "to", "method", "start", "end", "frames", "than default", "JND", "cost", "cost at default")
+
+
+@click.command()
+@click.argument("motions", nargs=-1, metavar="CLIPS...")
+@library_option
+@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate.")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for advice.csv, advice.json, and a strip of each transition.",
+)
+@click.option("--no-strips", is_flag=True, help="Write the tables alone.")
+@json_option
+def advise(
+    motions: tuple[str, ...], library: str | None, fps: float, out: Path | None, no_strips: bool, as_json: bool
+) -> None:
+    """For each pair of CLIPS, both ways: a transition point, a blend length, and how far that is from ten frames.
+
+    CLIPS are motion files, or names of motions in --library; all of the library where none is named. The method is the
+    one that suits the motion (Wang & Bodenheimer 2004): geodesic where one of the two is cyclic, else velocity.
+    """
+    from dataclasses import asdict
+
+    from study.errors import SegueError
+    from study.motion.clip import resample
+    from study.motion.library import open_library
+    from study.transitions.advice import is_cyclic
+
+    names = motions or (open_library(library or "synthetic").names() if library else ())
+    if len(set(names)) < 2:
+        raise click.UsageError(f"expected at least two clips, or --library with two or more, found {len(set(names))}.")
+    clips, cyclic = {}, {}
+    for name in dict.fromkeys(names):
+        own = load_clip(name, library, None)
+        clips[name], cyclic[name] = resample(own, fps), is_cyclic(own)
+    rows: list[dict[str, Any]] = []
+    problems: list[str] = []
+    pairs = list(permutations(clips, 2))
+    with progress("advise") as advance:
+        for done, (source, destination) in enumerate(pairs, start=1):
+            try:
+                found, strip = _one(
+                    clips[source], clips[destination], (cyclic[source], cyclic[destination]), None if no_strips else out
+                )
+            except SegueError as error:
+                problems.append(f"{source} to {destination}: {error}")
+            else:
+                rows.append({**asdict(found), "source": source, "destination": destination, "strip": strip})
+            advance(done / len(pairs), f"{done} of {len(pairs)}")
+    for problem in problems:
+        say(problem)
+    result = {"fps": fps, "advice": rows, "problems": problems, "cyclic": cyclic}
+    if out is not None:
+        _write(out, result)
+    emit(result, as_json, "\n".join(_table(rows)))
+
+
+def _one(source: Clip, destination: Clip, cyclic: tuple[bool, bool], out: Path | None) -> tuple[Advice, str | None]:
+    """The advice, and the strip drawn where there is a folder for it."""
+    from study.motion.clip import retarget
+    from study.transitions.advice import advise as find
+
+    destination = retarget(destination, source.skeleton)
+    found = find(source, destination, cyclic=cyclic)
+    return found, None if out is None else str(_strip(source, destination, found, out / "strips"))
+
+
+def _strip(source: Clip, destination: Clip, found: Advice, folder: Path) -> Path:
+    """A strip of the advised blend with a second and a half on either side, feet planted."""
+    from study.experiment.drawing import draw_clip
+    from study.motion.clip import trim
+    from study.transitions.blending import blend
+    from study.transitions.footskate import plant_feet
+
+    made, _ = plant_feet(
+        blend(source, destination, found.start_frame, found.end_frame, found.blend_frames), source, destination
+    )
+    around = round(1.5 * source.fps)
+    start = max(0, made.blend_start - around)
+    clip = trim(made.clip, start, min(made.clip.frames, made.blend_stop + around))
+    folder.mkdir(parents=True, exist_ok=True)
+    picture = folder / f"{found.source}-to-{found.destination}.png".replace("/", "_")
+    draw_clip(clip, picture, poses=13, blended=(made.blend_start - start, made.blend_stop - start))
+    return picture
+
+
+def _write(out: Path, result: dict[str, Any]) -> None:
+    import json
+
+    import pandas as pd
+
+    from study.analysis.estimates import plain
+
+    out.mkdir(parents=True, exist_ok=True)
+    pd.DataFrame(result["advice"]).to_csv(out / "advice.csv", index=False)
+    (out / "advice.json").write_text(json.dumps(plain(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """The advice as columns of text, those furthest from the default first."""
+    cells = [
+        HEADINGS,
+        *(
+            (
+                row["source"],
+                row["destination"],
+                row["method"],
+                str(row["start_frame"]),
+                str(row["end_frame"]),
+                str(row["blend_frames"]),
+                f"{row['difference_frames']:+d}",
+                f"{row['jnd']:.1f}",
+                f"{row['cost']:.4f}",
+                f"{row['default_cost']:.4f}",
+            )
+            for row in sorted(rows, key=lambda row: -row["jnd"])
+        ),
+    ]
+    widths = [max(len(line[column]) for line in cells) for column in range(len(HEADINGS))]
+    for line in cells:
+        left = (
+            cell.ljust(width) if at < 3 else cell.rjust(width)
+            for at, (cell, width) in enumerate(zip(line, widths, strict=True))
+        )
+        yield "  ".join(left)
+    yield "JND: just noticeable differences of the blend length from the default; from 1 on, people see it."

@@ -1,0 +1,197 @@
+"""Where and for how long to blend from one clip to another, with nothing given but the clips.
+
+In: two clips of one rig at one frame rate, and whether either moves in cycles. Out: `Advice`. The lengths are those of
+Wang & Bodenheimer 2004: geodesic where a motion is cyclic, for people see when a gait falls out of phase, velocity
+where neither is (section 3.1.3). Only points are taken at which the method asks for 5 to 35 frames, as it did for the
+paper's motions (section 4.3).
+
+The papers choose points apart from lengths, 2004 at random. Here each point is judged with the blend that follows from
+it, by what the blend does to the motion: it bends poses by their distance (Eq. 1) and adds, in passing from one to the
+other, that distance over the blend length to the velocities. As in the cost of Lee et al. the two are added, and the
+velocities weigh so much that poses and velocities of these clips vary alike: `cost (1 + (tau / (b + 1))^2)`, where tau
+is the time in which the motion goes through its own variation, about a sixth of a cycle. By the distance alone the
+shortest blends would always win, for a good match seldom lasts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import TransitionError
+from study.motion.clip import Clip, sample
+from study.motion.cycles import find_cycle
+from study.transitions.batch import geodesic_lengths, velocity_lengths
+from study.transitions.blend_length import FIXED_S, LONGEST_S, blend_length, default_frames
+from study.transitions.distances import check_same_rig, distance_matrix, frame_distance
+from study.transitions.weights import joint_weights
+
+IntArray = NDArray[np.int64]
+
+# 2004 section 5.1: differences that are noticed, 7 frames longer or 8 frames shorter, at 30 fps.
+JND_LONGER_S, JND_SHORTER_S = 7.0 / 30.0, 8.0 / 30.0
+# 2004 section 4.3: optimal lengths of the motions tested, at 30 fps.
+USUAL_S = (5.0 / 30.0, 35.0 / 30.0)
+# What is left to be seen of a clip before and after a blend: this, or a quarter of a short clip; seconds.
+_SEEN_S = 1.0
+# Room for the point to be chosen in, seconds.
+_FREEDOM_S = 1.0 / 3.0
+# Frames of a clip that its spread is found from.
+_SPREAD_FRAMES = 200
+# Points that are tried for one pair of clips; of longer clips, every so many frames.
+_TRIED = 250_000
+
+
+@dataclass(frozen=True)
+class Advice:
+    """A transition between two clips.
+
+    Parameters
+    ----------
+    source, destination
+        Names of the clips.
+    method
+        `"geodesic"` or `"velocity"`.
+    why
+        What it was chosen for.
+    start_frame, end_frame
+        First blended frame of the source, last blended frame of the destination.
+    blend_frames, blend_s
+        How long to blend.
+    cost, default_cost
+        2004 Eq. 1 for this blend, and for one of the default length at the same points.
+    default_frames
+        The fixed length that is compared with: 0.33 s, 10 frames at 30 fps.
+    difference_frames
+        How much longer the advised blend is; below zero, shorter.
+    jnd
+        That difference in just noticeable differences (2004 section 5.1); from 1 on, people see it.
+    note
+        What a reader should know.
+    """
+
+    source: str
+    destination: str
+    method: str
+    why: str
+    start_frame: int
+    end_frame: int
+    blend_frames: int
+    blend_s: float
+    cost: float
+    default_cost: float
+    default_frames: int
+    difference_frames: int
+    jnd: float
+    note: str = ""
+
+
+def is_cyclic(clip: Clip) -> bool:
+    """Whether a motion goes in gait cycles, found from the motion: steps that repeat at its start or its end.
+
+    A clip that turns, stops or sets off counts as cyclic where there are steps on one side of that. The clip's own
+    frame rate shows cycles best.
+    """
+    return any(cycle is not None and cycle.kind != "still" for cycle in (find_cycle(clip, "start"), find_cycle(clip)))
+
+
+def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None = None) -> Advice:
+    """A transition point and a blend length.
+
+    Parameters
+    ----------
+    source, destination
+        Clips of one rig at one frame rate.
+    cyclic
+        Whether the source and the destination move in cycles; looked for with `is_cyclic` unless given.
+
+    Raises
+    ------
+    TransitionError
+        For clips of different rigs or rates, or too short for a blend of 5 frames.
+    """
+    check_same_rig(source, destination)
+    repeats = (is_cyclic(source), is_cyclic(destination)) if cyclic is None else cyclic
+    method = "geodesic" if any(repeats) else "velocity"
+    starts, ends, longest = _points(source, destination)
+    find = geodesic_lengths if method == "geodesic" else velocity_lengths
+    lengths, costs = find(source, destination, starts, ends, longest=longest)
+    strain = costs * (1.0 + (own_time(source, destination) / (lengths + 1)) ** 2)
+    low, high = (round(seconds * source.fps) for seconds in USUAL_S)
+    usual = (lengths >= low) & (lengths <= high)
+    notes = []
+    if not usual.any():
+        notes.append(f"no point asks for a blend of {low} to {high} frames; this one costs least of all")
+        usual[:] = True
+    if longest < default_frames(source.fps, LONGEST_S):
+        notes.append(f"short clips: blends of up to {longest} frames were considered")
+    best = int(np.flatnonzero(usual)[np.argmin(strain[usual])])
+    start, end, length = int(starts[best]), int(ends[best]), int(lengths[best])
+    default = default_frames(source.fps, FIXED_S)
+    fixed = blend_length(source, destination, start, end, method="fixed", restrict=True)
+    return Advice(
+        source.name,
+        destination.name,
+        method,
+        _why(repeats),
+        start,
+        end,
+        length,
+        length / source.fps,
+        float(costs[best]),
+        fixed.cost,
+        default,
+        length - default,
+        just_noticeable((length - default) / source.fps),
+        "; ".join(notes),
+    )
+
+
+def own_time(*clips: Clip) -> float:
+    """The time, in frames, in which clips go through their own variation: spread of poses over speed of joints.
+
+    A joint that swings once in `n` frames has `n / (2 pi)`.
+    """
+    spread = speed = 0.0
+    for clip in clips:
+        weights = joint_weights(clip.skeleton)
+        some = sample(clip, np.linspace(0, clip.frames - 1, min(clip.frames, _SPREAD_FRAMES)))
+        spread += clip.frames * float(np.mean(distance_matrix(some, some, weights))) / 2.0
+        speed += clip.frames * float(np.mean(frame_distance(clip.rotations[1:], clip.rotations[:-1], weights)))
+    return float(np.sqrt(spread / speed)) if speed > 0 else 0.0
+
+
+def just_noticeable(difference_s: float) -> float:
+    """A difference in blend length, seconds, in just noticeable differences, 0 or more (2004 section 5.1)."""
+    return difference_s / JND_LONGER_S if difference_s > 0 else abs(difference_s) / JND_SHORTER_S
+
+
+def _why(cyclic: tuple[bool, bool]) -> str:
+    if all(cyclic):
+        return "both motions are cyclic"
+    if any(cyclic):
+        return f"the {'source' if cyclic[0] else 'destination'} is cyclic"
+    return "neither motion is cyclic"
+
+
+def _points(source: Clip, destination: Clip) -> tuple[IntArray, IntArray, int]:
+    """Start and end frames to try, and the longest blend that all of them have room for."""
+    fps = source.fps
+    entry, after = (min(round(_SEEN_S * fps), clip.frames // 4) for clip in (source, destination))
+    freedom = round(_FREEDOM_S * fps)
+    room = min(source.frames - entry, destination.frames - after) - freedom
+    longest = min(default_frames(fps, LONGEST_S), room)
+    if longest < default_frames(fps, USUAL_S[0]):
+        shorter = source if source.frames - entry < destination.frames - after else destination
+        raise TransitionError(
+            f"Expected clips of more than {default_frames(fps, USUAL_S[0]) + freedom} frames beside what is seen "
+            f"before and after the blend, found {shorter.frames} in {shorter.name or 'one of them'}. Use longer clips."
+        )
+    # Frame 0 has no frame before it to tell a velocity by.
+    starts = np.arange(max(entry, 1), source.frames - longest + 1)
+    ends = np.arange(longest - 1, destination.frames - max(after, 1))
+    step = int(np.ceil(np.sqrt(max(1.0, len(starts) * len(ends) / _TRIED))))
+    grid = np.meshgrid(starts[::step], ends[::step], indexing="ij")
+    return grid[0].ravel(), grid[1].ravel(), longest
