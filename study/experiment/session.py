@@ -29,11 +29,13 @@ __all__ = [
     "answer_words",
     "answered",
     "current",
+    "field_value",
     "filled",
     "legal_answers",
     "missed",
     "open_session",
     "progress",
+    "restarted",
     "right_answer",
 ]
 
@@ -178,6 +180,15 @@ def advanced(session: Session) -> Session:
     return replace(session, position=session.position + 1)
 
 
+def restarted(session: Session) -> Session:
+    """After a trial was interrupted between its stimuli: at its first one again, as the same showing."""
+    step = current(session)
+    if step.kind not in ("first", "gap", "second"):
+        raise SessionError(f"Expected a trial before its question to start again, found the session at {step.kind!r}.")
+    firsts = (i for i in range(session.position, -1, -1) if session.steps[i].kind == "first")
+    return replace(session, position=next(firsts))
+
+
 def filled(session: Session, values: Mapping[str, str]) -> tuple[Session, dict[str, str]]:
     """After the form was filled in: the session and what is stored, field by field; empty ones are left out.
 
@@ -191,11 +202,12 @@ def filled(session: Session, values: Mapping[str, str]) -> tuple[Session, dict[s
     fields = {field.name: field for field in session.protocol.form}
     if strays := sorted(set(values) - set(fields)):
         raise SessionError(f"Expected the form's fields {', '.join(fields)}, found {', '.join(map(repr, strays))}.")
-    taken = {name: _field_value(field, values.get(name, "").strip()) for name, field in fields.items()}
+    taken = {name: field_value(field, values.get(name, "").strip()) for name, field in fields.items()}
     return replace(session, position=session.position + 1), {name: value for name, value in taken.items() if value}
 
 
-def _field_value(field: FormField, value: str) -> str:
+def field_value(field: FormField, value: str) -> str:
+    """A field's value as it is stored, or a `SessionError` that says what the field takes."""
     if not value:
         if field.required:
             raise SessionError(f"Expected {field.name} to be filled in, found nothing.")
