@@ -12,21 +12,9 @@ from study.transitions.advice import advise, is_cyclic, just_noticeable, own_tim
 from study.transitions.blend_length import blend_length
 
 # 2004 sections 4.3 and 4.4: what its studies two and three were about.
-CYCLIC = [
-    "walk_slow",
-    "walk",
-    "walk_fast",
-    "jog",
-    "run",
-    "run_fast",
-    "stand_to_walk",
-    "walk_to_stop",
-    "walk_turn_left",
-    "walk_turn_right",
-    "run_turn_left",
-    "run_turn_right",
-]
-FREE = ["box", "box_combination", "dance", "dance_modern", "dance_turns", "tai_chi", "tai_chi_slow", "stand", "idle"]
+CYCLIC = ("walk_slow", "walk", "walk_fast", "jog", "run", "run_fast", "stand_to_walk", "walk_to_stop")
+CYCLIC += ("walk_turn_left", "walk_turn_right", "run_turn_left", "run_turn_right")
+FREE = ("box", "box_combination", "dance", "dance_modern", "dance_turns", "tai_chi", "tai_chi_slow", "stand", "idle")
 
 
 def test_differences_in_just_noticeable_ones():
