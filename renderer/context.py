@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import metadata
@@ -99,15 +100,19 @@ def open_context(kind: str | None = None) -> Context:
     raise RendererError(f"No offscreen OpenGL 3.3 here; {HOW_TO_INSTALL}. Tried " + "; ".join(reasons) + ".")
 
 
-_current: dict[tuple[int, str | None], Context] = {}
+_own = threading.local()
 
 
 def shared_context(kind: str | None = None) -> Context:
-    """The process's own context of that kind, opened when first asked for and kept; never one from before a fork."""
+    """The thread's own context of that kind, opened when first asked for, kept, and made current.
+
+    A context is current in one thread at a time, so each thread has its own; and none outlives a fork.
+    """
     key = (os.getpid(), kind or os.environ.get("SEGUE_GL") or None)
-    if key not in _current:
-        _current[key] = open_context(kind)
-    context = _current[key]
+    contexts: dict[tuple[int, str | None], Context] = _own.__dict__.setdefault("contexts", {})
+    if key not in contexts:
+        contexts[key] = open_context(kind)
+    context = contexts[key]
     context.gl.__enter__()
     return context
 

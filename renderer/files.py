@@ -39,10 +39,22 @@ def discard_unfinished(target: Path) -> None:
     """Remove what earlier attempts at this file left behind, of processes that are gone."""
     for left in target.parent.glob(f".{target.name}.*{_UNFINISHED}"):
         owner = left.name.removesuffix(_UNFINISHED).rpartition(".")[2]
-        if owner.isdigit() and int(owner) != os.getpid() and Path(f"/proc/{owner}").exists():
+        if owner.isdigit() and int(owner) != os.getpid() and _alive(int(owner)):
             continue
         with suppress(OSError):
             left.unlink()
+
+
+def _alive(process: int) -> bool:
+    if os.name != "posix":
+        return True  # asking there would end it; better to leave a file behind than to take one that is being written
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass  # somebody else's, but alive
+    return True
 
 
 def cannot_write(target: Path, error: OSError) -> RendererError:

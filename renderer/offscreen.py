@@ -87,8 +87,10 @@ def render_rgb(
     shapes = lay_out(check_positions(positions), figure, camera, fps)
     with _rgb_target(camera.size, context) as (target, painter):
         for data in shapes.data:
-            _start_rgb(target, figure, camera)
-            yield _painted_rgb(target, painter, data, camera.size)
+            with target.ctx:
+                _start_rgb(target, figure, camera)
+                picture = _painted_rgb(target, painter, data, camera.size)
+            yield picture
 
 
 def render_layers(layers: Sequence[tuple[ArrayLike, Figure]], camera: Camera, context: Context | None = None) -> Bytes:
@@ -110,9 +112,14 @@ def _rgb_target(size: tuple[int, int], context: Context | None) -> Iterator[tupl
     try:
         yield target, painter_of(gl)
     finally:
-        for attachment in target.color_attachments:
-            attachment.release()
-        target.release()
+        with gl:
+            _release(target)
+
+
+def _release(target: Any) -> None:
+    for attachment in target.color_attachments:
+        attachment.release()
+    target.release()
 
 
 def _start_rgb(target: Any, figure: Figure, camera: Camera) -> None:
@@ -176,18 +183,19 @@ class _Backdrop:
         if self.moves and camera.track_seconds is not None:
             self._path = smooth_path(positions, camera.track_seconds, fps)
         self._floor = None if self.plain else Floor(figure, camera)
-        self._known: tuple[int, Bytes] | None = None
+        self._known: dict[int, Bytes] = {}
 
     def frame(self, number: int) -> Bytes:
         """The NV12 frame without the figure; not to be written to."""
         key = number if self.moves else 0
-        if self._known is None or self._known[0] != key:
+        if key not in self._known:
+            if len(self._known) >= 2 * BATCH:
+                self._known.clear()
             if self._floor is None:
-                made = plain_frame(self._camera.size, self._figure.background)
+                self._known[key] = plain_frame(self._camera.size, self._figure.background)
             else:
-                made = self._floor.nv12(self._path[number])
-            self._known = (key, made)
-        return self._known[1]
+                self._known[key] = self._floor.nv12(self._path[number])
+        return self._known[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,6 +265,20 @@ class Atlas:
             frame = last
 
     def _draw(self, first: int, stop: int) -> Iterator[Tile]:
+        # Somebody may have made another context current since the last batch.
+        with self._gl:
+            place = self._paint(first, stop)
+        for i, (x, y) in enumerate(place.tolist()):
+            left, top, right, bottom = self._boxes[first + i].tolist()
+            yield Tile(
+                left,
+                top,
+                self._luma_bytes[y : y + bottom - top, x : x + right - left],
+                self._chroma_bytes[y // 2 : (y + bottom - top) // 2, x : x + right - left],
+            )
+
+    def _paint(self, first: int, stop: int) -> NDArray[np.int64]:
+        """Paint and read back frames `first .. stop - 1`; returns where in the picture each of them is."""
         count = stop - first
         width, height = self._tile
         place = np.stack([np.arange(count) % self._across * width, np.arange(count) // self._across * height], axis=1)
@@ -271,15 +293,7 @@ class Atlas:
         rows = (-(-count // self._across)) * height
         self._luma.read_into(self._luma_bytes, (0, 0, self._extent[0], rows), components=1, alignment=1)
         self._chroma.read_into(self._chroma_bytes, (0, 0, self._extent[0] // 2, rows // 2), components=2, alignment=1)
-        for i in range(count):
-            left, top, right, bottom = self._boxes[first + i].tolist()
-            x, y = place[i].tolist()
-            yield Tile(
-                left,
-                top,
-                self._luma_bytes[y : y + bottom - top, x : x + right - left],
-                self._chroma_bytes[y // 2 : (y + bottom - top) // 2, x : x + right - left],
-            )
+        return place
 
     def _start(self, first: int, place: NDArray[np.int64]) -> None:
         """The background of each tile."""
@@ -301,10 +315,9 @@ class Atlas:
 
     def release(self) -> None:
         """Free what it holds of the context."""
-        for target in (self._luma, self._chroma):
-            for attachment in target.color_attachments:
-                attachment.release()
-            target.release()
+        with self._gl:
+            for target in (self._luma, self._chroma):
+                _release(target)
 
 
 def _cut(boxes: NDArray[np.int64], size: tuple[int, int]) -> NDArray[np.int64]:

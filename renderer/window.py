@@ -518,6 +518,17 @@ def open_window(title: str = "Segue", *, full_screen: bool = True, size: Size = 
         raise
 
 
+def check_display() -> None:
+    """Raise `RendererError` where no window can be opened for want of a display; costs milliseconds."""
+    glfw = _load_glfw()
+    if not glfw.init():
+        raise RendererError(NO_DISPLAY.format(reason=_last_error(glfw)))
+    connected = bool(glfw.get_primary_monitor())
+    glfw.terminate()
+    if not connected:
+        raise RendererError(NO_DISPLAY.format(reason="no monitor is connected"))
+
+
 def _load_glfw() -> Any:
     try:
         import glfw

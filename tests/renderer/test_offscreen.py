@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from renderer.camera import Camera, frame_group, project, view_axes
 from renderer.capsules import Figure, place
 from renderer.colour import nv12_to_rgb, to_ycbcr
+from renderer.context import open_context
 from renderer.digest import hash_frames
 from renderer.errors import RendererError
 from renderer.figure import STYLES, make_figure
@@ -52,7 +54,7 @@ def cover_by_hand(start: tuple[float, float], end: tuple[float, float], radius: 
     share = ((x - a[0]) * way[0] + (y - a[1]) * way[1]) / max(float(way @ way), 1e-12)
     share = np.clip(share, 0, 1) if way.any() else np.zeros_like(x)
     inside = np.hypot(x - a[0] - share * way[0], y - a[1] - share * way[1]) <= radius
-    return inside.reshape(height, samples, width, samples).mean(axis=(1, 3))
+    return np.asarray(inside.reshape(height, samples, width, samples).mean(axis=(1, 3)))
 
 
 @pytest.mark.parametrize(
@@ -213,6 +215,32 @@ def test_frames_do_not_depend_on_the_batch(puppet: Any, style: str) -> None:
         assert [frame.tobytes() for frame in render_frames(clip, figure, camera, batch=batch)] == expected
     alone = [next(render_frames(clip[i : i + 1], figure, camera)).tobytes() for i in (0, 9, 22)]
     assert alone == [expected[i] for i in (0, 9, 22)]
+
+
+def test_another_context_in_between_does_no_harm(puppet: Any) -> None:
+    clip, figure, camera = puppet_scene(puppet, frames=12)
+    expected = hash_frames(render_frames(clip, figure, camera), camera.size)
+    frames, stills = render_frames(clip, figure, camera, batch=3), render_rgb(clip, figure, camera)
+    seen = []
+    for _ in range(12):
+        seen.append(next(frames))
+        first = next(stills)
+        other = open_context()
+        other.gl.clear()
+        other.release()
+    assert hash_frames(seen, camera.size) == expected
+    assert (first == list(render_rgb(clip, figure, camera))[-1]).all()
+
+
+def test_threads_draw_side_by_side(puppet: Any) -> None:
+    clip, figure, camera = puppet_scene(puppet, frames=12)
+    alone = hash_frames(render_frames(clip, figure, camera), camera.size)
+    with ThreadPoolExecutor(2) as pool:
+        both = list(
+            pool.map(lambda _: hash_frames(render_frames(clip, figure, camera, batch=3), camera.size), range(4))
+        )
+    assert both == [alone] * 4
+    assert hash_frames(render_frames(clip, figure, camera), camera.size) == alone
 
 
 def test_a_figure_that_leaves_the_frame_is_cut_there_and_spoils_nothing(puppet: Any) -> None:
