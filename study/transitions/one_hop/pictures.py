@@ -42,8 +42,9 @@ def draw_distances(
     from matplotlib.figure import Figure
 
     rows, columns = distances.shape
-    height = float(np.clip(5.6 * rows / columns, 1.8, 8.0))
-    figure = Figure(figsize=(7.0, height + 0.8), dpi=120, layout="constrained")
+    inches = 5.4 / max(rows, columns)
+    size = max(inches * columns, 1.5) + 1.7, max(inches * rows, 1.5) + 0.8
+    figure = Figure(figsize=size, dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     image = axes.imshow(
