@@ -132,7 +132,9 @@ class Texts(Part):
         default="A film could not be shown. Nothing of what you did is lost.", description="When a film can't be shown."
     )
     try_again: str = Field(default="Try again", min_length=1, description="Button that loads a film again.")
-    skip: str = Field(default="Go on without it", min_length=1, description="Button that passes over such a trial.")
+    pass_over: str = Field(
+        default="Go on without it", min_length=1, description="Button that passes over such a trial."
+    )
     elsewhere: str = Field(
         default="This study is open in another tab or window. Please go on there.",
         description="In a second tab of one participant.",
