@@ -8,11 +8,12 @@ the two there is a best view, and where it is depends on the motion: a run into 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.camera import Camera, check_positions, frame_group, project
+from renderer.camera import Camera, check_positions, frame_group, project, smooth_path
 
 FloatArray = NDArray[np.float64]
 
@@ -21,7 +22,12 @@ CANDIDATES_DEGREES = tuple(range(-90, 91, 5))
 
 
 def best_view(
-    positions_list: Sequence[ArrayLike], *, size: tuple[int, int] = (640, 480), heading: float, fps: float = 30.0
+    positions_list: Sequence[ArrayLike],
+    *,
+    size: tuple[int, int] = (640, 480),
+    heading: float,
+    track_seconds: float | None = None,
+    fps: float = 30.0,
 ) -> float:
     """The view, radians from the front, in which a group's figures are large and their limbs move most.
 
@@ -33,8 +39,8 @@ def best_view(
         Width and height of the frame in pixels.
     heading
         The direction that counts as forwards, radians about Y from +Z.
-    fps
-        Frames per second of the positions.
+    track_seconds, fps
+        As for `frame_group`.
 
     Returns
     -------
@@ -45,7 +51,11 @@ def best_view(
     """
     group = [check_positions(positions, f"positions of clip {i}") for i, positions in enumerate(positions_list)]
     candidates = sorted((np.radians(degrees) for degrees in CANDIDATES_DEGREES), key=lambda view: (abs(view), view))
-    scores = [clarity(group, frame_group(group, size=size, view=view, heading=heading), fps) for view in candidates]
+    following: dict[str, Any] = {"track_seconds": track_seconds, "fps": fps}
+    scores = [
+        clarity(group, frame_group(group, size=size, view=view, heading=heading, **following), fps)
+        for view in candidates
+    ]
     return float(candidates[int(np.argmax(np.round(scores, 6)))])
 
 
@@ -53,6 +63,8 @@ def clarity(group: Sequence[FloatArray], camera: Camera, fps: float) -> float:
     """Geometric mean of the figures' median height, pixels, and their points' mean speed against point 0, pixels/s."""
     heights, speeds = [], []
     for positions in group:
+        if camera.track_seconds is not None:
+            positions = positions - smooth_path(positions, camera.track_seconds, fps)[:, None]
         seen, _ = project(camera, positions.reshape(-1, 3))
         seen = seen.reshape(*positions.shape[:2], 2)
         heights.append(np.ptp(seen[..., 1], axis=1))

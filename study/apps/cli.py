@@ -33,6 +33,7 @@ VERBS = {
     "advise": "advise_command:advise",
     "check": "study_commands:check",
     "render": "study_commands:render",
+    "play": "play_commands:play",
     "simulate": "study_commands:simulate",
     "analyse": "study_commands:analyse",
     "report": "study_commands:report",

@@ -109,6 +109,7 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 @click.option("--style", type=click.Choice(["stick", "points", "mannequin"]), default="stick", show_default=True)
 @click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Of the video, in pixels.")
 @click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Of the strip.")
+@click.option("--floor", is_flag=True, help="Draw the ground, with contact shadows.")
 @click.option("--track", is_flag=True, help="Let the camera travel with the figure.")
 @json_option
 def preview(
@@ -120,6 +121,7 @@ def preview(
     style: str,
     size: str,
     poses: int,
+    floor: bool,
     track: bool,
     as_json: bool,
 ) -> None:
@@ -138,6 +140,7 @@ def preview(
         view=view,
         style=style,
         poses=poses,
+        floor=floor,
         track_seconds=1.0 if track else None,
     )
     result = {"file": str(out), "frames": shown.frames, "fps": shown.fps, "history": list(shown.history)}

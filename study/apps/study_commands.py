@@ -58,7 +58,9 @@ def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> d
     return {**asdict(summary), "folder": str(folder)}
 
 
-def simulate_participants(protocol: Protocol, folder: Path, participants: int, seed: int) -> dict[str, Any]:
+def simulate_participants(
+    protocol: Protocol, folder: Path, participants: int, seed: int | None = None
+) -> dict[str, Any]:
     """Simulated sessions on the stimuli of a results folder; the numbers for `--json`."""
     from dataclasses import asdict
 
@@ -73,7 +75,7 @@ def simulate_participants(protocol: Protocol, folder: Path, participants: int, s
             manifest,
             responses,
             participants,
-            seed,
+            protocol.seed if seed is None else seed,
             lambda done, total: report(done / max(total, 1), f"{done} of {total}"),
         )
     return {**asdict(summary), "folder": str(folder), "simulated": True}
@@ -136,11 +138,13 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
 @click.command()
 @click.argument("protocol")
 @click.option("--participants", type=click.IntRange(min=1), required=True, help="How many there should be in the end.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the observers' chance.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of the observers' chance; the protocol's unless given.")
 @library_option
 @OUT
 @json_option
-def simulate(protocol: str, participants: int, seed: int, library: str | None, out: Path | None, as_json: bool) -> None:
+def simulate(
+    protocol: str, participants: int, seed: int | None, library: str | None, out: Path | None, as_json: bool
+) -> None:
     """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
     from study.experiment.rendering import MANIFEST, record
 
@@ -204,7 +208,7 @@ def demo(out: Path | None, workers: int | None, participants: int, as_json: bool
     folder = results_folder(protocol, out)
     say("A small study on synthetic motions, answered by simulated observers; real ones take their place later.")
     rendered = render_stimuli(prepare_stimuli(protocol, None), folder, workers)
-    simulated = simulate_participants(protocol, folder, participants, seed=0)
+    simulated = simulate_participants(protocol, folder, participants)
     analysis = analyse_results(folder)
     page = write_report(folder)
     lines = [

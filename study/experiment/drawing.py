@@ -22,6 +22,7 @@ def figure_for(
     style: str = "stick",
     colours: Mapping[str, Sequence[int]] | None = None,
     background: Sequence[int] | None = None,
+    floor_m: float | None = None,
 ) -> Figure:
     """The renderer's figure for a skeleton, over `joint_positions(clip, ends=True)`.
 
@@ -33,6 +34,8 @@ def figure_for(
         As `renderer.figure.make_figure` takes it.
     colours, background
         8-bit RGB by side (`left`, `right`, `centre`), and of the background, instead of the style's own.
+    floor_m
+        Height of a ground plane with contact shadows, metres; none where None.
     """
     from renderer.figure import make_figure
 
@@ -45,6 +48,7 @@ def figure_for(
         height_m=height_m,
         colours=colours,
         background=background,
+        floor_m=floor_m,
     )
 
 
@@ -57,6 +61,7 @@ def draw_clip(
     style: str = "stick",
     poses: int = 9,
     track_seconds: float | None = None,
+    floor: bool = False,
     blended: tuple[int, int] | None = None,
 ) -> None:
     """A clip as a video (`.mp4`) or as a strip of poses (`.png`).
@@ -73,11 +78,13 @@ def draw_clip(
         How many poses a strip shows.
     track_seconds
         Let the camera travel with the figure, smoothed over so many seconds.
+    floor
+        Draw the ground, at height 0, with contact shadows.
     blended
         Frames of a transition's blend, as a slice counts them: a strip shows source, blend and destination apart.
     """
     positions = joint_positions(clip, ends=True)
-    figure = figure_for(clip.skeleton, style)
+    figure = figure_for(clip.skeleton, style, floor_m=0.0 if floor else None)
     if out.suffix.lower() == ".mp4":
         from renderer.camera import frame_group
         from renderer.video import render_video

@@ -23,7 +23,7 @@ from study.experiment.protocol_errors import KeyMismatchError, explain, full_loc
 from study.experiment.protocol_parts import Consent, FormField, Keys, Slug, Texts
 from study.experiment.protocol_parts import Part as _Part
 
-Method = Literal["fixed", "geodesic", "velocity", "cut"]
+Method = Literal["fixed", "geodesic", "velocity", "cut", "one-hop"]
 Task = Literal["same-different", "preference", "rating"]
 Order = Literal["both", "random", "balanced", "by-group"]
 
@@ -50,7 +50,16 @@ class StimulusSettings(_Part):
         description="From where the fixed camera looks at the group's common heading; `clearest` is the view in which "
         "the group's figures are large and their limbs move most in the picture.",
     )
+    track_s: float | None = Field(
+        default=None,
+        gt=0,
+        le=60,
+        description="Let the camera travel with the figure, smoothed over so long, instead of staying fixed. [seconds]",
+    )
     style: Literal["stick", "points", "mannequin"] = Field(default="stick", description="How the figure is drawn.")
+    floor: bool = Field(
+        default=False, description="Whether a ground plane with contact shadows is drawn (2004 section 4.1: none)."
+    )
     camera_group: Literal["transition", "category", "study"] = Field(
         default="transition",
         description="Which stimuli share one camera (2004: groups of motions share a camera position).",
@@ -150,6 +159,22 @@ class Item(_Part):
     high: str = Field(default="", description="Words at the highest point of the scale.")
 
 
+class OneHop(_Part):
+    """How the method `one-hop` finds its hops (Koyama and Goto 2019)."""
+
+    hops: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+        default=(), description="Motions that may be hops; those of the study's transitions where it is left out."
+    )
+    stay_s: float = Field(
+        default=1.0, ge=0, le=10, description="Longest stay in the source and in the hop; 0 for none. [seconds]"
+    )
+    weight: float | None = Field(
+        default=None, ge=0, le=0.01, description="Cost of a frame of stay, square metres; that of Eq. 5 if left out."
+    )
+    weight_times: float = Field(default=1.0, ge=0, le=100, description="What the weight is multiplied by (Figure 11).")
+    conditions: int = Field(default=100, ge=1, le=10000, description="Transitions drawn for the weight of Eq. 5.")
+
+
 class StudySpec(_Part):
     """One study of the sitting: a task over transitions."""
 
@@ -170,7 +195,13 @@ class StudySpec(_Part):
         default=(),
         description="Same-different: comparison minus reference blend length, a pair each; 0 shows one twice. [frames]",
     )
-    fixed_frames: int = Field(default=10, ge=1, le=600, description="Blend length of the method `fixed`. [frames]")
+    fixed_frames: int = Field(
+        default=10,
+        ge=1,
+        le=600,
+        description="Blend length of the method `fixed`, and of both blends of `one-hop`. [frames]",
+    )
+    one_hop: OneHop = Field(default=OneHop(), description="How the method `one-hop` finds its hops.")
     order: Order = Field(
         default="random",
         description="Order within pairs: `both` shows each pair in both, `random` draws, `balanced` draws half each "
@@ -311,9 +342,9 @@ def _check_task(study: StudySpec) -> None:
             raise KeyMismatchError(
                 f"expected no comparison in {who}: differences_frames says it; remove it", "comparison"
             )
-        if study.reference == "cut":
+        if study.reference in ("cut", "one-hop"):
             raise KeyMismatchError(
-                f"expected a reference with a blend length in {who}, found 'cut'; change it", "reference"
+                f"expected a reference with a blend length in {who}, found {study.reference!r}; change it", "reference"
             )
     elif study.differences_frames:
         raise KeyMismatchError(

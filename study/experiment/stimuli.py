@@ -14,13 +14,15 @@ import hashlib
 import platform
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import SegueError, StimulusError
 from study.experiment.drawing import figure_for
+from study.experiment.one_hop_stimuli import METHOD as HOP_METHOD
+from study.experiment.one_hop_stimuli import Hop, Hops
 from study.experiment.plan import Pair
 from study.experiment.points import Settled, Supply, settle
 from study.experiment.protocol import Protocol, StudySpec
@@ -66,6 +68,8 @@ class _Key:
     end_frame: int
     blend_frames: int
     added: tuple[int, int]
+    hop: Hop | None = None
+    frames_on: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,14 +111,15 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
     StimulusError
         With everything that can't be shown, one problem a line.
     """
-    settled, problems = _settle_all(protocol, library, progress)
+    hops = Hops(protocol, library)
+    settled, problems = _settle_all(protocol, library, hops, progress)
     if problems:
         raise StimulusError("\n".join(problems))
     drafts: dict[_Key, _Draft] = {}
     pairs: list[_DraftPair] = []
     for study in protocol.studies:
         for transition in protocol.transitions_of(study):
-            pairs += _draft_pairs(protocol, study, settled[study.name, transition.name], drafts)
+            pairs += _draft_pairs(protocol, study, settled[study.name, transition.name], drafts, hops)
     stimuli = _with_cameras(protocol, library, drafts)
     return StimulusSet(
         protocol,
@@ -129,7 +134,7 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
 
 def check(protocol: Protocol, library: Library) -> list[str]:
     """Everything that can't be shown, one sentence each; empty where all can."""
-    return _settle_all(protocol, library, None)[1]
+    return _settle_all(protocol, library, Hops(protocol, library), None)[1]
 
 
 def versions() -> dict[str, str]:
@@ -148,7 +153,7 @@ def versions() -> dict[str, str]:
 
 
 def _settle_all(
-    protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None
+    protocol: Protocol, library: Library, hops: Hops, progress: Callable[[int, int], None] | None
 ) -> tuple[dict[tuple[str, str], Settled], list[str]]:
     """The points of every transition in every study, and the problems of those that have none."""
     todo = [(study, transition) for study in protocol.studies for transition in protocol.transitions_of(study)]
@@ -156,7 +161,10 @@ def _settle_all(
     problems: dict[str, None] = {}
     for done, (study, transition) in enumerate(todo, start=1):
         try:
-            settled[study.name, transition.name] = settle(protocol, study, transition, library)
+            points = settle(protocol, study, transition, library)
+            if HOP_METHOD in study.methods:
+                hops.check(study, points)
+            settled[study.name, transition.name] = points
         except SegueError as error:
             problems[str(error)] = None
         if progress:
@@ -165,16 +173,21 @@ def _settle_all(
 
 
 def _draft_pairs(
-    protocol: Protocol, study: StudySpec, settled: Settled, drafts: dict[_Key, _Draft]
+    protocol: Protocol, study: StudySpec, settled: Settled, drafts: dict[_Key, _Draft], hops: Hops
 ) -> Iterator[_DraftPair]:
     """The pairs of one transition in one study; the stimuli that they need are added to `drafts`."""
 
     def need(method: str, difference: int = 0) -> _Key:
         frames = settled.lengths[method].blend_frames + difference
         added = (settled.source.added_before, settled.destination.added_before)
-        key = _Key(settled.transition.name, settled.start_frame, settled.end_frame, frames, added)
+        hop = hops.find(study, settled) if HOP_METHOD in study.methods else None
+        # What stands beside a one-hop transition is shown for as long as that one takes.
+        on = 0 if hop is None or method == HOP_METHOD else max(hop.frames - frames, 0)
+        own = hop if method == HOP_METHOD else None
+        key = _Key(settled.transition.name, settled.start_frame, settled.end_frame, frames, added, own, on)
         if key not in drafts:
-            drafts[key] = _draft(protocol, settled, method, difference, frames)
+            made = None if own is None else hops.transition(study, settled)
+            drafts[key] = _draft(protocol, settled, method, difference, frames, made, on)
         return key
 
     if study.task == "same-different":
@@ -189,18 +202,34 @@ def _draft_pairs(
             yield _DraftPair(study, settled, need(method), None, method, None)
 
 
-def _draft(protocol: Protocol, settled: Settled, method: str, difference: int, blend_frames: int) -> _Draft:
+def _draft(
+    protocol: Protocol,
+    settled: Settled,
+    method: str,
+    difference: int,
+    blend_frames: int,
+    by_hop: Transition | None,
+    frames_on: int,
+) -> _Draft:
     """Blend, cut to entry and exit, clean the feet, and place at the origin with the common heading."""
-    made = _transition(protocol, settled, blend_frames)
-    if protocol.stimuli.clean_feet and blend_frames:
+    made = by_hop or _transition(protocol, settled, blend_frames)
+    if protocol.stimuli.clean_feet and blend_frames and by_hop is None:
         # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
         made, _ = plant_feet(made, settled.source.clip, settled.destination.clip)
     entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
-    clip = trim(made.clip, made.blend_start - entry, made.blend_stop + after)
+    first = settled.start_frame - entry
+    clip = trim(made.clip, first, made.blend_stop + frames_on + after)
     notes = [note for note in (made.note, settled.lengths[method].note) if note]
     positions = _placed(joint_positions(clip, ends=True), protocol, settled)
     return _Draft(
-        settled, method, difference, blend_frames, clip, (entry, entry + blend_frames), positions, tuple(notes)
+        settled,
+        method,
+        difference,
+        blend_frames,
+        clip,
+        (made.blend_start - first, made.blend_stop - first),
+        positions,
+        tuple(notes),
     )
 
 
@@ -251,8 +280,10 @@ def _with_cameras(protocol: Protocol, library: Library, drafts: dict[_Key, _Draf
     try:
         for group, keys in groups.items():
             moving, size = [drafts[key].positions for key in keys], (settings.width, settings.height)
-            view = settings.view if settings.view != "clearest" else best_view(moving, size=size, heading=0.0)
-            camera = frame_group(moving, size=size, view=view, heading=0.0)
+            following: dict[str, Any] = {"track_seconds": settings.track_s, "fps": protocol.fps}
+            clearest = settings.view == "clearest"
+            view = best_view(moving, size=size, heading=0.0, **following) if clearest else settings.view
+            camera = frame_group(moving, size=size, view=view, heading=0.0, **following)
             for key in keys:
                 stimuli[key] = _stimulus(protocol, library, drafts[key], group, camera)
     except RendererError as error:
@@ -305,7 +336,8 @@ def _use(supply: Supply, frame: int) -> MotionUse:
 def _figure(protocol: Protocol, clip: Clip) -> Figure:
     style, colours = protocol.stimuli.style, protocol.stimuli.colours
     own = {side: _rgb(text) for side in ("left", "right", "centre") if (text := getattr(colours, side))}
-    return figure_for(clip.skeleton, style, own, _rgb(colours.background) if colours.background else None)
+    background = _rgb(colours.background) if colours.background else None
+    return figure_for(clip.skeleton, style, own, background, floor_m=0.0 if protocol.stimuli.floor else None)
 
 
 def _rgb(text: str) -> tuple[int, int, int]:
@@ -316,7 +348,7 @@ def _rgb(text: str) -> tuple[int, int, int]:
 def _content_hash(fps: float, positions: FloatArray, figure: Figure, camera: Camera) -> str:
     """Hash of all that is seen: points, figure, camera, size, frame rate and the renderer's look; 16 digits."""
     digest = hashlib.sha256(f"look {LOOK_VERSION}; {fps:g} fps; {camera.size}; {figure.style}; ".encode())
-    digest.update(f"{figure.background}; {figure.lit}; {camera.track_seconds}; ".encode())
+    digest.update(f"{figure.background}; {figure.lit}; {figure.floor_m}; {camera.track_seconds}; ".encode())
     digest.update(np.round(positions * 1e4).astype("<i4").tobytes())
     for array in (figure.ends, figure.along, figure.beyond, figure.radii, figure.colours):
         digest.update(np.round(np.asarray(array, dtype=np.float64) * 1e6).astype("<i8").tobytes())

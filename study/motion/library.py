@@ -165,9 +165,12 @@ class SyntheticLibrary(Library):
     def entry(self, name: str) -> Entry:
         if name not in self.names():
             raise MotionError(_unknown(name, self.names(), "the synthetic library"))
-        indexed = cmu_index().get(name)
-        kind, words = (indexed.kind, f"synthetic: {indexed.words.split(',')[0]}") if indexed else ("", "synthetic")
-        return Entry(name, kind, words)
+        from study.motion import synthetic
+
+        about = synthetic.describe(name)
+        start: Boundary = "gait" if about.cyclic_start else ""
+        end: Boundary = "gait" if about.cyclic_end else ""
+        return Entry(name, about.kind, f"synthetic: {about.line}", start, end)
 
     def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
         from study.motion import synthetic
