@@ -77,15 +77,15 @@ def enrol(
     token: str,
     group: int = 0,
     parameters: Mapping[str, str] | None = None,
-    identified: bool = False,
+    identifying: Mapping[str, str] | None = None,
     clock: Clock = _utc_now,
 ) -> Participant:
     """Store a participant's tokens (as hashes), group and parameters.
 
     Parameters
     ----------
-    identified
-        Whether the parameters name one person, who is then enrolled once.
+    identifying
+        The parameters that name one person, who is then enrolled once.
     """
     given = dict(parameters or {})
     secret = secrets.token_hex(32)
@@ -96,7 +96,7 @@ def enrol(
         "secret": secret,
         "group_number": group,
         "parameters_json": json.dumps(given, sort_keys=True),
-        "parameters_sha256": _parameters_key(given) if identified else None,
+        "parameters_sha256": None if identifying is None else _parameters_key(identifying),
         "began_at": clock(),
         "seen_at": clock(),
     }
@@ -114,9 +114,9 @@ def find_by_token(responses: Responses, token: str) -> Participant | None:
     return _find(responses, participants.c.token_sha256 == hashed(token))
 
 
-def find_by_parameters(responses: Responses, parameters: Mapping[str, str]) -> Participant | None:
-    """The participant who came by a link with these parameters, where they name one person; or None."""
-    return _find(responses, participants.c.parameters_sha256 == _parameters_key(parameters))
+def find_by_parameters(responses: Responses, identifying: Mapping[str, str]) -> Participant | None:
+    """The participant whom these parameters of a link name, or None."""
+    return _find(responses, participants.c.parameters_sha256 == _parameters_key(identifying))
 
 
 def _find(responses: Responses, condition: sa.ColumnElement[bool]) -> Participant | None:

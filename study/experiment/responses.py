@@ -256,6 +256,15 @@ def find_session(responses: Responses, participant: str) -> SessionRecord | None
     return None if found is None else _session_record(found._mapping)
 
 
+def session_by_id(responses: Responses, session_id: int) -> SessionRecord:
+    """A session by its number."""
+    with responses.engine.connect() as connection:
+        found = connection.execute(sa.select(sessions).where(sessions.c.id == session_id)).one_or_none()
+    if found is None:
+        raise SessionError(f"{responses.place}: expected the number of a session, found {session_id}.")
+    return _session_record(found._mapping)
+
+
 def all_sessions(responses: Responses) -> tuple[SessionRecord, ...]:
     """Every session, in the order in which they were started."""
     with responses.engine.connect() as connection:
@@ -337,7 +346,7 @@ def insert_answer(
         connection.execute(_INSERT_PRESENTATION, rows)
 
 
-_INSERT_ANSWER, _INSERT_PRESENTATION = sa.insert(answers), sa.insert(presentations)
+_INSERT_ANSWER, _INSERT_PRESENTATION, _INSERT_EVENT = sa.insert(answers), sa.insert(presentations), sa.insert(events)
 
 
 def _presentation_values(shown: Presentation) -> dict[str, Any]:
@@ -378,9 +387,16 @@ def record_event(
     clock: Clock = _utc_now,
 ) -> None:  # fmt: skip
     """Append what happened in a session besides answers (finished, faults, focus lost)."""
-    text = None if detail is None else json.dumps(detail, sort_keys=True)
     with responses.engine.begin() as connection:
-        connection.execute(sa.insert(events).values(session_id=record.id, kind=kind, at=clock(), detail_json=text))
+        insert_event(connection, record, kind, detail, clock())
+
+
+def insert_event(
+    connection: sa.Connection, record: SessionRecord, kind: str, detail: Mapping[str, Any] | None, at: datetime
+) -> None:
+    """The row of one event within a transaction of the caller's."""
+    text = None if detail is None else json.dumps(detail, sort_keys=True)
+    connection.execute(_INSERT_EVENT, {"session_id": record.id, "kind": kind, "at": at, "detail_json": text})
 
 
 def has_event(responses: Responses, record: SessionRecord, kind: str) -> bool:

@@ -48,7 +48,7 @@ def code_of(responses, name):
 
 
 def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol, tmp_path):
-    record = enrol("p1", parameters={"PROLIFIC_PID": "abc"}, identified=True)
+    record = enrol("p1", parameters={"PROLIFIC_PID": "abc"}, identifying={"PROLIFIC_PID": "abc"})
     found = people.find_by_token(responses, "token p1")
     assert (found.session_id, found.group, found.parameters) == (record.id, 0, {"PROLIFIC_PID": "abc"})
     assert people.find_by_parameters(responses, {"PROLIFIC_PID": "abc"}) == found

@@ -1,0 +1,361 @@
+"""Hosting: the live sittings of a study, and every rule about them that is not HTTP.
+
+A results folder and settings come in; views for the page go out. All that counts is in the database: a sitting in
+memory is only its answers taken up again, so a restart of the server loses nothing but who had which tab open.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import secrets
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+
+from study.apps.server import views
+from study.apps.server.messages import Answered, Begin, Done, Happened, Shown
+from study.apps.server.writer import Writer
+from study.errors import SessionError
+from study.experiment import participants as people
+from study.experiment import session as flow
+from study.experiment.participants import Participant
+from study.experiment.plan import draw_plan, groups_of
+from study.experiment.protocol import Protocol
+from study.experiment.rendering import Manifest
+from study.experiment.responses import (
+    Presentation,
+    Responses,
+    SessionRecord,
+    begin_session,
+    find_session,
+    has_event,
+    insert_answer,
+    insert_event,
+    record_form,
+    session_by_id,
+    steps_passed,
+    stored_answers,
+)
+from study.experiment.session import Answer, Session, Step
+
+TAB_SECONDS = 45.0
+"""A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
+
+MOST_EVENTS = 2000
+"""Events that are stored of one session; a page that goes wrong can't fill the disk."""
+
+NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a study is run; what depends on the place and the recruiting service, and so stands in no protocol.
+
+    `most_participants` is None for as many as come. `parameters` are the names that are kept of a link; those in
+    `identifying` name one person, who takes part once.
+    """
+
+    researcher_token: str
+    most_participants: int | None = None
+    groups: int | None = None
+    completion_code: str = ""
+    completion_url: str = ""
+    parameters: tuple[str, ...] = ("PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "participant")
+    identifying: tuple[str, ...] = ("PROLIFIC_PID", "participant")
+    dropped_after: timedelta = people.DROPPED_AFTER
+
+
+@dataclass
+class Sitting:
+    """One participant at it: the state of the session, what was stored, and which tab shows it."""
+
+    record: SessionRecord
+    participant: Participant
+    state: Session
+    answers: dict[tuple[int, str, int], Answer]
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+    page: str = ""
+    page_seen: float = 0.0
+    events: int = 0
+    shown_trial: tuple[int, int] | None = None
+
+
+class Host:
+    """A study that is being run."""
+
+    def __init__(self, protocol: Protocol, manifest: Manifest, responses: Responses, settings: Settings) -> None:
+        self.protocol, self.manifest, self.responses, self.settings = protocol, manifest, responses, settings
+        self.writer = Writer(responses.engine)
+        self.frames = {record.id: record.frames for record in manifest.records}
+        self.groups = settings.groups or groups_of(protocol, manifest.pairs)
+        self.sittings: dict[str, Sitting] = {}
+        self.recent: set[int] = set()
+        self._starting = asyncio.Lock()
+
+    def close(self) -> None:
+        """Finish all writes."""
+        self.writer.close()
+
+    # Who it is
+
+    async def sitting(self, token: str) -> Sitting | None:
+        """The sitting of a token: the live one, or the one that the database has; None for a token of nobody."""
+        key = people.hashed(token)
+        if key not in self.sittings:
+            participant = await asyncio.to_thread(people.find_by_token, self.responses, token)
+            if participant is None:
+                return None
+            found = await asyncio.to_thread(self._load, participant)
+            self.sittings.setdefault(key, found)
+        return self.sittings[key]
+
+    def _load(self, participant: Participant) -> Sitting:
+        record = session_by_id(self.responses, participant.session_id)
+        before = stored_answers(self.responses, record.id)
+        passed = steps_passed(self.responses, record)
+        state = views.to_view(flow.open_session(self.protocol, record.plan, before, passed=passed))
+        return Sitting(record, participant, state, {(a.trial, a.item, a.attempt): a for a in before})
+
+    async def begin(self, token: str, message: Begin) -> tuple[dict[str, Any], str]:
+        """A page was opened: the view that it shows, and the token that its cookie should hold."""
+        parameters = {
+            name: value for name, value in message.parameters.items() if name in self.settings.parameters and value
+        }
+        sitting = await self.sitting(token) if token else None
+        if sitting is not None and self._is_another(sitting, parameters):
+            sitting = None
+        if sitting is None:
+            async with self._starting:
+                found, token = await self._admit(parameters)
+            if isinstance(found, dict):
+                return found, ""
+            sitting = found
+        async with sitting.lock:
+            if not self._take_tab(sitting, message.page, message.previous, message.force):
+                return {"kind": "elsewhere"}, token
+            if sitting.shown_trial is not None:
+                trial, attempt = sitting.shown_trial
+                await self.note(sitting, "interrupted", {"trial": trial, "attempt": attempt})
+            await self.note(sitting, "display", message.display.model_dump(mode="json"))
+            return await self._view(sitting), token
+
+    def _is_another(self, sitting: Sitting, parameters: Mapping[str, str]) -> bool:
+        """Whether the link names another person than the cookie, as on a computer that several use."""
+        stored = sitting.participant.parameters
+        return any(parameters[name] != stored.get(name) for name in self.settings.identifying if parameters.get(name))
+
+    async def _admit(self, parameters: dict[str, str]) -> tuple[Sitting | dict[str, Any], str]:
+        """A new participant, or one who comes back by the very same link; or why not."""
+        token = people.new_token()
+        who = {name: parameters[name] for name in self.settings.identifying if name in parameters}
+        known = await asyncio.to_thread(people.find_by_parameters, self.responses, who) if who else None
+        if known is not None:
+            # An identifier alone may be guessed; the recruiting service's number of this visit may not.
+            if not parameters.get("SESSION_ID") or parameters != dict(known.parameters):
+                return {"kind": "taken"}, ""
+            self._forget(known.session_id)
+            await asyncio.to_thread(people.give_token, self.responses, known, token)
+            sitting = await self.sitting(token)
+            assert sitting is not None  # its token was stored just now
+            return sitting, token
+        filled = await asyncio.to_thread(
+            people.filled_groups, self.responses, self.groups, dropped_after=self.settings.dropped_after
+        )
+        if self.settings.most_participants is not None and sum(filled) >= self.settings.most_participants:
+            return {"kind": "full"}, ""
+        name = parameters.get("participant", "")
+        name = name if NAME.fullmatch(name) else f"web-{secrets.token_hex(5)}"
+        if await asyncio.to_thread(find_session, self.responses, name) is not None:
+            return {"kind": "taken"}, ""
+        await asyncio.to_thread(self._enrol, name, filled.index(min(filled)), token, parameters, who)
+        sitting = await self.sitting(token)
+        assert sitting is not None  # it was stored just now
+        return sitting, token
+
+    def _enrol(self, name: str, group: int, token: str, parameters: dict[str, str], who: dict[str, str]) -> None:
+        plan = draw_plan(self.protocol, self.manifest.pairs, name, group=group)
+        record = begin_session(
+            self.responses,
+            self.protocol,
+            plan,
+            library=self.manifest.library,
+            library_synthetic=self.manifest.synthetic,
+        )
+        people.enrol(
+            self.responses, record.id, token=token, group=group, parameters=parameters, identifying=who or None
+        )
+
+    def _forget(self, session_id: int) -> None:
+        self.sittings = {key: one for key, one in self.sittings.items() if one.record.id != session_id}
+
+    # Which tab it is
+
+    def _take_tab(self, sitting: Sitting, page: str, previous: str, force: bool) -> bool:
+        """Give the session to a tab, where no other one has it; a reloaded tab names the page that it was."""
+        now = time.monotonic()
+        free = not sitting.page or now - sitting.page_seen > TAB_SECONDS or sitting.page in (page, previous)
+        if not (free or force):
+            return False
+        sitting.page, sitting.page_seen = page, now
+        return True
+
+    def has_tab(self, sitting: Sitting, page: str) -> bool:
+        """Whether a page is the one that shows this session; after a restart the first one to ask is."""
+        if not sitting.page:
+            sitting.page = page
+        if sitting.page != page:
+            return False
+        sitting.page_seen = time.monotonic()
+        self.recent.add(sitting.record.id)
+        return True
+
+    def leave(self, sitting: Sitting, page: str) -> None:
+        """A page was closed."""
+        if sitting.page == page:
+            sitting.page = ""
+
+    # What is done
+
+    async def done(self, sitting: Sitting, message: Done) -> dict[str, Any]:
+        """A page was read; sent twice, or late, it changes nothing."""
+        async with sitting.lock:
+            step = flow.current(sitting.state)
+            read = step.kind in ("consent", "form", "instructions", "feedback", "break", "debrief")
+            if not read or message.step != views.step_key(sitting.state):
+                return await self._view(sitting)
+            if step.kind == "consent" and message.declined:
+                await asyncio.to_thread(people.erase, self.responses, sitting.record.id)
+                self._forget(sitting.record.id)
+                return {"kind": "declined"}
+            if step.kind == "form":
+                state, values = flow.filled(sitting.state, message.values)
+                await asyncio.to_thread(record_form, self.responses, sitting.record, values)
+            else:
+                state = flow.advanced(sitting.state)
+                if step.kind == "consent":
+                    await self.note(sitting, "consent")
+            sitting.state = views.to_view(state)
+            return await self._view(sitting)
+
+    async def answer(self, sitting: Sitting, message: Answered) -> dict[str, Any]:
+        """An answer: committed when this returns. Sent twice it counts once; out of turn it is not counted."""
+        async with sitting.lock:
+            key = (message.trial, message.item, message.attempt)
+            if key in sitting.answers:
+                return {**await self._view(sitting), "counted": sitting.answers[key].value == message.value}
+            state = self._at_question(sitting.state, key)
+            if state is None:
+                return {**await self._view(sitting), "counted": False}
+            well = message.shown_well and all(shown.shown_well for shown in message.shown)
+            step = flow.current(state)
+            late = step.duration_s is not None and (message.response_s or 0.0) > step.duration_s
+            if message.value is None or late:
+                state, answer = flow.missed(state, shown_well=well)
+            elif message.response_s is None:
+                raise SessionError("Expected response_s with an answer, found none.")
+            else:
+                state, answer = flow.answered(state, message.value, message.response_s, shown_well=well)
+            at = datetime.now(UTC)
+            shown = [self._presentation(sitting, message, one) for one in message.shown]
+            await self.writer.put(lambda connection: insert_answer(connection, sitting.record, answer, shown, at))
+            sitting.answers[key] = answer
+            sitting.state = views.to_view(state)
+            sitting.shown_trial = None
+            self.recent.add(sitting.record.id)
+            return {**await self._view(sitting), "counted": True}
+
+    def _at_question(self, state: Session, key: tuple[int, str, int]) -> Session | None:
+        """The state at a question, past the films that the page has shown; None where another question is due."""
+        while (step := flow.current(state)).kind not in ("answer", "done", "form", "consent"):
+            state = flow.advanced(state)
+        return state if step.kind == "answer" and (step.trial, step.item, step.attempt) == key else None
+
+    def _presentation(self, sitting: Sitting, message: Answered, shown: Shown) -> Presentation:
+        trial = sitting.record.plan.trial(message.trial)
+        stimulus = trial.first if shown.place == "first" else trial.second
+        return Presentation(
+            trial=message.trial,
+            attempt=message.attempt,
+            place=shown.place,
+            stimulus=stimulus,
+            method=shown.method,
+            frames_expected=self.frames.get(stimulus),
+            frames_presented=shown.frames_presented,
+            longest_gap_frames=shown.longest_gap_frames,
+            shown_well=shown.shown_well,
+            detail={"times_ms": shown.times_ms, "frames": shown.frames, **message.timing},
+        )
+
+    async def happened(self, sitting: Sitting, message: Happened) -> None:
+        """Something besides answers, told by the page."""
+        await self.note(sitting, message.kind, message.detail)
+
+    async def note(self, sitting: Sitting, kind: str, detail: Mapping[str, Any] | None = None) -> None:
+        """Store an event of a session."""
+        if sitting.events >= MOST_EVENTS:
+            return
+        sitting.events += 1
+        at = datetime.now(UTC)
+        await self.writer.put(lambda connection: insert_event(connection, sitting.record, kind, detail, at))
+
+    # What is shown
+
+    async def _view(self, sitting: Sitting) -> dict[str, Any]:
+        step = flow.current(sitting.state)
+        view = views.view(sitting.state, sitting.participant, self.frames)
+        sitting.shown_trial = (step.trial, step.attempt) if step.kind == "first" else None
+        if step.kind in ("debrief", "done"):
+            view["withdrawal_code"] = sitting.participant.withdrawal_code
+        if step.kind == "done":
+            if not await asyncio.to_thread(has_event, self.responses, sitting.record, "finished"):
+                await self.note(sitting, "finished")
+            view |= {"completion_code": self.settings.completion_code, "completion_url": self.settings.completion_url}
+        return view
+
+    async def film(self, sitting: Sitting, name: str) -> Path | None:
+        """The file of a film that a participant may load now; a damaged one is a fault that is noted."""
+        step = self._film_step(sitting, name)
+        if step is None:
+            return None
+        video = self.manifest.videos.get(step.stimulus, {})
+        path = self.manifest.folder / str(video.get("file", ""))
+        try:
+            size = path.stat().st_size if video else None
+        except OSError:
+            size = None
+        if size is None or size != video["bytes"]:
+            detail = {"what": "film damaged", "stimulus": step.stimulus, "bytes": size, "expected": video.get("bytes")}
+            await self.note(sitting, "fault", detail)
+            raise SessionError(f"Expected the film {step.stimulus} whole, found {size} bytes; render again.")
+        return path
+
+    def _film_step(self, sitting: Sitting, name: str) -> Step | None:
+        for step in views.films_due(sitting.state):
+            if secrets.compare_digest(views.film_name(sitting.participant, step), name):
+                return step
+        return None
+
+    async def withdraw(self, code: str) -> bool:
+        """Delete a participant's data by the withdrawal code."""
+        session_id = await asyncio.to_thread(people.withdraw, self.responses, code)
+        if session_id is not None:
+            self._forget(session_id)
+        return session_id is not None
+
+    async def note_who_is_here(self) -> None:
+        """Store who was heard of, so that drop-outs can be told apart."""
+        recent, self.recent = self.recent, set()
+        if recent:
+            await asyncio.to_thread(people.seen, self.responses, recent)
+
+
+def healthy(responses: Responses) -> bool:
+    """Whether the database answers."""
+    with responses.engine.connect() as connection:
+        return connection.execute(sa.text("SELECT 1")).scalar_one() == 1

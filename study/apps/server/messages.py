@@ -1,0 +1,104 @@
+"""Messages of the page: what a browser may send, checked key by key. JSON comes in, frozen models go out."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from study.errors import SessionError
+
+LONGEST_FILM_FRAMES = 40_000
+"""Far above the longest stimulus (120 s at 240 frames a second); a page can't fill the database."""
+
+Text = Annotated[str, Field(max_length=400)]
+Milliseconds = Annotated[float, Field(ge=0, lt=1e9, allow_inf_nan=False)]
+
+
+class Message(BaseModel):
+    """What all messages share."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Display(Message):
+    """What the page knows about the display that it is shown on."""
+
+    user_agent: Text = ""
+    viewport: tuple[int, int] = (0, 0)
+    screen: tuple[int, int] = (0, 0)
+    pixel_ratio: Annotated[float, Field(ge=0, le=100)] = 1.0
+    refresh_hz: Annotated[float, Field(ge=0, le=10_000)] | None = None
+    frame_callback: bool = False
+    touch: bool = False
+    reduced_motion: bool = False
+
+
+class Begin(Message):
+    """A page was opened: by which link, in which tab, on what display."""
+
+    page: Annotated[str, Field(min_length=8, max_length=64)]
+    previous: Annotated[str, Field(max_length=64)] = ""
+    force: bool = False
+    parameters: Annotated[dict[Annotated[str, Field(max_length=60)], Text], Field(max_length=20)] = {}
+    display: Display = Display()
+
+
+class Done(Message):
+    """A page was read, a consent given (or not), a form filled in."""
+
+    step: Text
+    declined: bool = False
+    values: Annotated[
+        dict[Annotated[str, Field(max_length=80)], Annotated[str, Field(max_length=2000)]], Field(max_length=100)
+    ] = {}
+
+
+class Shown(Message):
+    """How one film was presented."""
+
+    place: Literal["first", "second"]
+    method: Annotated[str, Field(max_length=40)]
+    frames_presented: Annotated[int, Field(ge=0, lt=LONGEST_FILM_FRAMES)] | None = None
+    longest_gap_frames: Annotated[float, Field(ge=0, lt=1e9, allow_inf_nan=False)] | None = None
+    shown_well: bool
+    times_ms: Annotated[tuple[Milliseconds, ...], Field(max_length=LONGEST_FILM_FRAMES)] = ()
+    frames: Annotated[tuple[int, ...], Field(max_length=LONGEST_FILM_FRAMES)] = ()
+
+
+class Answered(Message):
+    """An answer, or that none came in time; with how the films were shown."""
+
+    trial: Annotated[int, Field(ge=1, le=1_000_000)]
+    attempt: Annotated[int, Field(ge=1, le=100)]
+    item: Annotated[str, Field(max_length=80)] = ""
+    value: Annotated[str, Field(max_length=40)] | None = None
+    response_s: Annotated[float, Field(ge=0, lt=1e6, allow_inf_nan=False)] | None = None
+    shown_well: bool = True
+    shown: Annotated[tuple[Shown, ...], Field(max_length=2)] = ()
+    timing: Annotated[dict[Annotated[str, Field(max_length=40)], float | str | None], Field(max_length=20)] = {}
+
+
+class Happened(Message):
+    """Something besides answers."""
+
+    kind: Literal["focus-lost", "focus-back", "resized", "fault", "interrupted", "waited"]
+    detail: Annotated[dict[Annotated[str, Field(max_length=40)], float | Text | None], Field(max_length=20)] = {}
+
+
+class Withdrawal(Message):
+    """A withdrawal code."""
+
+    code: Annotated[str, Field(max_length=100)]
+
+
+def read(model: type[Message], data: bytes) -> Any:
+    """A message of a kind, or a `SessionError` that says what is wrong with it."""
+    try:
+        return model.model_validate_json(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the message"
+        raise SessionError(
+            f"Expected a message {model.__name__}, found a mistake at {where}: {first['msg']}."
+        ) from None

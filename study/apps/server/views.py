@@ -1,0 +1,127 @@
+"""Views: what a page may know of a step. A sitting's state comes in, JSON goes out.
+
+A page learns which films to play and what to ask, and nothing of what an answer means: films have an address of their
+own in every trial (a keyed hash), so that even two showings of one stimulus don't look alike.
+"""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Mapping
+from typing import Any
+
+from study.experiment import session as sitting
+from study.experiment.participants import Participant
+from study.experiment.protocol import Protocol
+from study.experiment.session import Session, Step
+
+FILMS = "/films"
+
+
+def film_name(participant: Participant, step: Step) -> str:
+    """The name of a film in one showing: unguessable, and different for every place, trial and attempt."""
+    place = f"{step.kind}/{step.study}/{step.trial}/{step.attempt}/{step.stimulus}"
+    return hmac.new(participant.secret.encode(), place.encode(), "sha256").hexdigest()[:40]
+
+
+def step_key(session: Session) -> str:
+    """The name of a step that is read, the same after a restart of the server."""
+    step = sitting.current(session)
+    trial = next((other.trial for other in session.steps[session.position :] if other.trial), 0)
+    return f"{step.kind}/{step.study}/{trial}"
+
+
+def films_due(session: Session) -> list[Step]:
+    """The steps whose films a participant may load now: those of this trial and of the next, or the example."""
+    step = sitting.current(session)
+    due = [step] if step.kind == "instructions" and step.stimulus else []
+    return due + [
+        other
+        for other in session.steps[session.position :]
+        if other.kind in ("first", "second") and other.trial in _next_trials(session)
+    ]
+
+
+def _next_trials(session: Session) -> tuple[int, ...]:
+    trials = dict.fromkeys(step.trial for step in session.steps[session.position :] if step.trial)
+    return tuple(trials)[:2]
+
+
+def to_view(session: Session) -> Session:
+    """Past what a page does by itself: the pause, which belongs to the trial before it."""
+    while sitting.current(session).kind == "pause":
+        session = sitting.advanced(session)
+    return session
+
+
+def view(session: Session, participant: Participant, frames: Mapping[str, int]) -> dict[str, Any]:
+    """What the page shows now; `frames` is the length of every stimulus."""
+    step, protocol = sitting.current(session), session.protocol
+    done, total = sitting.progress(session)
+    shown: dict[str, Any] = {"kind": step.kind, "text": step.text, "progress": [done, total]}
+    if step.kind == "first":
+        return {**shown, **_trial(session, participant, frames), "kind": "trial"}
+    if step.kind == "answer":
+        # The films of this trial were shown; further questions about them follow.
+        return {**shown, **_asking(session, step), "films": [], "gap_s": 0, "ahead": [], "kind": "trial"}
+    shown["step"] = step_key(session)
+    if step.kind == "consent":
+        shown |= {"agree": protocol.consent.agree, "decline": protocol.consent.decline}
+    if step.kind == "form":
+        shown["fields"] = [field.model_dump() for field in protocol.form]
+    if step.kind == "instructions":
+        study = protocol.study(step.study) if step.study else None
+        shown["fps"] = protocol.fps
+        shown["example"] = _film(step, participant, frames) if step.stimulus else None
+        shown["keys"] = _options(protocol, sitting.legal_answers(study)) if study and study.task != "rating" else []
+    return shown
+
+
+def _trial(session: Session, participant: Participant, frames: Mapping[str, int]) -> dict[str, Any]:
+    step = sitting.current(session)
+    own = [other for other in session.steps[session.position :] if other.trial == step.trial]
+    own = [other for other in own if other.attempt == step.attempt]
+    question = next(other for other in own if other.kind == "answer")
+    following = _next_trials(session)[1:]
+    return {
+        **_asking(session, question),
+        "films": [_film(other, participant, frames) for other in own if other.kind in ("first", "second")],
+        "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
+        "ahead": [_film(other, participant, frames) for other in films_due(session) if other.trial in following],
+    }
+
+
+def _asking(session: Session, step: Step) -> dict[str, Any]:
+    protocol = session.protocol
+    return {
+        "trial": step.trial,
+        "attempt": step.attempt,
+        "label": protocol.texts.practice if step.role == "practice" else "",
+        "fps": protocol.fps,
+        "pause_s": protocol.timing.pause_s,
+        "question": _question(protocol, step),
+    }
+
+
+def _film(step: Step, participant: Participant, frames: Mapping[str, int]) -> dict[str, Any]:
+    place = "first" if step.kind == "instructions" else step.kind
+    return {"place": place, "url": f"{FILMS}/{film_name(participant, step)}.mp4", "frames": frames[step.stimulus]}
+
+
+def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
+    return {
+        "item": step.item,
+        "text": step.text,
+        "low": step.low,
+        "high": step.high,
+        "window_s": step.duration_s,
+        "options": _options(protocol, step.legal),
+        "scale": protocol.study(step.study).task == "rating",
+    }
+
+
+def _options(protocol: Protocol, legal: tuple[str, ...]) -> list[dict[str, str]]:
+    keys = sitting.answer_keys(protocol, legal)
+    return [
+        {"value": value, "label": sitting.answer_words(protocol, value), "key": keys.get(value, "")} for value in legal
+    ]
