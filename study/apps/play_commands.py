@@ -1,0 +1,141 @@
+"""The verb `segue play`: a participant's session in a window on this machine."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.console import emit, json_option, library_option, say
+from study.apps.study_commands import OUT, load, prepare_stimuli, results_folder
+
+if TYPE_CHECKING:
+    from renderer.window import Window
+    from study.apps.player.loop import Outcome
+    from study.apps.player.pages import Look
+    from study.experiment.plan import Plan
+    from study.experiment.protocol import Protocol
+    from study.experiment.responses import Responses
+    from study.experiment.stimulus_set import StimulusSet
+
+
+@click.command()
+@click.argument("protocol")
+@click.option("--participant", required=True, metavar="ID", help="Who takes part, such as p01; the same ID goes on.")
+@click.option("--group", type=click.IntRange(min=0), default=0, show_default=True, help="For orders by group.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of the trials' order, instead of the protocol's own.")
+@library_option
+@OUT
+@click.option("--database", metavar="URL|FILE", help="Where answers go; responses.sqlite in the results folder.")
+@click.option("--windowed", is_flag=True, help="In a window, not on the full screen.")
+@click.option("--size", default="1280x800", show_default=True, metavar="WIDTHxHEIGHT", help="Of the window.")
+@click.option("--actual-size", is_flag=True, help="Show stimuli in the protocol's pixels, not as large as fits.")
+@click.option("--font", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="For other scripts.")
+@json_option
+def play(
+    protocol: str,
+    participant: str,
+    group: int,
+    seed: int | None,
+    library: str | None,
+    out: Path | None,
+    database: str | None,
+    windowed: bool,
+    size: str,
+    actual_size: bool,
+    font: Path | None,
+    as_json: bool,
+) -> None:
+    """A session in a window: stimuli drawn live, every flip timed, every answer stored before the next trial.
+
+    Stopped or killed, the same command goes on where it was. Escape asks whether to stop.
+    """
+    from renderer.window import check_display
+    from study.experiment.responses import open_responses
+    from study.experiment.stimuli import record
+
+    pixels = _size(size)
+    loaded = load(protocol)
+    check_display()
+    stimuli = prepare_stimuli(loaded, library)
+    folder = results_folder(loaded, out)
+    record(stimuli, folder)
+    with open_responses(database or folder) as responses:
+        plan = the_plan(responses, loaded, stimuli, participant, seed, group)
+        outcome, window = _sit(responses, loaded, stimuli, plan, pixels if windowed else None, not actual_size, font)
+    result = {**asdict(outcome), "participant": participant, "folder": str(folder), "window": window}
+    emit(result, as_json, f"{participant}: {outcome.end}; {outcome.answers} answers stored now, in {folder}")
+
+
+def _size(text: str) -> tuple[int, int]:
+    wide, _, high = text.partition("x")
+    if not (wide.isdigit() and high.isdigit() and int(wide) >= 320 and int(high) >= 240):
+        raise click.UsageError(f"expected --size as WIDTHxHEIGHT of at least 320x240 pixels, found {text!r}.")
+    return int(wide), int(high)
+
+
+def the_plan(
+    responses: Responses, protocol: Protocol, stimuli: StimulusSet, participant: str, seed: int | None, group: int
+) -> Plan:
+    """The stored plan of a participant who was here before, else a new one: the same as `simulate` draws."""
+    from study.experiment.plan import draw_plan
+    from study.experiment.responses import find_session
+
+    known = find_session(responses, participant)
+    if known is None:
+        return draw_plan(protocol, stimuli.pairs, participant, seed, group=group)
+    if seed is not None and seed != known.plan.seed:
+        raise click.UsageError(
+            f"expected --seed {known.plan.seed}, under which {participant!r} began, found {seed}; leave it out."
+        )
+    return known.plan
+
+
+def _sit(
+    responses: Responses,
+    protocol: Protocol,
+    stimuli: StimulusSet,
+    plan: Plan,
+    window_size: tuple[int, int] | None,
+    fill: bool,
+    font: Path | None,
+) -> tuple[Outcome, dict[str, Any]]:
+    """Open the window and walk the session; None as size takes the full screen."""
+    from renderer.window import open_window
+    from study.apps.player.loop import Outcome, play
+    from study.apps.player.store import ResponsesStore
+    from study.experiment.session import open_session
+
+    store = ResponsesStore(responses, protocol, plan, stimuli.library, stimuli.synthetic)
+    answers, passed, finished = store.before()
+    if finished:
+        say(f"{plan.participant} has finished before; there is nothing left to do.")
+        return Outcome("finished", 0, 0, 0), {}
+    session = open_session(protocol, plan, answers, passed=passed)
+    if answers:
+        say(f"{plan.participant} goes on after {len(answers)} answers.")
+    look = page_look(stimuli, font)
+    with open_window(protocol.title, full_screen=window_size is None, size=window_size or (1280, 800)) as window:
+        _tell_of_timing(window)
+        return play(window, session, stimuli.stimulus, store, look, fill=fill, say=say), window.describe()
+
+
+def page_look(stimuli: StimulusSet, font: Path | None) -> Look:
+    """Pages in the colours of the stimuli's background."""
+    from study.apps.player.pages import Look, default_font
+
+    return Look(stimuli.stimuli[0].figure.background, font or default_font())
+
+
+def _tell_of_timing(window: Window) -> None:
+    pacing = window.pacing
+    if pacing.measured:
+        say(f"display: {pacing.refresh_hz:.2f} Hz; swaps wait for it")
+    else:
+        why = "reports no refresh rate" if pacing.reported_hz == 0 else "does not make swaps wait"
+        say(
+            f"display: it {why} (a virtual one?), so frames follow an own clock of {pacing.refresh_hz:g} Hz. "
+            "TIMING WAS NOT MEASURED in this session; its record says so."
+        )

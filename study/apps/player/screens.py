@@ -1,0 +1,94 @@
+"""Screens: the page of each step of a session, in the words of its protocol. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from study.apps.player.pages import Button, Page
+from study.experiment.protocol import Protocol
+from study.experiment.protocol_parts import FormField
+from study.experiment.session import Step, answer_keys, answer_words
+
+
+def reading_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Page:
+    """Welcome, instructions (with an example where there is one), feedback, a break, the debriefing."""
+    texts = protocol.texts
+    buttons = [Button("go-on", texts.go_on, "space", texts.space_key)]
+    if step.kind == "instructions" and step.stimulus:
+        buttons.append(Button("example", texts.example, "e", "E"))
+    note = texts.practice if step.role == "practice" else ""
+    return _with_progress(protocol, Page(step.text, buttons=tuple(buttons), note=note), progress, step.kind == "break")
+
+
+def _with_progress(protocol: Protocol, page: Page, progress: tuple[int, int], shown: bool) -> Page:
+    if not shown:
+        return page
+    words = protocol.texts.progress.replace("{done}", str(progress[0])).replace("{total}", str(progress[1]))
+    return replace(page, progress=progress, progress_words=words)
+
+
+def consent_page(protocol: Protocol, step: Step) -> Page:
+    """What is agreed to."""
+    consent = protocol.consent
+    return Page(
+        step.text, buttons=(Button("agree", consent.agree, "1", "1"), Button("decline", consent.decline, "2", "2"))
+    )
+
+
+def answer_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Page:
+    """The question after the stimuli, a button for each legal answer."""
+    keys = answer_keys(protocol, step.legal)
+    buttons = []
+    for value in step.legal:
+        words, key = answer_words(protocol, value), keys.get(value, "")
+        # A digit on its own button says which key it is.
+        buttons.append(Button(value, words, key, "" if words == key else key.upper()))
+    note = protocol.texts.practice if step.role == "practice" else ""
+    page = Page("", step.text, tuple(buttons), step.low, step.high, note)
+    return _with_progress(protocol, page, progress, step.role != "practice")
+
+
+def field_page(protocol: Protocol, field: FormField, entry: str, complaint: bool) -> Page:
+    """One question of the form; `complaint` where what was typed can't be taken."""
+    texts = protocol.texts
+    if field.kind == "choice":
+        buttons = [
+            Button(f"choice-{number}", choice, str(number) if number <= 9 else "", str(number) if number <= 9 else "")
+            for number, choice in enumerate(field.choices, start=1)
+        ]
+        if not field.required:
+            buttons.append(Button("go-on", texts.skip, "0", "0"))
+        return Page("", field.label, tuple(buttons), note=texts.form)
+    words = texts.go_on if entry or field.required else texts.skip
+    hint = _range(field)
+    if complaint:
+        hint = f"{texts.not_taken} {hint}".strip()
+    button = Button("go-on", words, "enter", texts.enter_key)
+    return Page("", field.label, (button,), note=texts.form, entry=entry, hint=hint)
+
+
+def _range(field: FormField) -> str:
+    if field.least is None and field.most is None:
+        return ""
+    least = "" if field.least is None else f"{field.least:g}"
+    most = "" if field.most is None else f"{field.most:g}"
+    return f"{least} – {most}"
+
+
+def stop_page(protocol: Protocol) -> Page:
+    """Whether the participant really wants to stop."""
+    texts = protocol.texts
+    buttons = (Button("stay", texts.stay, "space", texts.space_key), Button("stop", texts.stop, "x", "X"))
+    return Page(texts.stop_note, texts.stop_question, buttons)
+
+
+def away_page(protocol: Protocol) -> Page:
+    """The window has lost the keyboard."""
+    texts = protocol.texts
+    return Page(texts.away, buttons=(Button("go-on", texts.go_on, "space", texts.space_key),))
+
+
+def last_page(protocol: Protocol, text: str) -> Page:
+    """The very last words."""
+    texts = protocol.texts
+    return Page(text, buttons=(Button("go-on", texts.close, "space", texts.space_key),))

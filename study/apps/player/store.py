@@ -1,0 +1,95 @@
+"""Store: where a player's answers and events go, each committed before the player goes on.
+
+Nothing is written before `begin`, which the player calls once the participant has agreed to take part (at once where
+nobody is asked): who declines leaves nothing behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+from typing import Protocol as Shape
+
+from study.experiment.plan import Plan
+from study.experiment.protocol import Protocol
+from study.experiment.responses import (
+    Presentation,
+    Responses,
+    SessionRecord,
+    begin_session,
+    find_session,
+    has_event,
+    record_answer,
+    record_event,
+    record_form,
+    steps_passed,
+    stored_answers,
+)
+from study.experiment.session import Answer
+
+
+class Store(Shape):
+    """What the player needs of a store; a test brings a list."""
+
+    def begin(self) -> None:
+        """The participant takes part."""
+
+    def answer(self, answer: Answer, shown: Sequence[Presentation]) -> None:
+        """Commit an answer, with how its stimuli were shown."""
+
+    def form(self, values: Mapping[str, str]) -> None:
+        """Commit the form."""
+
+    def event(self, kind: str, detail: Mapping[str, Any] | None = None) -> None:
+        """Commit what happened otherwise."""
+
+
+class ResponsesStore:
+    """One participant's session in a database of responses."""
+
+    def __init__(
+        self, responses: Responses, protocol: Protocol, plan: Plan, library: str, library_synthetic: bool
+    ) -> None:
+        self._responses, self._protocol, self._plan = responses, protocol, plan
+        self._library, self._synthetic = library, library_synthetic
+        self._record: SessionRecord | None = None
+        self._waiting: list[tuple[str, Mapping[str, Any] | None]] = []
+
+    def before(self) -> tuple[tuple[Answer, ...], tuple[str, ...], bool]:
+        """What an earlier sitting left: answers, steps passed (`consent`, `form`), and whether it was finished."""
+        record = find_session(self._responses, self._plan.participant)
+        if record is None:
+            return (), (), False
+        answers = stored_answers(self._responses, record.id)
+        return answers, steps_passed(self._responses, record), has_event(self._responses, record, "finished")
+
+    def begin(self) -> None:
+        """Write the session down, or take up the one that there is, with the events that waited for it."""
+        if self._record is not None:
+            return
+        self._record = begin_session(
+            self._responses, self._protocol, self._plan, library=self._library, library_synthetic=self._synthetic
+        )
+        waiting, self._waiting = self._waiting, []
+        for kind, detail in waiting:
+            self.event(kind, detail)
+
+    def answer(self, answer: Answer, shown: Sequence[Presentation]) -> None:
+        """Commit an answer; it is on disk when this returns."""
+        record_answer(self._responses, self._begun(), answer, shown)
+
+    def form(self, values: Mapping[str, str]) -> None:
+        """Commit the form."""
+        record_form(self._responses, self._begun(), values)
+
+    def event(self, kind: str, detail: Mapping[str, Any] | None = None) -> None:
+        """Commit an event, or keep it until the session begins."""
+        if self._record is None:
+            self._waiting.append((kind, detail))
+        else:
+            record_event(self._responses, self._record, kind, detail)
+
+    def _begun(self) -> SessionRecord:
+        self.begin()
+        assert self._record is not None, "begin sets it"
+        return self._record
