@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 LEAST_CRITERION = 0.2
 """No participant's criterion lies below this: at 0 a person would say "different" always."""
 
-_PREFERENCE = {"fixed": 0.0, "velocity": 0.65, "geodesic": 3.29, "cut": -2.0}
+_PREFERENCE = {"fixed": 0.0, "velocity": 0.65, "geodesic": 3.29, "cut": -2.0, "one-hop": 1.5}
 
 
 @dataclass(frozen=True)

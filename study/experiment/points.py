@@ -115,6 +115,11 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
         longest = max(longest, study.fixed_frames + max((0, *study.differences_frames)))
     if study.methods == ("cut",):
         longest = search = 1
+    if "one-hop" in study.methods:
+        # The source plays on for a stay, the destination for both stays and a second blend.
+        stay = round(study.one_hop.stay_s * protocol.fps)
+        longest = max(longest, study.fixed_frames) if len(study.methods) > 1 else study.fixed_frames
+        longest, after_exit = longest + stay, after_exit + 2 * stay + study.fixed_frames
     room = max(longest, search)
     blend = f"blends of up to {longest} frames"
     return (
@@ -253,7 +258,7 @@ def lengths_at(
             destination,
             start,
             end,
-            method=method,
+            method="fixed" if method == "one-hop" else method,
             fixed_frames=study.fixed_frames,
             specification=protocol.stimuli.specification,
             restrict=True,
@@ -308,6 +313,9 @@ def _room_problem(protocol: Protocol, study: StudySpec, settled: Settled) -> str
     """What is missing around given points for entry, the longest blend and exit; empty where nothing is."""
     entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
     longest = max(level_lengths(study, settled.lengths))
+    if "one-hop" in study.methods:
+        stay = round(study.one_hop.stay_s * protocol.fps)
+        longest, after = longest + stay, after + 2 * stay + study.fixed_frames
     rooms = (
         ("entry", entry, settled.start_frame, settled.source),
         ("the longest blend", longest, settled.source.clip.frames - settled.start_frame, settled.source),
