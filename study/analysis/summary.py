@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from study.analysis import estimates
+from study.analysis.anova import rating_anova
 from study.analysis.jnd import analyse_jnd
 from study.analysis.preference import compare
 from study.analysis.quality import quality
@@ -46,8 +47,8 @@ def analyse(
     -------
     dict
         `jnd` (by name of a same-different study), `preference` (by name of a preference study, a list of compared
-        pairs of methods), `ratings` (by name of a rating study), each empty where there is no such study; `quality`,
-        `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
+        pairs of methods), `ratings` and `rating_anova` (by name of a rating study), each empty where there is none;
+        `quality`, `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def analyse(
     strange = sorted(set(answers["task"].astype(str)) - set(TASKS))
     if strange:
         raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {strange[0]!r}")
-    result: dict[str, Any] = {"jnd": {}, "preference": {}, "ratings": {}}
+    result: dict[str, Any] = {"jnd": {}, "preference": {}, "ratings": {}, "rating_anova": {}}
     for (task, study), part in answers.groupby([answers["task"].astype(str), _studies(answers)], sort=False):
         if task == "same-different":
             result["jnd"][study] = analyse_jnd(
@@ -70,6 +71,7 @@ def analyse(
             result["preference"][study] = compare(part, confidence, alpha)
         else:
             result["ratings"][study] = rating_table(part, confidence)
+            result["rating_anova"][study] = rating_anova(part, confidence)
     result |= {"quality": quality(answers), "data": kind_of_data(answers), "confidence": confidence, "alpha": alpha}
     return dict(estimates.plain(result))
 

@@ -181,7 +181,8 @@ def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
             found.append(sections.preference_section(study.name, title, comparisons, mark=mark))
         elif study.name in analysis["ratings"]:
             rows, points = analysis["ratings"][study.name], study.scale_points
-            found.append(sections.ratings_section(study.name, title, rows, mark=mark, points=points))
+            variance = analysis.get("rating_anova", {}).get(study.name, ())
+            found.append(sections.ratings_section(study.name, title, rows, variance, mark=mark, points=points))
     return found
 
 

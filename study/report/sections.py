@@ -349,8 +349,13 @@ def preference_motion_table(name: str, comparison: Result) -> Table:
     )
 
 
-def ratings_section(name: str, title: str, rows: Sequence[Result], *, mark: str, points: int) -> Section:
-    """Return the section of a rating study: descriptive only."""
+def ratings_section(
+    name: str, title: str, rows: Sequence[Result], variance: Sequence[Result] = (), *, mark: str, points: int
+) -> Section:
+    """Return the section of a rating study: means, and where two methods or more were rated, their comparison.
+
+    `rows` are those of `rating_table`, `variance` those of `rating_anova`.
+    """
     table = tables.make(
         f"{name}_ratings",
         "Ratings: mean over participants of their means, with its standard error and 95% interval.",
@@ -376,6 +381,60 @@ def ratings_section(name: str, title: str, rows: Sequence[Result], *, mark: str,
     drawing = Drawing(
         figures.ratings_figure(rows, f"study-{name}-ratings", mark, points), "Mean ratings with 95% intervals."
     )
+    compared = (_variance_table(name, variance), _difference_table(name, variance)) if variance else ()
     return Section(
-        f"study-{name}", title, "rating", (headline,) if headline else (), (drawing,) if rows else (), (table,), ()
+        f"study-{name}",
+        title,
+        "rating",
+        (headline,) if headline else (),
+        (drawing,) if rows else (),
+        (table, *compared),
+        tuple(dict.fromkeys(question["note"] for question in variance if question["note"])),
+    )
+
+
+def _variance_table(name: str, questions: Sequence[Result]) -> Table:
+    return tables.make(
+        f"{name}_anova",
+        "Two-way between-subjects analysis of variance, method by order of presentation (2003 section 4.2). It takes "
+        "the ratings of one participant for independent; the next table does not.",
+        [
+            ("item", "question", "text"),
+            ("source", "source", "text"),
+            ("degrees_of_freedom", "df", "count"),
+            ("error_degrees_of_freedom", "error df", "count"),
+            ("sum_of_squares", "SS", "two"),
+            ("mean_square", "MS", "two"),
+            ("f", "F", "two"),
+            ("p_value", "p", "p"),
+            ("partial_eta_squared", "partial eta squared", "two"),
+        ],
+        [
+            {"error_degrees_of_freedom": None, "f": None, "p_value": None, "partial_eta_squared": None}
+            | {**row, "item": words.readable(question["item"])}
+            for question in questions
+            for row in question["anova"]
+        ],
+    )
+
+
+def _difference_table(name: str, questions: Sequence[Result]) -> Table:
+    return tables.make(
+        f"{name}_differences",
+        "Difference of each participant's own ratings of the two methods: mean, 95% interval, and t test.",
+        [
+            ("item", "question", "text"),
+            ("of", "difference", "text"),
+            ("mean", "mean", "two"),
+            ("low", "95% from", "two"),
+            ("high", "to", "two"),
+            ("t", "t", "two"),
+            ("degrees_of_freedom", "df", "count"),
+            ("p_value", "p", "p"),
+        ],
+        [
+            {**question["difference"], "item": words.readable(question["item"])}
+            for question in questions
+            if question["difference"]
+        ],
     )
