@@ -23,6 +23,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from study.analysis.scoring import maximise
+
 FloatArray = NDArray[np.float64]
 Kind = Literal["different", "guess_corrected", "criterion_free"]
 KINDS: tuple[Kind, ...] = ("different", "guess_corrected", "criterion_free")
@@ -103,26 +105,16 @@ def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, largest
     end at a bound, which `Fits.held` tells, and are no failure.
     """
     low, high = _bounds(frames, largest_lapse)
-    point = np.clip(_start(frames, different, shown), low, high)
-    value = _log_likelihood(point, frames, different, shown)
-    damping = np.full(len(point), 1e-3)
-    settled = np.zeros(len(point), dtype=bool)
-    for _ in range(200):
-        now = np.flatnonzero(~settled)
-        if not len(now):
-            break
-        step = _step(point[now], damping[now], low, high, frames, different[now], shown[now])
-        proposal = np.clip(point[now] + step, low, high)
-        moved = np.abs(proposal - point[now]).max(axis=1)
-        proposed = _log_likelihood(proposal, frames, different[now], shown[now])
-        gain = proposed - value[now]
-        better = gain >= 0
-        point[now[better]], value[now[better]] = proposal[better], proposed[better]
-        damping[now] = np.where(better, damping[now] / 10, damping[now] * 10)
-        settled[now] = (moved < 1e-8) | (better & (gain < 1e-10) & (moved < 1e-4)) | (damping[now] > 1e12)
-        damping = np.maximum(damping, 1e-9)
-    held = (point <= low + 1e-9) | (point >= high - 1e-9)
-    return Fits(np.exp(point[:, 0]), point[:, 1].copy(), np.exp(point[:, 2:]), value, held, settled)
+    found = maximise(
+        lambda point, rows: _log_likelihood(point, frames, different[rows], shown[rows]),
+        lambda point, rows: _scores(point, frames, different[rows], shown[rows]),
+        _start(frames, different, shown),
+        low,
+        high,
+    )
+    point = found.point
+    criterion, lapse, slopes = np.exp(point[:, 0]), point[:, 1].copy(), np.exp(point[:, 2:])
+    return Fits(criterion, lapse, slopes, found.value, found.held, found.settled)
 
 
 def _bounds(frames: FloatArray, largest_lapse: float) -> tuple[FloatArray, FloatArray]:
@@ -184,27 +176,6 @@ def _scores(
     gradient = np.einsum("bl,blp->bp", (different - shown * share) / variance, slopes)
     information = np.einsum("bl,blp,blq->bpq", shown / variance, slopes, slopes)
     return gradient, information
-
-
-def _step(
-    point: FloatArray,
-    damping: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    frames: FloatArray,
-    different: FloatArray,
-    shown: FloatArray,
-) -> FloatArray:
-    """One damped scoring step; parameters that would leave their range from its bound are held."""
-    gradient, information = _scores(point, frames, different, shown)
-    held = ((point <= low) & (gradient < 0)) | ((point >= high) & (gradient > 0))
-    free = (~held).astype(np.float64)
-    information = information * free[:, :, None] * free[:, None, :]
-    diagonal = np.einsum("bpp->bp", information)
-    size = point.shape[1]
-    information = information + np.eye(size) * (damping[:, None] * (diagonal + 1e-6) + (1 - free) + 1e-12)[:, None, :]
-    step = np.linalg.solve(information, (gradient * free)[:, :, None])[:, :, 0]
-    return np.asarray(np.clip(step, -1.0, 1.0), dtype=np.float64)
 
 
 # Thresholds
