@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,8 +48,6 @@ def prepare_stimuli(protocol: Protocol, library: str | None) -> StimulusSet:
 
 def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> dict[str, Any]:
     """Render what is not rendered yet, with progress on standard error; the numbers for `--json`."""
-    from dataclasses import asdict
-
     from study.experiment.rendering import render as render_all
 
     with progress("videos") as report:
@@ -62,8 +61,6 @@ def simulate_participants(
     protocol: Protocol, folder: Path, participants: int, seed: int | None = None
 ) -> dict[str, Any]:
     """Simulated sessions on the stimuli of a results folder; the numbers for `--json`."""
-    from dataclasses import asdict
-
     from study.experiment.observers import simulate as simulate_all
     from study.experiment.rendering import read_manifest
     from study.experiment.responses import open_responses
@@ -126,8 +123,17 @@ def check(protocol: str, library: str | None, as_json: bool) -> None:
 @json_option
 def render(protocol: str, library: str | None, out: Path | None, workers: int | None, as_json: bool) -> None:
     """Render all stimuli of a protocol; what is rendered already is reused, so an interrupted run goes on."""
+    from study.experiment.rendering import rendered_already
+    from study.motion.library import open_library
+
     checked = load(protocol)
-    summary = render_stimuli(prepare_stimuli(checked, library), results_folder(checked, out), workers)
+    folder = results_folder(checked, out)
+    done = rendered_already(checked, open_library(library or "synthetic"), folder)
+    summary = (
+        {**asdict(done), "folder": str(folder)}
+        if done
+        else render_stimuli(prepare_stimuli(checked, library), folder, workers)
+    )
     text = (
         f"{summary['folder']}: {summary['videos']} videos, {summary['frames']} frames, {summary['seconds']:.0f} s of "
         f"motion; {summary['rendered']} rendered now, {summary['reused']} reused"

@@ -21,6 +21,8 @@ from study.experiment.stimulus_set import Stimulus, StimulusRecord, StimulusSet,
 if TYPE_CHECKING:
     from renderer.jobs import Progress
     from renderer.video import VideoInfo
+    from study.experiment.protocol import Protocol
+    from study.motion.library import Library
 
 MANIFEST_VERSION = 1
 MANIFEST, PROTOCOL, STIMULI, ANSWERS = "manifest.json", "protocol.toml", "stimuli", "responses.sqlite"
@@ -57,6 +59,7 @@ class Manifest:
     pairs: tuple[Pair, ...]
     videos: Mapping[str, Mapping[str, Any]]
     versions: Mapping[str, str]
+    made_from: str
 
     @property
     def complete(self) -> bool:
@@ -129,6 +132,36 @@ def render(
         raise StimulusError(str(error)) from error
     frames = sum(record.frames for record in stimulus_set.records)
     return RenderSummary(len(videos), frames, frames / stimulus_set.protocol.fps, len(todo), reused)
+
+
+def made_from(protocol: Protocol, library: Library) -> str:
+    """Hash of all that stimuli are made from: the protocol's text, the library's files, and this program's own.
+
+    Files count by path, size and time of change, so that asking costs milliseconds.
+    """
+    root = Path(__file__).resolve().parents[2]
+    program = [path for folder in ("study", "renderer") for path in sorted((root / folder).rglob("*.*"))]
+    digest = hashlib.sha256(f"{protocol.sha256} {library.name}\n".encode())
+    for path in (*program, *library.files()):
+        if path.suffix != ".pyc" and path.is_file():
+            state = path.stat()
+            digest.update(f"{path} {state.st_size} {state.st_mtime_ns}\n".encode())
+    return digest.hexdigest()
+
+
+def rendered_already(protocol: Protocol, library: Library, out: str | Path) -> RenderSummary | None:
+    """What `render` would say where nothing is left to do; None where there is, or something changed since."""
+    folder = Path(out)
+    if not (folder / MANIFEST).exists():
+        return None
+    manifest = read_manifest(folder)
+    if manifest.made_from != made_from(protocol, library) or not manifest.complete:
+        return None
+    if not all(_is_whole(manifest.video(known.id), manifest.videos[known.id]) for known in manifest.records):
+        return None
+    frames = sum(known.frames for known in manifest.records)
+    count = len(manifest.records)
+    return RenderSummary(count, frames, frames / manifest.fps, 0, count)
 
 
 def record(stimulus_set: StimulusSet, out: str | Path) -> dict[str, dict[str, Any]]:
@@ -244,6 +277,7 @@ def _write_manifest(folder: Path, stimulus_set: StimulusSet, videos: Mapping[str
         "size": [protocol.stimuli.width, protocol.stimuli.height],
         "style": protocol.stimuli.style,
         "versions": dict(stimulus_set.versions),
+        "made_from": stimulus_set.made_from,
         "cameras": cameras,
         "pairs": [asdict(pair) for pair in stimulus_set.pairs],
         "stimuli": [{**asdict(record), "video": videos.get(record.id)} for record in stimulus_set.records],
@@ -301,4 +335,5 @@ def read_manifest(folder: str | Path) -> Manifest:
         pairs=tuple(pair_from_json(pair) for pair in data["pairs"]),
         videos=videos,
         versions=data["versions"],
+        made_from=data["made_from"],
     )

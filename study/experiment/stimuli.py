@@ -26,7 +26,7 @@ from study.experiment.one_hop_stimuli import Hop, Hops
 from study.experiment.plan import Pair
 from study.experiment.points import Settled, Supply, settle
 from study.experiment.protocol import Protocol, StudySpec
-from study.experiment.rendering import Manifest, RenderSummary, read_manifest, record, render
+from study.experiment.rendering import Manifest, RenderSummary, made_from, read_manifest, record, render
 from study.experiment.stimulus_set import MotionUse, Stimulus, StimulusRecord, StimulusSet
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
@@ -129,6 +129,7 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
         tuple({stimulus.id: stimulus for stimulus in stimuli.values()}.values()),
         tuple(_pair(pair, stimuli) for pair in pairs),
         versions(),
+        made_from(protocol, library),
     )
 
 

@@ -98,7 +98,10 @@ class Stimulus:
 
 @dataclass(frozen=True, eq=False)
 class StimulusSet:
-    """All stimuli of a protocol on one library, each once, and the pairs that are shown."""
+    """All stimuli of a protocol on one library, each once, and the pairs that are shown.
+
+    `made_from` is a hash of all that they were made from; see `rendering.made_from`.
+    """
 
     protocol: Protocol
     library: str
@@ -107,6 +110,7 @@ class StimulusSet:
     stimuli: tuple[Stimulus, ...]
     pairs: tuple[Pair, ...]
     versions: Mapping[str, str] = field(default_factory=dict)
+    made_from: str = ""
 
     @property
     def records(self) -> tuple[StimulusRecord, ...]:

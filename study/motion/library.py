@@ -92,6 +92,10 @@ class Library(ABC):
     def entry(self, name: str) -> Entry:
         """What is known of a motion; `MotionError` with the nearest valid name where there is none."""
 
+    def files(self) -> tuple[Path, ...]:
+        """The files that the motions come from; none where they are synthetic."""
+        return ()
+
     @abstractmethod
     def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
         """Read or synthesize a motion."""
@@ -187,7 +191,7 @@ class FolderLibrary(Library):
         super().__init__()
         self.name = str(folder)
         self.folder = folder
-        files = _motion_files(folder)
+        self._files = files = _motion_files(folder)
         if not files:
             raise MotionError(
                 f"Expected .bvh or .amc files in {folder} or its subfolders, found none. Put motion files there, or "
@@ -204,6 +208,9 @@ class FolderLibrary(Library):
 
     def names(self) -> tuple[str, ...]:
         return tuple(self._entries)
+
+    def files(self) -> tuple[Path, ...]:
+        return tuple(self._files)
 
     def trials(self) -> tuple[str, ...]:
         """The CMU trials that are there; each can be asked for by its number as well."""

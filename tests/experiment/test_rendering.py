@@ -16,7 +16,7 @@ from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
 from study.errors import StimulusError
 from study.experiment.protocol import load_protocol, parse_protocol
-from study.experiment.rendering import read_manifest, record, render, write_whole
+from study.experiment.rendering import read_manifest, record, render, rendered_already, write_whole
 from study.experiment.stimuli import prepare
 
 MOTIONS = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
@@ -255,3 +255,26 @@ def test_whole_files_leave_nothing_behind(tmp_path):
     assert files(tmp_path) == {"a.txt": b"two"}
     with pytest.raises(StimulusError, match="can't be written"):
         write_whole(tmp_path / "a.txt" / "b.txt", b"x")
+
+
+def test_what_is_complete_and_unchanged_needs_no_building(prepared, rendered, tmp_path):
+    folder = copied(rendered, tmp_path)
+    protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
+    done = rendered_already(protocol, library, folder)
+    assert done == replace(rendered[1], rendered=0, reused=rendered[1].videos)
+    assert rendered_already(parse_protocol(TOY_PROTOCOL + "\n# changed\n"), library, folder) is None
+    assert rendered_already(protocol, library, tmp_path / "elsewhere") is None
+
+
+def test_a_changed_motion_file_or_a_damaged_video_is_noticed(prepared, rendered, tmp_path):
+    folder = copied(rendered, tmp_path)
+    protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
+    motion = tmp_path / "walk.bvh"
+    motion.write_text("HIERARCHY", encoding="utf-8")
+    library.files = lambda: (motion,)
+    assert rendered_already(protocol, library, folder) is None
+    video = next((folder / "stimuli").glob("*.mp4"))
+    video.write_bytes(video.read_bytes()[:-1])
+    assert rendered_already(protocol, ToyLibrary(MOTIONS), folder) is None
+    assert render(prepared, folder, workers=1).rendered == 1
+    assert rendered_already(protocol, ToyLibrary(MOTIONS), folder) is not None
