@@ -257,7 +257,7 @@ def test_whole_files_leave_nothing_behind(tmp_path):
         write_whole(tmp_path / "a.txt" / "b.txt", b"x")
 
 
-def test_what_is_complete_and_unchanged_needs_no_building(prepared, rendered, tmp_path):
+def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path):
     folder = copied(rendered, tmp_path)
     protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
     done = rendered_already(protocol, library, folder)
