@@ -25,6 +25,7 @@ from study.transitions.one_hop.problem import FORBIDDEN, IntArray
 
 _ROWS = 128
 _SEGMENT = 64
+_PAIRS = 8192
 
 
 @dataclass(eq=False)
@@ -236,42 +237,43 @@ def minima_by_stay(first: Table, second: IntArray, triggers: range, weight: int,
 
     Notes
     -----
-    The hop's frames are cut into segments. The sum of the least first leg and the least second leg of a segment bounds
-    all of its sums from below, so a segment whose bound exceeds the best known cost is never added up. Equal
-    costs are kept, for the rule for ties.
+    The least first leg and the least second leg of two rows bound all of their sums from below, so a pair whose bound
+    exceeds the best known cost is never added up; and where a pair is, segments of the hop's frames are left out by
+    bounds of their own. The most promising stay of each trigger is added up first: it sets a limit that leaves out
+    most of the others. Equal costs are kept, for the rule for ties.
     """
     stays, width = second.shape
     out = np.full((len(triggers), stays), FORBIDDEN, dtype=np.int32)
     if not len(first.counts):
         return out
+    counts, limit = first.counts[:, :width], np.minimum(limit, FORBIDDEN - 1)
     starts = np.arange(0, width, _SEGMENT)
-    low_first = np.minimum.reduceat(first.counts[:, :width], starts, axis=1)
-    low_second = np.minimum.reduceat(second, starts, axis=1)
+    low_first, low_second = (np.minimum.reduceat(legs, starts, axis=1) for legs in (counts, second))
     source = np.arange(len(triggers))[:, None] + np.arange(stays) + (triggers.start - first.first_row)
-    outside = (source < 0) | (source >= len(first.counts))
+    outside = (source < 0) | (source >= len(counts))
     source[outside] = 0
     paid = (np.arange(stays) * weight).astype(np.int32)
-    limit = limit.copy()
-    bounds = low_first[source] + low_second + paid[:, None]
+    bounds = low_first.min(axis=1)[source] + (low_second.min(axis=1) + paid)
     bounds[outside] = FORBIDDEN
 
-    def add_up(trigger: NDArray[np.int64], stay: NDArray[np.int64], segment: int) -> None:
-        here = slice(segment * _SEGMENT, min((segment + 1) * _SEGMENT, width))
-        for part in range(0, len(trigger), 8192):
-            t, s = trigger[part : part + 8192], stay[part : part + 8192]
-            least = (first.counts[source[t, s], here] + second[s, here]).min(axis=1)
-            out[t, s] = np.minimum(out[t, s], least)
+    promising = bounds.argmin(axis=1)
+    trigger = np.flatnonzero(np.take_along_axis(bounds, promising[:, None], axis=1)[:, 0] <= limit)
+    stay = promising[trigger]
+    for part in range(0, len(trigger), _ROWS):
+        t, s = trigger[part : part + _ROWS], stay[part : part + _ROWS]
+        out[t, s] = (counts[source[t, s]] + second[s]).min(axis=1)
+    limit[trigger] = np.minimum(limit[trigger], out[trigger, stay] + paid[stay])
+    bounds[trigger, stay] = FORBIDDEN  # done
 
-    # The most promising segment of each trigger first: it sets a limit that leaves out most of the others.
-    flat = bounds.reshape(len(triggers), -1)
-    promising = flat.argmin(axis=1)
-    possible = np.take_along_axis(flat, promising[:, None], axis=1)[:, 0] < FORBIDDEN
-    for segment in range(len(starts)):
-        trigger = np.flatnonzero(possible & (promising % len(starts) == segment))
-        add_up(trigger, promising[trigger] // len(starts), segment)
-    np.minimum(limit, (out + paid).min(axis=1), out=limit)
-    for segment in range(len(starts)):
-        trigger, stay = np.nonzero(bounds[:, :, segment] <= np.minimum(limit, FORBIDDEN - 1)[:, None])
-        add_up(trigger, stay, segment)
-        np.minimum(limit, (out + paid).min(axis=1), out=limit)
+    triggers_left, stays_left = np.nonzero(bounds <= limit[:, None])
+    for part in range(0, len(triggers_left), _PAIRS):
+        t, s = triggers_left[part : part + _PAIRS], stays_left[part : part + _PAIRS]
+        segment_bounds = low_first[source[t, s]] + (low_second + paid[:, None])[s]
+        for segment in range(len(starts)):
+            here = slice(segment * _SEGMENT, min((segment + 1) * _SEGMENT, width))
+            chosen = np.flatnonzero(segment_bounds[:, segment] <= limit[t])
+            tc, sc = t[chosen], s[chosen]
+            least = (counts[source[tc, sc], here] + second[sc, here]).min(axis=1)
+            out[tc, sc] = np.minimum(out[tc, sc], least)
+            np.minimum.at(limit, tc, least + paid[sc])
     return out
