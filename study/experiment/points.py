@@ -3,22 +3,25 @@
 Motions of a library and a protocol's conditions come in; two clips, a start frame, an end frame and the blend length
 of each method go out. Points are drawn at random, "to make the study independent of a particular transition metric"
 (2004 section 4.3), and kept where the lengths that follow meet the conditions. A cyclic motion that is too short is
-extended by whole cycles; points are always drawn within the part that the library supplied.
+extended by whole cycles; points are always drawn within the part that the library supplied. Cuts can stand where a
+metric is least instead (2003 section 4.2).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from study.errors import MotionError, StimulusError, TransitionError
 from study.experiment.plan import generator
-from study.experiment.protocol import Points, Protocol, StudySpec, TransitionSpec
+from study.experiment.protocol import OPTIMUM_CUTS, Points, Protocol, StudySpec, TransitionSpec
 from study.motion.clip import Clip, resample
 from study.transitions.blend_length import BlendLength, blend_length
+from study.transitions.candidates import APART_S, frame_costs
+from study.transitions.timewarp import WarpLength, warp_length
 
 if TYPE_CHECKING:
     from study.motion.library import Library
@@ -71,15 +74,23 @@ class Supply:
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A transition with its points and the blend length of each method."""
+    """A transition with its points and the blend length of each method; `optima` are points of methods' own."""
 
     transition: TransitionSpec
     source: Supply
     destination: Supply
     start_frame: int
     end_frame: int
-    lengths: Mapping[str, BlendLength]
+    lengths: Mapping[str, BlendLength | WarpLength]
     tried: int
+    optima: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+    def at(self, method: str) -> Settled:
+        """The same with the points of one method, where methods have their own (`optima`)."""
+        if method not in self.optima:
+            return self
+        start, end = self.optima[method]
+        return replace(self, start_frame=start, end_frame=end)
 
 
 def settle(protocol: Protocol, study: StudySpec, transition: TransitionSpec, library: Library) -> Settled:
@@ -100,6 +111,8 @@ def settle(protocol: Protocol, study: StudySpec, transition: TransitionSpec, lib
             f"transition {transition.name!r}: expected motions of one rig, found {transition.source!r} and "
             f"{transition.destination!r} with different joints; choose motions of one library and rig."
         )
+    if study.reference in OPTIMUM_CUTS:
+        return _at_optima(study, transition, source, destination)
     if points.choose == "given":
         return _given(protocol, study, transition, points, source, destination)
     return _drawn(protocol, study, transition, points, source, destination)
@@ -113,8 +126,11 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
     longest = min(points.longest_frames or search, search) + max((0, *study.differences_frames))
     if "fixed" in study.methods:
         longest = max(longest, study.fixed_frames + max((0, *study.differences_frames)))
-    if study.methods == ("cut",):
+    if all(method.startswith("cut") for method in study.methods):
         longest = search = 1
+    if "timewarp" in study.methods:
+        # A warped pose lies between two frames, of which one may be the frame before the window (2004 Eqs. 5, 6).
+        entry, longest, search = max(entry, 1), longest + 1, search + 1
     if "one-hop" in study.methods:
         # The source plays on for a stay, the destination for both stays and a second blend.
         stay = round(study.one_hop.stay_s * protocol.fps)
@@ -244,12 +260,37 @@ def _target(
     return first, min(first + enough, high)
 
 
-def lengths_at(
-    protocol: Protocol, study: StudySpec, source: Clip, destination: Clip, start: int, end: int
-) -> dict[str, BlendLength]:
-    """The blend length of each of a study's methods at two points."""
-    found: dict[str, BlendLength] = {}
+def _at_optima(study: StudySpec, transition: TransitionSpec, source: Supply, destination: Supply) -> Settled:
+    """Each method's cut where its metric is least over all frames that leave room (2003 section 4.2)."""
+    rows, columns = slice(*source.window), slice(*destination.window)
+    optima: dict[str, tuple[int, int]] = {}
     for method in study.methods:
+        costs = frame_costs(source.clip, destination.clip, OPTIMUM_CUTS[method])[rows, columns].copy()
+        if transition.source == transition.destination:
+            # From a frame to itself is no transition, nor to its neighbours.
+            own = np.arange(*source.window)[:, None] - source.first, np.arange(*destination.window) - destination.first
+            costs[np.abs(own[0] - own[1]) < APART_S * source.clip.fps] = np.inf
+        row, column = np.unravel_index(int(np.argmin(costs)), costs.shape)
+        optima[method] = (rows.start + int(row), columns.start + int(column))
+    none: dict[str, BlendLength | WarpLength] = {method: BlendLength(method, 0, 0.0, float("nan")) for method in optima}
+    return Settled(transition, source, destination, *optima[study.reference], none, 1, optima)
+
+
+def lengths_at(
+    protocol: Protocol,
+    study: StudySpec,
+    source: Clip,
+    destination: Clip,
+    start: int,
+    end: int,
+    methods: Sequence[str] | None = None,
+) -> dict[str, BlendLength | WarpLength]:
+    """The blend length of each of a study's methods (or of some) at two points."""
+    found: dict[str, BlendLength | WarpLength] = {}
+    for method in methods or study.methods:
+        if method == "timewarp":
+            found[method] = warp_length(source, destination, start, end, restrict=True)
+            continue
         if method == "cut":
             found[method] = BlendLength("cut", 0, 0.0, float("nan"))
             continue
@@ -303,7 +344,7 @@ def _given(
     return settled
 
 
-def level_lengths(study: StudySpec, lengths: Mapping[str, BlendLength]) -> list[int]:
+def level_lengths(study: StudySpec, lengths: Mapping[str, BlendLength | WarpLength]) -> list[int]:
     """All blend lengths that a study shows, in frames."""
     own = [length.blend_frames for length in lengths.values()]
     return own + [lengths[study.reference].blend_frames + d for d in study.differences_frames]
@@ -346,9 +387,13 @@ def _drawn(
     seen: list[int] = []
     for tried, draw in enumerate(rng.choice(count, size=min(count, CANDIDATES), replace=False), start=1):
         start, end = int(starts[draw // len(ends)]), int(ends[draw % len(ends)])
-        lengths = lengths_at(protocol, study, source.clip, destination.clip, start, end)
+        clips = source.clip, destination.clip
+        lengths = lengths_at(protocol, study, *clips, start, end, (study.reference,))
         seen.append(lengths[study.reference].blend_frames)
         reason = _unmet(study, points, lengths)
+        if not reason and study.comparison is not None:
+            lengths |= lengths_at(protocol, study, *clips, start, end, (study.comparison,))
+            reason = _unwarped(points, lengths)
         settled = Settled(transition, source, destination, start, end, lengths, tried)
         if not reason and _room_problem(protocol, study, settled):
             reason = "no room for the longest blend"
@@ -358,7 +403,7 @@ def _drawn(
     raise StimulusError(_none_found(study, transition, reasons, seen))
 
 
-def _unmet(study: StudySpec, points: Points, lengths: Mapping[str, BlendLength]) -> str:
+def _unmet(study: StudySpec, points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -> str:
     """The first condition that a drawn transition doesn't meet; empty where all are met."""
     length = lengths[study.reference].blend_frames
     if study.reference == "cut":
@@ -370,6 +415,15 @@ def _unmet(study: StudySpec, points: Points, lengths: Mapping[str, BlendLength])
         return f"longer than {points.longest_frames} frames"
     if points.avoid_frames is not None and abs(length - points.avoid_frames) <= (points.avoid_within_frames or 0):
         return f"within {points.avoid_within_frames or 0} frames of {points.avoid_frames}"
+    return ""
+
+
+def _unwarped(points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -> str:
+    """What a time-warped blend lacks to be accepted; empty where it lacks nothing."""
+    least = points.least_warp_frames or 0
+    for length in lengths.values():
+        if isinstance(length, WarpLength) and abs(length.source_frames - length.destination_frames) < least:
+            return f"warped by less than {least} frames"
     return ""
 
 

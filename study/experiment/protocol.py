@@ -23,9 +23,14 @@ from study.experiment.protocol_errors import KeyMismatchError, explain, full_loc
 from study.experiment.protocol_parts import Consent, FormField, Keys, Slug, Texts
 from study.experiment.protocol_parts import Part as _Part
 
-Method = Literal["fixed", "geodesic", "velocity", "cut", "one-hop"]
+Method = Literal[
+    "fixed", "geodesic", "velocity", "timewarp", "cut", "cut-lee2002", "cut-wang2003", "cut-pointcloud", "one-hop"
+]
 Task = Literal["same-different", "preference", "rating"]
 Order = Literal["both", "random", "balanced", "by-group"]
+
+OPTIMUM_CUTS = {"cut-lee2002": "lee2002", "cut-wang2003": "wang2003", "cut-pointcloud": "pointcloud"}
+"""Methods that cut where a metric is least over both motions, and the metric of each (2003 section 4.2)."""
 
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -116,6 +121,11 @@ class Points(_Part):
     avoid_frames: int | None = Field(default=None, ge=1, description="A blend length to stay away from. [frames]")
     avoid_within_frames: int | None = Field(
         default=None, ge=0, description="No optimal blend this near to `avoid_frames` is accepted. [frames]"
+    )
+    least_warp_frames: int | None = Field(
+        default=None,
+        ge=0,
+        description="A time-warped blend is accepted if its two windows differ by so much at least. [frames]",
     )
     source_within: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(
         default=None, description="Part of the source clip in which its point is drawn, as two fractions of its length."
@@ -342,13 +352,20 @@ def _check_task(study: StudySpec) -> None:
             raise KeyMismatchError(
                 f"expected no comparison in {who}: differences_frames says it; remove it", "comparison"
             )
-        if study.reference in ("cut", "one-hop"):
+        if study.reference.startswith("cut") or study.reference in ("one-hop", "timewarp"):
             raise KeyMismatchError(
-                f"expected a reference with a blend length in {who}, found {study.reference!r}; change it", "reference"
+                f"expected a reference with one blend length in {who}, found {study.reference!r}; change it",
+                "reference",
             )
     elif study.differences_frames:
         raise KeyMismatchError(
             f"expected this key in same-different studies only; remove it from {who}", "differences_frames"
+        )
+    if len({method in OPTIMUM_CUTS for method in study.methods}) > 1:
+        raise KeyMismatchError(
+            f"expected in {who} either cuts where a metric is least or methods at common points, found "
+            f"{study.reference!r} and {study.comparison!r}; change one",
+            "comparison",
         )
     if study.task == "preference" and study.comparison in (None, study.reference):
         raise KeyMismatchError(f"expected a comparison other than {study.reference!r} in {who}; name one", "comparison")
@@ -400,6 +417,11 @@ def _check_points(protocol: Protocol, study: StudySpec, transition: TransitionSp
         points = protocol.points_for(study, transition)
     except ValidationError as error:
         raise KeyMismatchError(f"contradicting conditions {who}: {error.errors()[0]['ctx']['error']}", *where) from None
+    if points.choose == "given" and study.reference in OPTIMUM_CUTS:
+        raise KeyMismatchError(
+            f"expected no given points {who}: {study.reference!r} finds its own; remove choose or change the method",
+            *where,
+        )
     if points.choose == "given":
         for end in ("source", "destination"):
             given = [key for key in (f"{end}_s", f"{end}_frame") if getattr(points, key) is not None]

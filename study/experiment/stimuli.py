@@ -30,8 +30,10 @@ from study.experiment.rendering import Manifest, RenderSummary, made_from, read_
 from study.experiment.stimulus_set import MotionUse, Stimulus, StimulusRecord, StimulusSet
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
+from study.transitions.blend_length import BlendLength
 from study.transitions.blending import Transition, blend, cut, facing
 from study.transitions.footskate import plant_feet
+from study.transitions.timewarp import WarpLength, warped_blend
 
 if TYPE_CHECKING:
     from renderer.camera import Camera
@@ -70,6 +72,7 @@ class _Key:
     added: tuple[int, int]
     hop: Hop | None = None
     frames_on: int = 0
+    windows: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,16 +182,19 @@ def _draft_pairs(
     """The pairs of one transition in one study; the stimuli that they need are added to `drafts`."""
 
     def need(method: str, difference: int = 0) -> _Key:
-        frames = settled.lengths[method].blend_frames + difference
+        own_points, length = settled.at(method), settled.lengths[method]
+        frames = length.blend_frames + difference
         added = (settled.source.added_before, settled.destination.added_before)
         hop = hops.find(study, settled) if HOP_METHOD in study.methods else None
         # What stands beside a one-hop transition is shown for as long as that one takes.
         on = 0 if hop is None or method == HOP_METHOD else max(hop.frames - frames, 0)
         own = hop if method == HOP_METHOD else None
-        key = _Key(settled.transition.name, settled.start_frame, settled.end_frame, frames, added, own, on)
+        windows = _warped(length)
+        points = own_points.start_frame, own_points.end_frame
+        key = _Key(settled.transition.name, *points, frames, added, own, on, windows)
         if key not in drafts:
             made = None if own is None else hops.transition(study, settled)
-            drafts[key] = _draft(protocol, settled, method, difference, frames, made, on)
+            drafts[key] = _draft(protocol, own_points, method, difference, frames, made, on, windows)
         return key
 
     if study.task == "same-different":
@@ -211,9 +217,10 @@ def _draft(
     blend_frames: int,
     by_hop: Transition | None,
     frames_on: int,
+    windows: tuple[int, int] | None,
 ) -> _Draft:
     """Blend, cut to entry and exit, clean the feet, and place at the origin with the common heading."""
-    made = by_hop or _transition(protocol, settled, blend_frames)
+    made = by_hop or _transition(protocol, settled, blend_frames, windows)
     if protocol.stimuli.clean_feet and blend_frames and by_hop is None:
         # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
         made, _ = plant_feet(made, settled.source.clip, settled.destination.clip)
@@ -234,10 +241,22 @@ def _draft(
     )
 
 
-def _transition(protocol: Protocol, settled: Settled, blend_frames: int) -> Transition:
+def _warped(length: BlendLength | WarpLength) -> tuple[int, int] | None:
+    """The frames of source and destination in a time-warped blend; None where they are as many."""
+    if isinstance(length, WarpLength) and length.source_frames != length.destination_frames:
+        return length.source_frames, length.destination_frames
+    return None
+
+
+def _transition(
+    protocol: Protocol, settled: Settled, blend_frames: int, windows: tuple[int, int] | None = None
+) -> Transition:
     source, destination = settled.source.clip, settled.destination.clip
     if blend_frames == 0:
         return cut(source, destination, settled.start_frame, settled.end_frame)
+    if windows is not None:
+        points = settled.start_frame, settled.end_frame
+        return warped_blend(source, destination, *points, *windows, weight=protocol.stimuli.weight)
     return blend(
         source,
         destination,

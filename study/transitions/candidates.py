@@ -18,8 +18,8 @@ from study.transitions.point_cloud import point_cloud, window_distances
 
 METRICS = ("lee2002", "wang2003", "pointcloud")
 
-# Candidates of one kind and metric are at least so far apart, seconds.
-_APART_S = 0.4
+# Candidates of one kind and metric are at least so far apart, and so are frames of one clip that a cut joins; seconds.
+APART_S = 0.4
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,9 @@ def candidates(
     rows, columns = _shown(source, margin_s, after=False), _shown(destination, margin_s, after=True)
     found: dict[tuple[int, int], str] = {}
     for metric in METRICS:
-        costs = _costs(source, destination, metric)[rows.start : rows.stop, columns.start : columns.stop]
+        costs = frame_costs(source, destination, metric)[rows.start : rows.stop, columns.start : columns.stop]
         for kind, count, order in (("best", best, costs), ("worst", worst, -costs)):
-            for row, column in _least_apart(order, count, round(_APART_S * source.fps)):
+            for row, column in _least_apart(order, count, round(APART_S * source.fps)):
                 key = (rows.start + row, columns.start + column)
                 found[key] = f"{found[key]}, {kind} {metric}" if key in found else f"{kind} {metric}"
     for _ in range(at_random):
@@ -84,8 +84,12 @@ def _shown(clip: Clip, margin_s: float, *, after: bool) -> range:
     return range(1, clip.frames - margin) if after else range(margin, clip.frames - 1)
 
 
-def _costs(source: Clip, destination: Clip, metric: str) -> NDArray[np.floating]:
-    """The metric between all frames; of a clip with itself, nothing near the diagonal."""
+def frame_costs(source: Clip, destination: Clip, metric: str) -> NDArray[np.floating]:
+    """What a metric of `METRICS` says of a cut between all frames of two clips, `(frames, frames)`.
+
+    Of a clip with itself, frames within 0.4 s of each other have the median: they are no transition. So have frames
+    without a whole window around them, for the point cloud.
+    """
     costs: NDArray[np.floating]
     if metric == "pointcloud":
         costs = _centred_windows(source, destination)
@@ -94,7 +98,7 @@ def _costs(source: Clip, destination: Clip, metric: str) -> NDArray[np.floating]
     if source is destination:
         # Frames next to each other are no transition: neither best nor worst.
         frames = np.arange(source.frames)
-        near = np.abs(frames[:, None] - frames) < _APART_S * source.fps
+        near = np.abs(frames[:, None] - frames) < APART_S * source.fps
         costs[near] = np.median(costs)
     return costs
 
