@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -24,3 +27,28 @@ def mocap() -> Path:
     if not (MOCAP / "cmu_bvh").is_dir():
         unavailable("real motion capture", f"expected it in {MOCAP}, or in the folder that SEGUE_MOCAP names")
     return MOCAP
+
+
+@pytest.fixture(scope="session")
+def virtual_display() -> Iterator[str]:
+    """A virtual X display of 800 x 600 pixels, started for these tests; its name, for DISPLAY."""
+    for program, package in (("Xvfb", "xvfb"), ("xdotool", "xdotool")):
+        if shutil.which(program) is None:
+            unavailable(program, f"install it (Debian, Ubuntu: apt install {package})")
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
+        pass_fds=(write,),
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    with os.fdopen(read) as told:
+        number = told.readline().strip()  # written once it takes connections
+    if not number:
+        server.wait()
+        pytest.fail(f"Xvfb ended at once, with status {server.returncode}")
+    try:
+        yield f":{number}"
+    finally:
+        server.terminate()
+        server.wait()

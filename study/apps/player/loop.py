@@ -440,9 +440,9 @@ class _Player:
         self.store.answer(answer, self._presentations(step) if first_item else ())
         self._answers += 1
         self._faulty += not shown_well
-        done, total = sitting.progress(self.session)
-        again = "" if shown_well else " (shown badly: " + ", ".join(self._reasons()) + ")"
-        self._say(f"trial {step.trial}{' ' + step.item if step.item else ''}: answer stored, {done} of {total}{again}")
+        which = f"trial {step.trial}" + (f" {step.item}" if step.item else "")
+        badly = "" if shown_well else f"; shown badly: {', '.join(self._reasons())}"
+        self._say(f"{which}, showing {step.attempt}: answer stored{badly}")
 
     def _reasons(self) -> list[str]:
         reasons = [*self._faults, *(fault for showing in self._showings for fault in showing.faults)]

@@ -1,0 +1,264 @@
+"""`segue play` in a real window on a virtual display, with keys and clicks from xdotool; killed and taken up again."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study.experiment.plan import draw_plan, trial_table
+from study.experiment.responses import answers_frame, find_session, has_event, open_responses, stored_answers
+
+ROOT = Path(__file__).parents[3]
+STORED = re.compile(r"trial (\d+)(?: (\S+))?, showing (\d+): answer stored")
+
+
+class Playing:
+    """A `segue play` process, and what it has said so far."""
+
+    def __init__(self, display: str, *arguments: object) -> None:
+        self.env = {**os.environ, "DISPLAY": display}
+        self.env.pop("WAYLAND_DISPLAY", None)
+        code = "from study.apps.cli import main; main()"
+        command = [sys.executable, "-c", code, "play", *map(str, arguments)]
+        self.process = subprocess.Popen(
+            command, cwd=ROOT, env=self.env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        self.said: list[str] = []
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            self.said.append(line.rstrip())
+
+    @property
+    def stored(self) -> list[tuple[int, str, int]]:
+        """Answers that it said were stored: trial, item, showing."""
+        found = [STORED.match(line) for line in self.said]
+        return [(int(m[1]), m[2] or "", int(m[3])) for m in found if m]
+
+    @property
+    def running(self) -> bool:
+        return self.process.poll() is None
+
+    def until(self, done: Any, seconds: float = 60.0) -> None:
+        """Wait for something; fails with what was said where it does not come."""
+        end = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < end, "\n".join(["it never came; said:", *self.said])
+            assert self.running, "\n".join(["it ended; said:", *self.said])
+            time.sleep(0.02)
+
+    def opened(self) -> None:
+        self.until(lambda: any(line.startswith("display:") for line in self.said))
+
+    def do(self, *words: object) -> None:
+        subprocess.run(["xdotool", *map(str, words)], env=self.env, check=True, capture_output=True)
+
+    def press_all(self, keys: tuple[str, ...], seconds: float) -> None:
+        """Press keys over and over until it ends or the time is over; those that answer nothing do nothing."""
+        end = time.monotonic() + seconds
+        while self.running and time.monotonic() < end:
+            self.do("key", "--delay", 15, *keys)
+            time.sleep(0.03)
+
+    def ended(self) -> str:
+        """Its standard output, once it has ended."""
+        out = self.process.stdout.read() if self.process.stdout else ""
+        self.process.wait(30)
+        self._reader.join(30)
+        return out
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.ended()
+
+
+@pytest.fixture
+def protocol_file(tmp_path: Path, texts: Any) -> Path:
+    file = tmp_path / "small.toml"
+    file.write_text(texts["small"] + texts["rating"])
+    return file
+
+
+def test_a_session_from_start_to_end(
+    virtual_display: str, protocol_file: Path, tmp_path: Path, make_small: Any, texts: Any
+) -> None:
+    out = tmp_path / "results"
+    playing = Playing(virtual_display, protocol_file, "--participant", "p1", "--out", out, "--json")
+    playing.opened()
+    playing.press_all(("space", "s", "7", "Left", "Return"), 120)
+    result = json.loads(playing.ended())
+    assert playing.process.returncode == 0, playing.said
+    assert result["end"] == "finished"
+    assert result["window"]["full_screen"]
+    assert result["window"]["viewport"] == [800, 600]
+    assert not result["window"]["timing_measured"]
+    assert any("TIMING WAS NOT MEASURED" in line for line in playing.said)
+    small = make_small(texts["rating"])
+    with open_responses(out) as responses:
+        record = find_session(responses, "p1")
+        assert record is not None
+        assert not record.simulated
+        assert has_event(responses, record, "finished")
+        # The same seed gives the same trial table as a simulation's plan.
+        assert trial_table(record.plan) == trial_table(draw_plan(small.protocol, small.stimuli.pairs, "p1"))
+        table = answers_frame(responses, all_attempts=True)
+        given = Counter((row.trial, row.item) for row in table.itertuples() if row.attempt == 1)
+        assert given == Counter(
+            (trial.trial, item)
+            for trial in record.plan.trials
+            for item in (("natural", "smooth") if trial.task == "rating" else ("",))
+        )
+        assert set(table.answer[table.task == "same-different"]) <= {"same", "different", None}
+        assert (table.response_s.dropna() > 0).all()
+
+
+def test_simulation_and_window_have_the_same_trials(make_small: Any, tmp_path: Path) -> None:
+    from study.experiment.observers import simulate
+
+    small = make_small()
+    with open_responses(tmp_path / "simulated.sqlite") as responses:
+        simulate(small.protocol, small.stimuli, responses, 1)
+        simulated = find_session(responses, "sim-001")
+    with open_responses(tmp_path / "played.sqlite") as responses:
+        from study.apps.play_commands import the_plan
+
+        played = the_plan(responses, small.protocol, small.stimuli, "sim-001", None, 0)
+    assert simulated is not None
+    assert trial_table(simulated.plan) == trial_table(played)
+
+
+def test_clicks_answer_and_closing_asks_first(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "results"
+    arguments = (protocol_file, "--participant", "p1", "--out", out, "--windowed", "--size", "640x480")
+    playing = Playing(virtual_display, *arguments, "--json")
+    playing.opened()
+    window = subprocess.run(
+        ["xdotool", "search", "--onlyvisible", "--name", "A small study"],
+        env=playing.env, check=True, capture_output=True, text=True,
+    ).stdout.split()[0]  # fmt: skip
+    end = time.monotonic() + 60
+    while not playing.stored and time.monotonic() < end:
+        # The middle of the page: the only button of a page to read; then the left one of two.
+        for x, y in ((320, 250), (240, 255), (320, 262)):
+            playing.do("mousemove", "--window", window, x, y, "click", 1)
+            time.sleep(0.04)
+    assert playing.stored, playing.said
+    playing.do("key", "Escape")
+    time.sleep(0.5)
+    assert playing.running
+    playing.do("key", "space")
+    time.sleep(0.3)
+    assert playing.running
+    for _ in range(40):
+        if playing.running:
+            playing.do("key", "--delay", 300, "Escape", "x")
+    assert json.loads(playing.ended())["end"] == "stopped"
+    assert playing.process.returncode == 0
+
+
+def look(display: str) -> np.ndarray:
+    """What is on the display, through xwd where it is installed and the window's own pixels elsewhere."""
+    from PIL import ImageGrab
+
+    return np.asarray(ImageGrab.grab(xdisplay=display).convert("RGB"))
+
+
+def test_something_is_on_the_screen(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
+    playing = Playing(virtual_display, protocol_file, "--participant", "p1", "--out", tmp_path / "results")
+    playing.opened()
+    time.sleep(0.5)
+    picture = look(virtual_display)
+    ground = np.array([222, 223, 225])
+    assert (picture[5, 5] == ground).all()
+    ink = (np.abs(picture.astype(int) - ground).sum(axis=2) > 300).mean()
+    assert 0.001 < ink < 0.05  # a line of text and a button
+    playing.kill()
+
+
+def check_against(stored: set[tuple[int, str, int]], out: Path, participant: str) -> int:
+    """Every answer that was acknowledged is in the database, none twice; returns how many there are."""
+    with open_responses(out) as responses:
+        record = find_session(responses, participant)
+        answers = stored_answers(responses, record.id) if record is not None else ()
+    there = Counter((answer.trial, answer.item, answer.attempt) for answer in answers)
+    assert not {key: count for key, count in there.items() if count > 1}
+    assert stored <= set(there), f"lost: {sorted(stored - set(there))}"
+    return len(there)
+
+
+def kill_again_and_again(times: int, display: str, protocol: Path, out: Path, seed: int = 4) -> tuple[int, int]:
+    """Kill sessions at random moments; returns how many kills there were and how many sessions were finished."""
+    rng = np.random.default_rng(seed)
+    kills = finished = 0
+    stored: set[tuple[int, str, int]] = set()
+    before = 0
+    while kills < times:
+        participant = f"p{finished}"
+        playing = Playing(display, protocol, "--participant", participant, "--out", out)
+        # From the start of Python to the middle of the session.
+        if rng.random() < 0.2:
+            time.sleep(float(rng.uniform(0.0, 2.0)))
+        else:
+            playing.opened()
+            playing.press_all(("space", "s", "7"), float(rng.uniform(0.0, 4.0)))
+        done = not playing.running
+        playing.kill()
+        kills += not done
+        stored |= set(playing.stored)
+        there = check_against(stored, out, participant)
+        assert there >= before, "answers were lost"
+        before = there
+        if done:
+            assert playing.process.returncode == 0, playing.said
+            finished, stored, before = finished + 1, set(), 0
+    # What is left is finished: the session resumes where it stopped.
+    playing = Playing(display, protocol, "--participant", f"p{finished}", "--out", out)
+    playing.opened()
+    playing.press_all(("space", "s", "7"), 120)
+    playing.ended()
+    assert playing.process.returncode == 0, playing.said
+    again = set(playing.stored) & stored
+    assert not again, f"asked again: {again}"
+    check_against(stored | set(playing.stored), out, f"p{finished}")
+    with open_responses(out) as responses:
+        record = find_session(responses, f"p{finished}")
+        assert record is not None
+        assert has_event(responses, record, "finished")
+    return kills, finished + 1
+
+
+def test_a_killed_session_loses_nothing_and_goes_on(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
+    kills, _ = kill_again_and_again(3, virtual_display, protocol_file, tmp_path / "results")
+    assert kills == 3
+
+
+@pytest.mark.slow
+def test_two_hundred_kills(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
+    kills, finished = kill_again_and_again(200, virtual_display, protocol_file, tmp_path / "results", seed=5)
+    assert kills == 200
+    assert finished > 1
+
+
+def test_without_a_display_it_says_what_to_do(protocol_file: Path, tmp_path: Path) -> None:
+    playing = Playing("", protocol_file, "--participant", "p1", "--out", tmp_path / "results")
+    playing.ended()
+    assert playing.process.returncode == 2
+    assert len(playing.said) == 1
+    assert playing.said[0].startswith("segue: Expected a display to open a window on, found none that works")
+    assert "segue serve" in playing.said[0]
+    assert not (tmp_path / "results").exists()
