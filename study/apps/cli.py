@@ -34,6 +34,7 @@ VERBS = {
     "check": "study_commands:check",
     "render": "study_commands:render",
     "play": "play_commands:play",
+    "serve": "serve_commands:serve",
     "simulate": "study_commands:simulate",
     "analyse": "study_commands:analyse",
     "report": "study_commands:report",

@@ -16,8 +16,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-import sqlalchemy as sa
-
 from study.apps.server import views
 from study.apps.server.messages import Answered, Begin, Done, Happened, Shown
 from study.apps.server.writer import Writer
@@ -353,9 +351,3 @@ class Host:
         recent, self.recent = self.recent, set()
         if recent:
             await asyncio.to_thread(people.seen, self.responses, recent)
-
-
-def healthy(responses: Responses) -> bool:
-    """Whether the database answers."""
-    with responses.engine.connect() as connection:
-        return connection.execute(sa.text("SELECT 1")).scalar_one() == 1

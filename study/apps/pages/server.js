@@ -1,0 +1,118 @@
+// Talking to the server: one message at a time, kept until it is acknowledged.
+// What must not get lost waits in sessionStorage, so it survives a reload; it is sent again until the server has it.
+
+import { sleep, status } from "./dom.js";
+
+const KEPT = "segue-kept";
+const FIRST_WAIT_MS = 400;
+const LONGEST_WAIT_MS = 4000;
+const TIMEOUT_MS = 15000;
+
+export const page = Array.from(crypto.getRandomValues(new Uint8Array(16)), (n) => n.toString(16).padStart(2, "0")).join("");
+
+export class Refused extends Error {
+  constructor(code, message) {
+    super(message);
+    this.code = code;
+  }
+}
+
+function storage(action) {
+  try {
+    return action(window.sessionStorage);
+  } catch {
+    return null; // switched off: the message is kept in memory alone
+  }
+}
+
+async function post(path, body) {
+  const response = await fetch(path, {
+    method: "POST",
+    headers: { "content-type": "application/json", "x-segue-page": page },
+    body: JSON.stringify(body),
+    signal: AbortSignal.timeout(TIMEOUT_MS),
+  });
+  const content = await response.json();
+  if (response.ok) return content;
+  throw new Refused(response.status, content.error ?? "");
+}
+
+// Sends until the server has it: through restarts, lost networks and closed lids.
+async function insist(path, body, waitingText) {
+  let waited = 0;
+  for (let wait = FIRST_WAIT_MS; ; wait = Math.min(wait * 1.6, LONGEST_WAIT_MS)) {
+    try {
+      const content = await post(path, body);
+      if (waited > 0) status("");
+      return { content, waited };
+    } catch (error) {
+      if (error instanceof Refused && error.code < 500) throw error;
+    }
+    waited += 1;
+    if (waited >= 2) status(waitingText, true);
+    await Promise.race([sleep(wait), new Promise((resolve) => window.addEventListener("online", resolve, { once: true }))]);
+  }
+}
+
+export async function send(path, body, waitingText) {
+  storage((kept) => kept.setItem(KEPT, JSON.stringify({ path, body })));
+  const { content, waited } = await insist(path, body, waitingText);
+  storage((kept) => kept.removeItem(KEPT));
+  if (waited > 0) tell("waited", { times: waited });
+  return content;
+}
+
+export async function begin(body, waitingText) {
+  const previous = storage((kept) => kept.getItem("segue-page")) ?? "";
+  const { content } = await insist("/api/begin", { ...body, page, previous }, waitingText);
+  if (content.kind !== "elsewhere") storage((kept) => kept.setItem("segue-page", page));
+  return content;
+}
+
+// What an earlier page of this tab could not send any more; null where there is nothing.
+export async function sendKept(waitingText) {
+  const kept = storage((store) => JSON.parse(store.getItem(KEPT)));
+  if (!kept) return null;
+  let content = null;
+  try {
+    ({ content } = await insist(kept.path, kept.body, waitingText));
+  } catch (error) {
+    if (!(error instanceof Refused)) throw error; // the session went on without it
+  }
+  storage((store) => store.removeItem(KEPT));
+  return content;
+}
+
+export const hasKept = () => storage((kept) => kept.getItem(KEPT)) !== null;
+
+// Tells of something that happened; lost where the server can't be reached, and nothing waits for it.
+export function tell(kind, detail = {}) {
+  post("/api/happened", { kind, detail }).catch(() => {});
+}
+
+export function keepAlive(whenTaken) {
+  const every = setInterval(async () => {
+    try {
+      await post("/api/alive", {});
+    } catch (error) {
+      if (error instanceof Refused && error.code === 409) {
+        clearInterval(every);
+        whenTaken();
+      }
+    }
+  }, 10000);
+  window.addEventListener("pagehide", () => navigator.sendBeacon("/api/leave", page));
+}
+
+export async function study() {
+  for (;;) {
+    try {
+      const response = await fetch("/api/study", { signal: AbortSignal.timeout(TIMEOUT_MS) });
+      if (response.ok) return await response.json();
+    } catch {
+      // not there yet
+    }
+    status("Connecting …");
+    await sleep(1000);
+  }
+}

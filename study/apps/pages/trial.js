@@ -1,0 +1,195 @@
+// A trial: films, gap, question, as the server's view says. Resolves with the message that is the answer.
+
+import { ask, element, heading, show, sleep, status } from "./dom.js";
+import { FilmFault, load, loadAhead, play, release } from "./film.js";
+import { tell } from "./server.js";
+
+const MOST_RESTARTS = 3;
+
+// Whether anybody looks: a trial that was hidden or left for a while is shown, but flagged.
+const watch = { hidden: false };
+
+export function watchFocus() {
+  document.addEventListener("visibilitychange", () => {
+    watch.hidden ||= document.hidden;
+    tell(document.hidden ? "focus-lost" : "focus-back", { how: "visibility", at_ms: performance.now() });
+  });
+  window.addEventListener("blur", () => tell("focus-lost", { how: "blur", at_ms: performance.now() }));
+  window.addEventListener("focus", () => tell("focus-back", { how: "focus", at_ms: performance.now() }));
+  let timer = 0;
+  window.addEventListener("resize", () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => tell("resized", { width: window.innerWidth, height: window.innerHeight }), 500);
+  });
+}
+
+function visible() {
+  if (!document.hidden) return Promise.resolve();
+  return new Promise((resolve) => {
+    const look = () => {
+      if (document.hidden) return;
+      document.removeEventListener("visibilitychange", look);
+      resolve();
+    };
+    document.addEventListener("visibilitychange", look);
+  });
+}
+
+export function stage(study) {
+  const [width, height] = study.size;
+  const room = [Math.min(window.innerWidth - 16, width * 1.5), Math.max(160, window.innerHeight - 150)];
+  // Never larger than the film is, but for very small ones: what is seen is what was rendered.
+  const scale = Math.min(1, room[0] / width, room[1] / height);
+  const made = element("div", { class: "stage", "data-focus": true, tabindex: "-1" });
+  made.style.width = `${Math.floor(width * scale)}px`;
+  made.style.height = `${Math.floor(height * scale)}px`;
+  return made;
+}
+
+async function loadAll(view, study, onFault) {
+  const place = stage(study);
+  place.setAttribute("aria-label", study.texts.wait);
+  show([place], { trial: true });
+  const timer = setTimeout(() => status(study.texts.wait), 600);
+  const videos = [];
+  try {
+    for (const film of view.films) {
+      const video = await load(film, view.fps, (why, attempt) => onFault(film, why, attempt));
+      place.append(video);
+      videos.push(video);
+    }
+  } catch (error) {
+    videos.forEach(release);
+    throw error;
+  } finally {
+    clearTimeout(timer);
+    status("");
+  }
+  return { place, videos };
+}
+
+async function showFilms(view, study, pauseOver, onFault) {
+  const { place, videos } = await loadAll(view, study, onFault);
+  await pauseOver;
+  await visible();
+  const shown = [];
+  let last = performance.now();
+  try {
+    for (const [index, film] of view.films.entries()) {
+      if (index > 0) await sleep(view.gap_s * 1000);
+      videos[index].classList.add("now");
+      const { last: lastFrame, ...how } = await play(videos[index], film, view.fps);
+      videos[index].classList.remove("now");
+      last = lastFrame;
+      shown.push({ place: film.place, ...how });
+    }
+  } finally {
+    videos.forEach(release);
+    place.remove();
+  }
+  return { shown, last };
+}
+
+export function options(question, study, chosen) {
+  const row = element("div", { class: "buttons centre", role: "group", "aria-label": question.text || question.item });
+  for (const option of question.options) {
+    const hint = option.key && option.key !== option.label ? study.texts.press.replace("{key}", option.key.toUpperCase()) : "";
+    const words = [element("span", {}, option.label), hint ? element("small", {}, hint) : null].filter(Boolean);
+    const button = element("button", {
+      type: "button",
+      class: question.scale ? "answer point" : "answer",
+      "data-value": option.value,
+      "aria-keyshortcuts": option.key || null,
+      onclick: (event) => chosen(option.value, event.timeStamp),
+    });
+    button.append(...words);
+    row.append(button);
+  }
+  return row;
+}
+
+// Asks; resolves with the value (null where the window closed first) and the time of the key or button.
+function question(asked, study) {
+  return new Promise((resolve) => {
+    const controller = new AbortController();
+    const keys = new Map(asked.options.filter((option) => option.key).map((option) => [option.key, option.value]));
+    let timer = 0;
+    const finish = (value, at) => {
+      if (controller.signal.aborted) return;
+      controller.abort();
+      clearTimeout(timer);
+      for (const button of document.querySelectorAll("button.answer")) {
+        button.disabled = true;
+        button.setAttribute("aria-pressed", String(button.dataset.value === value));
+      }
+      resolve({ value, at });
+    };
+    const row = options(asked, study, finish);
+    const ends = asked.low || asked.high ? element("div", { class: "ends" }, element("span", {}, asked.low), element("span", {}, asked.high)) : null;
+    show([heading(asked.text, { class: "question" }), row, ends].filter(Boolean), { trial: true });
+    document.addEventListener(
+      "keydown",
+      (event) => {
+        if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+        const value = keys.get(event.key.toLowerCase());
+        if (value === undefined) return;
+        event.preventDefault();
+        finish(value, event.timeStamp);
+      },
+      { signal: controller.signal },
+    );
+    if (asked.window_s !== null) timer = setTimeout(() => finish(null, performance.now()), asked.window_s * 1000);
+  });
+}
+
+// Films that can't be shown: try again, or go on without. Nothing hangs, and the fault is on record.
+async function filmFault(study) {
+  const { texts } = study;
+  return ask([heading(texts.film_fault)], [
+    { label: texts.try_again, value: "again" },
+    { label: texts.pass_over, value: "skip", quiet: true },
+  ]);
+}
+
+// `earlier` is how the films of this trial were shown, where this view asks a further question about them.
+export async function trial(view, study, pauseOver, earlier) {
+  const base = { trial: view.trial, attempt: view.attempt, item: view.question.item };
+  const onFault = (film, why, attempt) => tell("fault", { what: why, trial: view.trial, place: film.place, try: attempt });
+  watch.hidden = document.hidden;
+  let films = earlier;
+  for (let restarts = 0; view.films.length > 0; ) {
+    try {
+      films = await showFilms(view, study, pauseOver, onFault);
+      break;
+    } catch (error) {
+      if (!(error instanceof FilmFault)) throw error;
+      tell("fault", { what: error.why, trial: view.trial, hidden: document.hidden ? 1 : 0 });
+      restarts += 1;
+      // A closed lid stops films: they start again when somebody looks.
+      if (watch.hidden && restarts < MOST_RESTARTS) {
+        await visible();
+        watch.hidden = false;
+        continue;
+      }
+      if ((await filmFault(study)) === "skip") {
+        return { message: { ...base, value: null, response_s: null, shown_well: false, shown: [] }, films: null };
+      }
+      watch.hidden = document.hidden;
+    }
+  }
+  loadAhead(view.ahead);
+  const asked = performance.now();
+  const { value, at } = await question(view.question, study);
+  const well = !watch.hidden && (films?.shown ?? []).every((one) => one.shown_well);
+  // The last film's last frame is when the participant has seen everything; a further question begins with itself.
+  const from = view.films.length > 0 ? films.last : asked;
+  const message = {
+    ...base,
+    value,
+    response_s: value === null ? null : Math.max(0, (at - from) / 1000),
+    shown_well: well,
+    shown: view.films.length > 0 ? films.shown : [],
+    timing: { last_frame_ms: from, answer_ms: at, time_origin_ms: performance.timeOrigin },
+  };
+  return { message, films };
+}

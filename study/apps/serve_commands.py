@@ -1,0 +1,75 @@
+"""The verb `serve`: sessions in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from study.apps.console import library_option, say
+from study.apps.study_commands import OUT, WORKERS, load, prepare_stimuli, render_stimuli, results_folder
+
+
+@click.command()
+@click.argument("protocol")
+@library_option
+@OUT
+@WORKERS
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0 for all.")
+@click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="0 for any free one.")
+@click.option("--participants", type=click.IntRange(min=1), help="No more than so many; drop-outs are given back.")
+@click.option(
+    "--groups", type=click.IntRange(min=1), help="Groups to fill evenly; what the protocol needs unless given."
+)
+@click.option("--parameter", "parameters", multiple=True, metavar="NAME", help="Keep this parameter of the link, too.")
+@click.option("--completion-code", default="", help="Shown at the end.")
+@click.option("--completion-url", default="", metavar="URL", help="Where the last button leads.")
+@click.option(
+    "--researcher-token", envvar="SEGUE_RESEARCHER_TOKEN", help="Made up unless given; 16 characters or more."
+)
+@click.option("--behind-proxy", is_flag=True, help="Believe the proxy on this machine about https and addresses.")
+def serve(
+    protocol: str,
+    library: str | None,
+    out: Path | None,
+    workers: int | None,
+    host: str,
+    port: int,
+    participants: int | None,
+    groups: int | None,
+    parameters: tuple[str, ...],
+    completion_code: str,
+    completion_url: str,
+    researcher_token: str | None,
+    behind_proxy: bool,
+) -> None:
+    """Sessions in the browser. What is not rendered yet is rendered first; ends with Ctrl-C, and goes on from there."""
+    from study.apps.server.hosting import Settings
+    from study.apps.server.running import run
+    from study.experiment.participants import new_token
+
+    checked = load(protocol)
+    folder = results_folder(checked, out)
+    if researcher_token is not None and len(researcher_token) < 16:
+        raise click.UsageError(
+            f"expected a researcher's token of 16 characters or more, found {len(researcher_token)}."
+        )
+    if completion_url and not completion_url.startswith(("https://", "http://")):
+        raise click.UsageError(f"expected a completion URL that starts with https://, found {completion_url!r}.")
+    render_stimuli(prepare_stimuli(checked, library), folder, workers)
+    settings = Settings(
+        researcher_token=researcher_token or new_token(),
+        most_participants=participants,
+        groups=groups,
+        completion_code=completion_code,
+        completion_url=completion_url,
+        parameters=(*Settings.parameters, *parameters),
+    )
+
+    def started(address: str) -> None:
+        say(f"participants  {address}/")
+        say(f"researcher    {address}/researcher#{settings.researcher_token}")
+        say(f"answers       {folder / 'responses.sqlite'}")
+        say("Ctrl-C ends it; the same command goes on from there.")
+
+    run(checked, folder, settings, host=host, port=port, behind_proxy=behind_proxy, started=started)

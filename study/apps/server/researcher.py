@@ -1,0 +1,151 @@
+"""The researcher's routes, behind a token: who is where, answers so far, drop-outs, faults, downloads."""
+
+from __future__ import annotations
+
+import asyncio
+import csv
+import io
+import json
+import secrets
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from study.apps.server.hosting import Host
+from study.experiment import participants as people
+from study.experiment import session as flow
+from study.experiment.observers import questions
+from study.experiment.response_tables import events, form_values, participants, presentations, sessions, withdrawals
+from study.experiment.responses import all_sessions, answers_frame
+
+Handler = Callable[[Request], Awaitable[Response]]
+
+LATEST_FAULTS = 50
+
+
+def researcher_routes(host: Host, guarded: Callable[[Handler], Handler]) -> list[Route]:
+    """The routes; each asks for the token first."""
+
+    def behind_token(handler: Handler) -> Handler:
+        async def run(request: Request) -> Response:
+            given = request.headers.get("authorization", "").removeprefix("Bearer ")
+            if not secrets.compare_digest(given.encode(), host.settings.researcher_token.encode()):
+                return JSONResponse({"error": "Expected the researcher's token."}, status_code=401)
+            return await handler(request)
+
+        return guarded(run)
+
+    async def overview(_: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(_overview, host))
+
+    async def table(request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in TABLES:
+            return JSONResponse({"error": f"Expected one of {', '.join(TABLES)}."}, status_code=404)
+        content = await asyncio.to_thread(TABLES[name], host)
+        headers = {"content-disposition": f'attachment; filename="{host.protocol.name}-{name}.csv"'}
+        return Response(content, media_type="text/csv; charset=utf-8", headers=headers)
+
+    return [
+        Route("/api/researcher/overview", behind_token(overview), methods=["GET"]),
+        Route("/api/researcher/{name:str}.csv", behind_token(table), methods=["GET"]),
+    ]
+
+
+def _overview(host: Host) -> dict[str, Any]:
+    now = datetime.now(UTC)
+    rows = people.overview(host.responses)
+    live = {sitting.record.id: sitting for sitting in host.sittings.values()}
+    totals = {record.id: questions(host.protocol, record.plan) for record in all_sessions(host.responses)}
+    listed = [_listed(host, row, live.get(row["id"]), totals.get(row["id"], 0), now) for row in rows]
+    states = [row["state"] for row in listed]
+    with host.responses.engine.connect() as connection:
+        withdrawn = connection.execute(sa.select(sa.func.count()).select_from(withdrawals)).scalar_one()
+        query = (
+            sa.select(events.c.at, sessions.c.participant, events.c.detail_json)
+            .join(sessions, sessions.c.id == events.c.session_id)
+            .where(events.c.kind == "fault")
+        )
+        found = connection.execute(query.order_by(events.c.id.desc()).limit(LATEST_FAULTS)).all()
+    return {
+        "title": host.protocol.title,
+        "protocol_sha256": host.protocol.sha256,
+        "counts": {state: states.count(state) for state in ("at it", "finished", "dropped out", "declined")},
+        "withdrawn": withdrawn,
+        "most_participants": host.settings.most_participants,
+        "groups": people.filled_groups(host.responses, host.groups, dropped_after=host.settings.dropped_after),
+        "sessions": listed,
+        "faults": [{"at": row[0].isoformat(), "participant": row[1], "detail": row[2]} for row in found],
+        "tables": list(TABLES),
+    }
+
+
+def _listed(host: Host, row: Mapping[str, Any], sitting: Any, total: int, now: datetime) -> dict[str, Any]:
+    happened = row["events"]
+    if "finished" in happened:
+        state = "finished"
+    elif "declined" in happened:
+        state = "declined"
+    elif now - row["seen_at"] > host.settings.dropped_after and sitting is None:
+        state = "dropped out"
+    else:
+        state = "at it"
+    return {
+        "participant": row["participant"],
+        "group": row["group_number"],
+        "parameters": json.loads(row["parameters_json"]),
+        "state": state,
+        "step": flow.current(sitting.state).kind if sitting is not None else "",
+        "answers": row["answers"],
+        "questions": total,
+        "began_at": row["began_at"].isoformat(timespec="seconds"),
+        "seen_at": row["seen_at"].isoformat(timespec="seconds"),
+        "faults": happened.get("fault", 0),
+        "focus_losses": happened.get("focus-lost", 0),
+    }
+
+
+def csv_safe(value: Any) -> Any:
+    """A cell that no spreadsheet runs: text that begins like a formula gets an apostrophe."""
+    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r"):
+        return f"'{value}"
+    return value
+
+
+def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows([csv_safe(cell) for cell in row] for row in rows)
+    return text.getvalue()
+
+
+def _answers(host: Host) -> str:
+    table = answers_frame(host.responses, all_attempts=True, roles=("trial", "practice", "check"))
+    return str(table.to_csv(index=False))
+
+
+def _joined(host: Host, table: sa.Table, *columns: sa.Column[Any]) -> str:
+    query = sa.select(sessions.c.participant, *columns).join(table, table.c.session_id == sessions.c.id)
+    with host.responses.engine.connect() as connection:
+        rows = connection.execute(query.order_by(sessions.c.id)).all()
+    cells = [[cell.isoformat() if isinstance(cell, datetime) else cell for cell in row] for row in rows]
+    return _csv(["participant", *(column.name for column in columns)], cells)
+
+
+TABLES: dict[str, Callable[[Host], str]] = {
+    "answers": _answers,
+    "form": lambda host: _joined(host, form_values, form_values.c.name, form_values.c.value, form_values.c.at),
+    "presentations": lambda host: _joined(
+        host, presentations, *(c for c in presentations.c if c.name not in ("id", "session_id", "detail_json"))
+    ),
+    "events": lambda host: _joined(host, events, events.c.kind, events.c.at, events.c.detail_json),
+    "participants": lambda host: _joined(
+        host, participants, participants.c.group_number, participants.c.parameters_json, participants.c.began_at
+    ),
+}

@@ -1,0 +1,69 @@
+"""Running: the application on a port, with uvicorn, until it is stopped."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import uvicorn
+
+from study.apps.server.hosting import Host, Settings
+from study.apps.server.web import make_app
+from study.errors import SessionError
+from study.experiment.protocol import Protocol
+from study.experiment.rendering import read_manifest
+from study.experiment.responses import open_responses
+
+
+def run(
+    protocol: Protocol,
+    folder: Path,
+    settings: Settings,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    behind_proxy: bool = False,
+    started: Callable[[str], object] | None = None,
+) -> None:
+    """Serve a results folder until the process is told to end; answers under way are committed first.
+
+    Raises
+    ------
+    SessionError
+        Where the address can't be listened at.
+    """
+    manifest = read_manifest(folder)
+    listening = _listen(host, port)
+    name = f"[{host}]" if ":" in host else host
+    with open_responses(folder) as responses:
+        app = make_app(Host(protocol, manifest, responses, settings))
+        config = uvicorn.Config(
+            app,
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            proxy_headers=behind_proxy,
+            timeout_keep_alive=75,
+            timeout_graceful_shutdown=5,
+            backlog=2048,
+        )
+        if started:
+            started(f"http://{name}:{listening.getsockname()[1]}")
+        uvicorn.Server(config).run(sockets=[listening])
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+    except OSError as error:
+        listening.close()
+        raise SessionError(
+            f"Expected to listen at {host}, port {port}, found that it can't be done ({error.strerror}); "
+            "choose another port."
+        ) from error
+    listening.listen(2048)
+    return listening

@@ -1,0 +1,181 @@
+"""A small client of Chromium's DevTools protocol: enough to open tabs, press keys, click, read pages, take pictures."""
+
+from __future__ import annotations
+
+import base64
+import json
+import subprocess
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+FLAGS = (
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", "--no-first-run", "--mute-audio",
+    "--disable-dev-shm-usage", "--disable-extensions", "--disable-background-networking", "--disable-sync",
+    "--disable-component-update", "--no-default-browser-check", "--hide-scrollbars",
+    # Several tabs share a test machine's cores: none of them may be slowed down for being in the back.
+    "--disable-background-timer-throttling", "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows",
+)  # fmt: skip
+
+KEYS = {"Enter": 13, " ": 32, "Tab": 9}
+
+
+class Tab:
+    """One tab; calls wait for their answers."""
+
+    def __init__(self, browser: Browser, target: str, context: str) -> None:
+        self.browser, self.target, self.context = browser, target, context
+        self.socket: ClientConnection = connect(
+            f"ws://127.0.0.1:{browser.port}/devtools/page/{target}", max_size=None, ping_interval=None, open_timeout=30
+        )
+        self.number = 0
+        self.events: list[dict[str, Any]] = []
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, timeout: float = 30, **params: Any) -> dict[str, Any]:
+        self.number += 1
+        self.socket.send(json.dumps({"id": self.number, "method": method, "params": params}))
+        end = time.monotonic() + timeout
+        while True:
+            message = json.loads(self.socket.recv(timeout=max(0.1, end - time.monotonic())))
+            if message.get("id") == self.number:
+                assert "error" not in message, f"{method}: {message['error']}"
+                return message["result"]
+            if "method" in message:
+                self.events.append(message)
+
+    def open(self, address: str) -> None:
+        self.call("Page.navigate", url=address)
+
+    def reload(self) -> None:
+        self.call("Page.reload")
+
+    def run(self, script: str) -> Any:
+        """The value of an expression in the page; promises are waited for."""
+        answer = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def text(self) -> str:
+        return self.run("document.body ? document.body.innerText : ''") or ""
+
+    def wait(self, script: str, timeout: float = 30, every: float = 0.05) -> Any:
+        """Wait until an expression is true."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            try:
+                if value := self.run(script):
+                    return value
+            except AssertionError:
+                pass  # between two documents
+            time.sleep(every)
+        raise AssertionError(f"waited {timeout} s in vain for {script}; the page says: {self.text()!r}")
+
+    def wait_text(self, text: str, timeout: float = 30) -> None:
+        self.wait(f"document.body && document.body.innerText.includes({json.dumps(text)})", timeout)
+
+    def click(self, text: str) -> None:
+        """A real click, at the middle of the button or link with a text."""
+        where = self.wait(
+            "(() => { const b = [...document.querySelectorAll('button, a')].find("
+            f"(b) => !b.disabled && b.innerText.includes({json.dumps(text)}));"
+            "if (!b) return null; const r = b.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; })()"
+        )
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=where[0], y=where[1], button="left", clickCount=1)
+
+    def key(self, key: str, timestamp: float | None = None) -> None:
+        more = {} if timestamp is None else {"timestamp": timestamp}
+        text = "\r" if key == "Enter" else key if len(key) == 1 else ""
+        code = KEYS.get(key, ord(key.upper()[0]))
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, text=text, windowsVirtualKeyCode=code, **more)
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=code)
+
+    def picture(self, path: Path) -> None:
+        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+
+    def size(self, width: int, height: int) -> None:
+        self.call(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
+        )
+
+    def complaints(self) -> list[str]:
+        """What the page threw or the browser refused."""
+        found = []
+        for event in self.events:
+            if event["method"] == "Runtime.exceptionThrown":
+                details = event["params"]["exceptionDetails"]
+                found.append(details.get("exception", {}).get("description") or details["text"])
+            if event["method"] == "Log.entryAdded" and event["params"]["entry"]["level"] == "error":
+                entry = event["params"]["entry"]
+                if entry["source"] != "network":
+                    found.append(entry["text"])
+        return found
+
+    def close(self) -> None:
+        self.socket.close()
+        self.browser.http(f"/json/close/{self.target}")
+
+
+class Browser:
+    """A running Chromium."""
+
+    def __init__(self, process: subprocess.Popen[bytes], port: int, path: str) -> None:
+        self.process, self.port = process, port
+        self.socket = connect(f"ws://127.0.0.1:{port}{path}", max_size=None, ping_interval=None)
+        self.number = 0
+
+    def call(self, method: str, **params: Any) -> dict[str, Any]:
+        self.number += 1
+        self.socket.send(json.dumps({"id": self.number, "method": method, "params": params}))
+        while True:
+            message = json.loads(self.socket.recv(timeout=30))
+            if message.get("id") == self.number:
+                assert "error" not in message, message
+                return message["result"]
+
+    def http(self, path: str) -> bytes:
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.port}{path}", timeout=30) as response:
+            return response.read()
+
+    def person(self) -> str:
+        """A fresh set of cookies and storage, as another participant has."""
+        return self.call("Target.createBrowserContext")["browserContextId"]
+
+    def tab(self, person: str | None = None) -> Tab:
+        """A tab of a person (a new one unless given)."""
+        person = person or self.person()
+        target = self.call("Target.createTarget", url="about:blank", browserContextId=person, width=1280, height=720)
+        return Tab(self, target["targetId"], person)
+
+
+@contextmanager
+def chromium(executable: str, profile: Path) -> Iterator[Browser]:
+    process = subprocess.Popen(
+        [executable, *FLAGS, f"--user-data-dir={profile}", "about:blank"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        file = profile / "DevToolsActivePort"
+        end = time.monotonic() + 60
+        while not (file.is_file() and file.read_text().count("\n")):
+            assert process.poll() is None, "Chromium ended at once"
+            assert time.monotonic() < end, "Chromium did not start within a minute"
+            time.sleep(0.05)
+        port, path = file.read_text().split("\n")[:2]
+        browser = Browser(process, int(port), path)
+        yield browser
+        browser.socket.close()
+    finally:
+        process.terminate()
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
