@@ -32,11 +32,11 @@ class GivenCosts:
         self.costs = costs
 
     def prepare(self, clip: Clip, blend_frames: int) -> int:
-        assert blend_frames > 0
+        del blend_frames
         return int(clip.name)
 
     def counts(self, a: Any, b: Any, blend_frames: int, rows: range, columns: range) -> np.ndarray:
-        assert self.costs[a, b].shape[0] == 0 or blend_frames > 0
+        del blend_frames
         return self.costs[a, b][rows.start : rows.stop, columns.start : columns.stop].copy()
 
 
