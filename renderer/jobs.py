@@ -161,7 +161,11 @@ class _Teller:
 
 def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[VideoInfo]:
     # Spawned, not forked: a GL library that has run in this process does not survive a fork.
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
+    try:
+        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
+    except OSError:
+        # No semaphores here (/dev/shm is missing or not ours to write, as in some containers): one process does it all.
+        return [tell(run_job(job)) for job in jobs]
     done: dict[int, VideoInfo] = {}
     # The longest first, so that no worker is left with a long one at the end.
     order = sorted(range(len(jobs)), key=lambda i: -len(jobs[i].positions))

@@ -159,3 +159,15 @@ def test_workers_that_all_fail_are_not_waited_for(tmp_path: Path) -> None:
     assert "RendererError" in ended.stderr
     assert "nosuch" in ended.stderr
     assert not list(tmp_path.glob("*.mp4"))
+
+
+def test_where_no_pool_can_be_made_one_process_does_it_all(
+    tmp_path: Path, puppet: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("renderer.jobs.ProcessPoolExecutor", refuse)
+    made = render_many(jobs_in(tmp_path, puppet, count=2), 2)
+    assert [video.path.name for video in made] == ["0.mp4", "1.mp4"]
+    assert all(video.path.is_file() for video in made)
