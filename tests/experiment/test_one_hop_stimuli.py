@@ -101,7 +101,7 @@ def test_refusals(library: Library) -> None:
     wrong = TEXT.replace('comparison = "fixed"', "differences_frames = [0, 5]").replace(
         '"preference"', '"same-different"'
     )
-    with pytest.raises(ProtocolError, match=r"reference with a blend length .* found 'one-hop'"):
+    with pytest.raises(ProtocolError, match=r"reference with one blend length .* found 'one-hop'"):
         parse_protocol(wrong)
     with pytest.raises(ProtocolError, match="hopps"):
         parse_protocol(TEXT.replace("conditions = 5", 'hopps = ["dance"]'))
