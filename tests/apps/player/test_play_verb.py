@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -77,14 +78,35 @@ class Playing:
 
     def ended(self) -> str:
         """Its standard output, once it has ended."""
-        out = self.process.stdout.read() if self.process.stdout else ""
+        assert self.process.stdout is not None
+        assert self.process.stderr is not None
+        out = "" if self.process.stdout.closed else self.process.stdout.read()
         self.process.wait(30)
         self._reader.join(30)
+        self.process.stdout.close()
+        self.process.stderr.close()
         return out
 
     def kill(self) -> None:
         self.process.send_signal(signal.SIGKILL)
         self.ended()
+
+
+Start = Callable[..., Playing]
+
+
+@pytest.fixture
+def start(virtual_display: str) -> Iterator[Start]:
+    """`start(arguments ...)`: a `segue play` on the virtual display, which never outlives its test."""
+    started: list[Playing] = []
+
+    def begin(*arguments: object, display: str = virtual_display) -> Playing:
+        started.append(Playing(display, *arguments))
+        return started[-1]
+
+    yield begin
+    for playing in started:
+        playing.kill()
 
 
 @pytest.fixture
@@ -95,10 +117,10 @@ def protocol_file(tmp_path: Path, texts: Any) -> Path:
 
 
 def test_a_session_from_start_to_end(
-    virtual_display: str, protocol_file: Path, tmp_path: Path, make_small: Any, texts: Any
+    start: Start, protocol_file: Path, tmp_path: Path, make_small: Any, texts: Any
 ) -> None:
     out = tmp_path / "results"
-    playing = Playing(virtual_display, protocol_file, "--participant", "p1", "--out", out, "--json")
+    playing = start(protocol_file, "--participant", "p1", "--out", out, "--json")
     playing.opened()
     playing.press_all(("space", "s", "7", "Left", "Return"), 120)
     result = json.loads(playing.ended())
@@ -142,10 +164,10 @@ def test_simulation_and_window_have_the_same_trials(make_small: Any, tmp_path: P
     assert trial_table(simulated.plan) == trial_table(played)
 
 
-def test_clicks_answer_and_closing_asks_first(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
+def test_clicks_answer_and_closing_asks_first(start: Start, protocol_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "results"
     arguments = (protocol_file, "--participant", "p1", "--out", out, "--windowed", "--size", "640x480")
-    playing = Playing(virtual_display, *arguments, "--json")
+    playing = start(*arguments, "--json")
     playing.opened()
     window = subprocess.run(
         ["xdotool", "search", "--onlyvisible", "--name", "A small study"],
@@ -172,14 +194,14 @@ def test_clicks_answer_and_closing_asks_first(virtual_display: str, protocol_fil
 
 
 def look(display: str) -> np.ndarray:
-    """What is on the display, through xwd where it is installed and the window's own pixels elsewhere."""
+    """What is on the display, `(height, width, 3)`."""
     from PIL import ImageGrab
 
     return np.asarray(ImageGrab.grab(xdisplay=display).convert("RGB"))
 
 
-def test_something_is_on_the_screen(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
-    playing = Playing(virtual_display, protocol_file, "--participant", "p1", "--out", tmp_path / "results")
+def test_something_is_on_the_screen(start: Start, virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
+    playing = start(protocol_file, "--participant", "p1", "--out", tmp_path / "results")
     playing.opened()
     time.sleep(0.5)
     picture = look(virtual_display)
@@ -201,7 +223,7 @@ def check_against(stored: set[tuple[int, str, int]], out: Path, participant: str
     return len(there)
 
 
-def kill_again_and_again(times: int, display: str, protocol: Path, out: Path, seed: int = 4) -> tuple[int, int]:
+def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, seed: int = 4) -> tuple[int, int]:
     """Kill sessions at random moments; returns how many kills there were and how many sessions were finished."""
     rng = np.random.default_rng(seed)
     kills = finished = 0
@@ -209,7 +231,7 @@ def kill_again_and_again(times: int, display: str, protocol: Path, out: Path, se
     before = 0
     while kills < times:
         participant = f"p{finished}"
-        playing = Playing(display, protocol, "--participant", participant, "--out", out)
+        playing = start(protocol, "--participant", participant, "--out", out)
         # From the start of Python to the middle of the session.
         if rng.random() < 0.2:
             time.sleep(float(rng.uniform(0.0, 2.0)))
@@ -227,7 +249,7 @@ def kill_again_and_again(times: int, display: str, protocol: Path, out: Path, se
             assert playing.process.returncode == 0, playing.said
             finished, stored, before = finished + 1, set(), 0
     # What is left is finished: the session resumes where it stopped.
-    playing = Playing(display, protocol, "--participant", f"p{finished}", "--out", out)
+    playing = start(protocol, "--participant", f"p{finished}", "--out", out)
     playing.opened()
     playing.press_all(("space", "s", "7"), 120)
     playing.ended()
@@ -242,20 +264,20 @@ def kill_again_and_again(times: int, display: str, protocol: Path, out: Path, se
     return kills, finished + 1
 
 
-def test_a_killed_session_loses_nothing_and_goes_on(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
-    kills, _ = kill_again_and_again(3, virtual_display, protocol_file, tmp_path / "results")
+def test_a_killed_session_loses_nothing_and_goes_on(start: Start, protocol_file: Path, tmp_path: Path) -> None:
+    kills, _ = kill_again_and_again(3, start, protocol_file, tmp_path / "results")
     assert kills == 3
 
 
 @pytest.mark.slow
-def test_two_hundred_kills(virtual_display: str, protocol_file: Path, tmp_path: Path) -> None:
-    kills, finished = kill_again_and_again(200, virtual_display, protocol_file, tmp_path / "results", seed=5)
+def test_two_hundred_kills(start: Start, protocol_file: Path, tmp_path: Path) -> None:
+    kills, finished = kill_again_and_again(200, start, protocol_file, tmp_path / "results", seed=5)
     assert kills == 200
     assert finished > 1
 
 
-def test_without_a_display_it_says_what_to_do(protocol_file: Path, tmp_path: Path) -> None:
-    playing = Playing("", protocol_file, "--participant", "p1", "--out", tmp_path / "results")
+def test_without_a_display_it_says_what_to_do(start: Start, protocol_file: Path, tmp_path: Path) -> None:
+    playing = start(protocol_file, "--participant", "p1", "--out", tmp_path / "results", display="")
     playing.ended()
     assert playing.process.returncode == 2
     assert len(playing.said) == 1
