@@ -175,8 +175,10 @@ export function play(video, film, fps) {
       if (!hasFrameCallback) {
         return { method: "ended", frames_presented: null, longest_gap_frames: null, shown_well: true, times_ms: [], frames: [], last: endedAt };
       }
-      const presented = counted ? counted.last - counted.first + 1 : 0;
-      const whole = frames[frames.length - 1] >= film.frames - 1 && presented >= film.frames - 1;
+      // The first frame stood there before the film started, and then is not presented once more.
+      const stood = frames.length > 0 && frames[0] > 0 ? 1 : 0;
+      const presented = counted ? counted.last - counted.first + 1 + stood : stood;
+      const whole = frames[frames.length - 1] >= film.frames - 1 && presented >= film.frames;
       return {
         method: "requestVideoFrameCallback",
         frames_presented: presented,

@@ -7,6 +7,7 @@ import * as screens from "./screens.js";
 import { Refused, begin, hasKept, keepAlive, send, sendKept, study as getStudy } from "./server.js";
 import { trial, watchFocus } from "./trial.js";
 
+const WITH_PROGRESS = ["trial", "feedback"];
 const LAST = ["done", "declined", "full", "taken", "elsewhere"];
 
 async function display() {
@@ -68,7 +69,7 @@ async function run(study) {
   let view = await enter(study);
   keepAlive(() => window.location.reload());
   while (!LAST.includes(view.kind)) {
-    top(view.label ?? "", screens.progress(view, study));
+    top(view.label ?? "", WITH_PROGRESS.includes(view.kind) ? screens.progress(view, study) : "");
     try {
       view = await act(view, study, state);
     } catch (error) {

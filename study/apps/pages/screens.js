@@ -2,10 +2,11 @@
 
 import { ask, element, heading, paragraph, show, status, top } from "./dom.js";
 import { load, play, release } from "./film.js";
-import { stage } from "./trial.js";
+import { matchBackground, stage } from "./trial.js";
 
 function texts(view, study) {
-  const [first, ...rest] = view.text.split(/\n\s*\n/);
+  // As in most plain text: an empty line parts paragraphs, a single line break is only where a line was full.
+  const [first, ...rest] = view.text.split(/\n\s*\n/).map((part) => part.replace(/\s+/g, " ").trim());
   const long = first.length > 90 || rest.length === 0;
   return long ? [heading(study.title), ...[first, ...rest].map(paragraph)] : [heading(first), ...rest.map(paragraph)];
 }
@@ -92,6 +93,7 @@ async function example(view, study) {
     video = await load(view.example, view.fps);
     status("");
     place.append(video);
+    matchBackground(place, video);
     video.classList.add("now");
     await play(video, view.example, view.fps);
   } catch {

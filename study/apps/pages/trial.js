@@ -46,6 +46,15 @@ export function stage(study) {
   return made;
 }
 
+// What surrounds and parts the films has their background's colour, so that nothing flashes.
+export function matchBackground(place, video) {
+  const canvas = element("canvas", { width: 1, height: 1 });
+  const context = canvas.getContext("2d");
+  context.drawImage(video, 0, 0, 1, 1, 0, 0, 1, 1);
+  const [red, green, blue] = context.getImageData(0, 0, 1, 1).data;
+  place.style.backgroundColor = `rgb(${red}, ${green}, ${blue})`;
+}
+
 async function loadAll(view, study, onFault) {
   const place = stage(study);
   place.setAttribute("aria-label", study.texts.wait);
@@ -70,6 +79,7 @@ async function loadAll(view, study, onFault) {
 
 async function showFilms(view, study, pauseOver, onFault) {
   const { place, videos } = await loadAll(view, study, onFault);
+  matchBackground(place, videos[0]);
   await pauseOver;
   await visible();
   const shown = [];
