@@ -36,13 +36,17 @@ FREEDOM_S = 1.0
 
 @dataclass(frozen=True)
 class Needs:
-    """Frames around a point: `before` it, and `after` (the point itself counted), with the least that will do."""
+    """Frames around a point: `before` it, and `after` (the point itself counted), with the least that will do.
+
+    With `whole`, a synthetic motion is made as long as it is by itself, so that the best point can be looked for in it.
+    """
 
     before: int
     after: int
     least_before: int
     least_after: int
     words: str
+    whole: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +141,10 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
         longest = max(longest, study.fixed_frames) if len(study.methods) > 1 else study.fixed_frames
         longest, after_exit = longest + stay, after_exit + 2 * stay + study.fixed_frames
     room = max(longest, search)
-    blend = f"blends of up to {longest} frames"
+    blend, whole = f"blends of up to {longest} frames", study.reference in OPTIMUM_CUTS
     return (
-        Needs(entry, room, entry, longest, f"{entry} frames of entry and {blend}"),
-        Needs(room - 1, after_exit + 1, longest - 1, after_exit + 1, f"{blend} and {after_exit} frames of exit"),
+        Needs(entry, room, entry, longest, f"{entry} frames of entry and {blend}", whole),
+        Needs(room - 1, after_exit + 1, longest - 1, after_exit + 1, f"{blend} and {after_exit} frames of exit", whole),
     )
 
 
@@ -150,7 +154,8 @@ def _supply(
     """A motion of the library, extended where it is too short and cyclic."""
     freedom = round(FREEDOM_S * protocol.fps)
     # Captured motions come as they are, so that what is added to them is known.
-    seconds = (needs.before + needs.after + 4 * freedom) / protocol.fps if library.synthetic else None
+    made = library.synthetic and not needs.whole
+    seconds = (needs.before + needs.after + 4 * freedom) / protocol.fps if made else None
     try:
         clip = library.clip(name, fps=protocol.fps, min_seconds=seconds)
         entry = library.entry(name)
@@ -272,6 +277,13 @@ def _at_optima(study: StudySpec, transition: TransitionSpec, source: Supply, des
             costs[np.abs(own[0] - own[1]) < APART_S * source.clip.fps] = np.inf
         row, column = np.unravel_index(int(np.argmin(costs)), costs.shape)
         optima[method] = (rows.start + int(row), columns.start + int(column))
+    if len(set(optima.values())) < len(optima):
+        start, end = optima[study.reference]
+        raise StimulusError(
+            f"transition {transition.name!r}: expected {' and '.join(optima)} to cut at different points, found both "
+            f"from frame {start} to {end}, so that the stimuli would be the same; choose other motions, or another "
+            "part of them with source_within and destination_within."
+        )
     none: dict[str, BlendLength | WarpLength] = {method: BlendLength(method, 0, 0.0, float("nan")) for method in optima}
     return Settled(transition, source, destination, *optima[study.reference], none, 1, optima)
 
