@@ -136,7 +136,7 @@ function question(asked, study) {
     };
     const row = options(asked, study, finish);
     const ends = asked.low || asked.high ? element("div", { class: "ends" }, element("span", {}, asked.low), element("span", {}, asked.high)) : null;
-    show([heading(asked.text, { class: "question" }), row, ends].filter(Boolean), { trial: true });
+    show([heading(asked.text, { class: "question" }), element("div", { class: "scale" }, row, ends)], { trial: true });
     document.addEventListener(
       "keydown",
       (event) => {
