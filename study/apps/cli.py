@@ -39,6 +39,7 @@ VERBS = {
     "analyse": "study_commands:analyse",
     "report": "study_commands:report",
     "export": "study_commands:export",
+    "fit": "analysis_commands:fit",
     "doctor": "doctor_command:doctor",
 }
 

@@ -1,0 +1,135 @@
+"""Psychometric functions of a whole study: trials of several participants in, every estimate side by side out.
+
+Each participant's own function, the function of all answers taken as one person's, and what is to be believed of the
+group, since answers of one participant are not independent of each other.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.analysis import estimates
+from study.analysis.psychometric import Estimate, Model, PsychometricFit, curve_of, fit_psychometric, make_model
+from study.analysis.psychometric_likelihood import fit_likelihood
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+
+
+def analyse_psychometric(
+    trials: pd.DataFrame, model: Model | None = None, *, confidence: float = 0.95, simulations: int = 0
+) -> dict[str, Any]:
+    """Analyse one 2AFC or yes-no study.
+
+    Parameters
+    ----------
+    trials
+        Columns `participant`, `level`, `yes`, `shown`.
+    model
+        From `psychometric.make_model`; 2AFC unless given.
+    confidence
+        Of the intervals.
+    simulations
+        Data sets drawn for the p-value of the deviance of the pooled fit; 0 takes chi-square.
+
+    Returns
+    -------
+    dict
+        JSON-able: `participants` (one fit each), `pooled` (all answers as one person's), `likelihood` (maximum,
+        profile interval and deviance of the same), `group` (mean over participants of their thresholds, with Student's
+        interval), `levels` (answers by level), `answer` (a sentence).
+    """
+    chosen = model or make_model()
+    own = []
+    for name, part in trials.groupby(trials["participant"].astype(str), sort=True):
+        own.append({"participant": str(name), "answers": int(part["shown"].sum()), **_one(part, chosen, confidence)})
+    levels, yes, shown = (trials[column].to_numpy(dtype=np.float64) for column in ("level", "yes", "shown"))
+    best = fit_likelihood(levels, yes, shown, chosen, confidence=confidence, simulations=simulations)
+    pooled = _one(trials, chosen, confidence)
+    result = {
+        "participants": own,
+        "pooled": pooled,
+        "likelihood": {"note": best} if isinstance(best, str) else estimates.plain(best),
+        "group": _group(own, chosen, confidence),
+        "levels": _by_level(trials),
+    }
+    return {**dict(estimates.plain(result)), "answer": _in_words(pooled, own)}
+
+
+def _one(part: pd.DataFrame, model: Model, confidence: float) -> dict[str, Any]:
+    levels, yes, shown = (part[column].to_numpy(dtype=np.float64) for column in ("level", "yes", "shown"))
+    fit = fit_psychometric(levels, yes, shown, model, confidence=confidence)
+    if isinstance(fit, str):
+        return {"threshold": None, "note": fit}
+    return describe(fit)
+
+
+def describe(fit: PsychometricFit) -> dict[str, Any]:
+    """Return a fit as plain numbers, without the grid."""
+    parts = ("threshold", "width", "lapse", "guess", "overdispersion")
+    estimated: dict[str, Estimate] = {name: getattr(fit, name) for name in parts}
+    return {
+        **{name: estimates.plain(value) for name, value in estimated.items()},
+        "sigmoid": fit.model.sigmoid.name,
+        "curve": curve_of(fit),
+        "note": fit.note,
+    }
+
+
+def _group(own: list[dict[str, Any]], model: Model, confidence: float) -> dict[str, Any]:
+    """The mean over participants of their own thresholds; of the logarithms for Weibull."""
+    found = [row["threshold"]["value"] for row in own if row["threshold"] and row["threshold"]["value"] is not None]
+    left_out = len(own) - len(found)
+    axis = model.sigmoid.axis(np.array(found)) if found else np.zeros(0)
+    test = estimates.mean_test(axis, 0.0, confidence)
+
+    def back(value: float | None) -> float | None:
+        return None if value is None else float(model.sigmoid.levels(np.array(value)))
+
+    note = test.note
+    if left_out:
+        note = "; ".join(
+            filter(None, (note, f"{left_out} of {len(own)} participants have no threshold within the levels"))
+        )
+    return {
+        "participants": test.participants,
+        "mean_threshold": back(test.mean),
+        "low": back(test.interval.low),
+        "high": back(test.interval.high),
+        "standard_deviation": float(axis.std(ddof=1)) if len(axis) > 1 else None,
+        "note": note,
+    }
+
+
+def _by_level(trials: pd.DataFrame) -> list[dict[str, Any]]:
+    sums = trials.groupby("level", sort=True)[["yes", "shown"]].sum()
+    return [
+        {
+            "level": float(level),
+            "yes": float(yes),
+            "shown": float(shown),
+            "percent": 100 * yes / shown if shown else None,
+        }
+        for level, yes, shown in zip(sums.index, sums["yes"], sums["shown"], strict=True)
+    ]
+
+
+def _in_words(pooled: dict[str, Any], own: list[dict[str, Any]]) -> str:
+    if not pooled["threshold"]:
+        return f"No psychometric function can be fitted: {pooled['note']}."
+    threshold = pooled["threshold"]
+    if threshold["value"] is None:
+        return f"No threshold can be given: {threshold['note']}."
+    low, high = threshold["interval"]["low"], threshold["interval"]["high"]
+    ends = f"{'open' if low is None else format(low, '.4g')} to {'open' if high is None else format(high, '.4g')}"
+    text = f"The threshold is {threshold['value']:.4g} (95% interval {ends})"
+    if len(own) > 1:
+        return (
+            f"{text}, all answers of {len(own)} participants taken as one person's; the group's own estimates follow."
+        )
+    return f"{text}."
