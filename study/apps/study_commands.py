@@ -93,8 +93,12 @@ def analyse_results(folder: Path) -> dict[str, Any]:
 
 def headlines(analysis: dict[str, Any]) -> list[str]:
     """The answers of an analysis in sentences."""
+    from study.analysis.anova import anova_sentences
+
     sentences = [study["answer"] for study in analysis["jnd"].values()]
     sentences += [compared["answer"] for study in analysis["preference"].values() for compared in study]
+    for study in analysis["rating_anova"].values():
+        sentences += anova_sentences(study, analysis["alpha"])
     return sentences
 
 
