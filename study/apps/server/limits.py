@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -40,8 +41,11 @@ HEADERS: tuple[tuple[bytes, bytes], ...] = (
 )
 
 
-class RequestTooLargeError(Exception):
-    """A request that is longer than it says, or than is taken."""
+class RequestTooLargeError(HTTPException):
+    """A request that is longer than it says, or than is taken; inside the application it becomes status 413."""
+
+    def __init__(self, largest: int) -> None:
+        super().__init__(413, f"Expected at most {largest} bytes.")
 
 
 class Limits:
@@ -71,17 +75,17 @@ class Limits:
             message = await receive()
             taken += len(message.get("body", b""))
             if taken > self.largest:
-                raise RequestTooLargeError
+                raise RequestTooLargeError(self.largest)
             return message
 
         try:
             if _length(scope["headers"]) > self.largest:
-                raise RequestTooLargeError
+                raise RequestTooLargeError(self.largest)
             await self.app(scope, receive_limited, send_with_headers)
-        except RequestTooLargeError:
+        except RequestTooLargeError as refusal:
             if not begun:
-                refusal = JSONResponse({"error": f"Expected at most {self.largest} bytes."}, status_code=413)
-                await refusal(scope, receive, send_with_headers)
+                response = JSONResponse({"error": refusal.detail}, status_code=413)
+                await response(scope, receive, send_with_headers)
 
 
 def _joined(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:

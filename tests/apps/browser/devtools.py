@@ -19,7 +19,8 @@ FLAGS = (
     "--disable-dev-shm-usage", "--disable-extensions", "--disable-background-networking", "--disable-sync",
     "--disable-component-update", "--no-default-browser-check", "--hide-scrollbars",
     # Several tabs share a test machine's cores: none of them may be slowed down for being in the back.
-    "--disable-background-timer-throttling", "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows",
+    "--disable-background-timer-throttling", "--disable-renderer-backgrounding",
+    "--disable-backgrounding-occluded-windows",
 )  # fmt: skip
 
 KEYS = {"Enter": 13, " ": 32, "Tab": 9}
@@ -85,7 +86,8 @@ class Tab:
         where = self.wait(
             "(() => { const b = [...document.querySelectorAll('button, a')].find("
             f"(b) => !b.disabled && b.innerText.includes({json.dumps(text)}));"
-            "if (!b) return null; const r = b.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; })()"
+            "if (!b) return null; const r = b.getBoundingClientRect();"
+            "return [r.x + r.width / 2, r.y + r.height / 2]; })()"
         )
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=where[0], y=where[1], button="left", clickCount=1)
@@ -101,9 +103,7 @@ class Tab:
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
 
     def size(self, width: int, height: int) -> None:
-        self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
-        )
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def complaints(self) -> list[str]:
         """What the page threw or the browser refused."""

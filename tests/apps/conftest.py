@@ -1,0 +1,8 @@
+"""Makes the helpers of these tests importable: tests are imported by path, without packages."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent / "browser")]

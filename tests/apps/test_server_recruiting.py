@@ -1,0 +1,170 @@
+"""Recruiting, withdrawal and the researcher's page."""
+
+from __future__ import annotations
+
+import csv
+import io
+from datetime import timedelta
+
+import pytest
+from serving import TOKEN, Person, make_host, unfilmed
+from starlette.testclient import TestClient
+
+from study.apps.server.web import make_app
+from study.experiment.responses import answers_frame, open_responses, session_table
+
+
+@pytest.fixture(scope="module")
+def stimuli(tmp_path_factory):
+    return unfilmed(tmp_path_factory.mktemp("served"))
+
+
+@pytest.fixture
+def responses(tmp_path):
+    with open_responses(tmp_path) as opened:
+        yield opened
+
+
+@pytest.fixture
+def serve(stimuli, responses):
+    clients = []
+
+    class Serving:
+        def __init__(self, **settings):
+            self.client = TestClient(make_app(make_host(stimuli, responses, **settings)))
+            clients.append(self.client.__enter__())
+
+        def person(self):
+            fresh = TestClient(self.client.app)
+            fresh.portal = self.client.portal
+            return Person(fresh)
+
+        def ask(self, path, token=TOKEN):
+            return self.client.get(f"/api/researcher/{path}", headers={"authorization": f"Bearer {token}"})
+
+    yield Serving
+    for client in clients:
+        client.__exit__(None, None, None)
+
+
+LINK = {"PROLIFIC_PID": "5f1", "STUDY_ID": "s", "SESSION_ID": "9a8", "wave": "2", "unknown": "x"}
+
+
+def test_parameters_of_the_link_are_kept_and_no_others(serve):
+    serving = serve(parameters=("PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "participant", "wave"))
+    serving.person().begin(parameters=LINK)
+    kept = serving.ask("overview").json()["sessions"][0]["parameters"]
+    assert kept == {name: value for name, value in LINK.items() if name != "unknown"}
+
+
+def test_the_same_link_goes_on_and_the_same_person_begins_once(serve, responses):
+    serving = serve()
+    first = serving.person()
+    view = first.until(first.begin(parameters=LINK), "trial")
+    first.answer(view)
+    elsewhere = serving.person()
+    again = elsewhere.begin("page-two", parameters=LINK, force=True)
+    assert again["kind"] != "consent"
+    assert first.post("/api/alive", {}).status_code == 401
+    for other in ({"SESSION_ID": "guess"}, {"SESSION_ID": ""}):
+        assert serving.person().begin(parameters={**LINK, **other}) == {"kind": "taken"}
+    assert len(session_table(responses)) == 1
+
+
+def test_another_person_at_the_same_computer_is_another_participant(serve, responses):
+    person = serve().person()
+    person.until(person.begin(parameters={"participant": "p01"}), "trial")
+    assert person.begin("page-two", parameters={"participant": "p02"})["kind"] == "consent"
+    assert list(session_table(responses)["participant"]) == ["p01", "p02"]
+
+
+def test_groups_are_filled_evenly_and_drop_outs_given_back(serve):
+    serving = serve(dropped_after=timedelta(seconds=-1))
+    for _ in range(3):
+        serving.person().begin()
+    # Everybody dropped out at once: all three got the first group.
+    groups = [one["group"] for one in serving.ask("overview").json()["sessions"]]
+    assert groups == [0, 0, 0]
+    serving = serve()
+    for _ in range(4):
+        person = serving.person()
+        person.until(person.begin(), "done")
+    overview = serving.ask("overview").json()
+    assert [one["group"] for one in overview["sessions"]] == [0, 1, 1, 1, 0, 0, 0]
+    assert (overview["groups"], overview["counts"]["finished"]) == ([4, 3], 4)
+
+
+def test_no_more_than_are_wanted(serve):
+    serving = serve(most_participants=2)
+    first, second = serving.person(), serving.person()
+    first.begin()
+    consent = second.begin()
+    assert serving.person().begin() == {"kind": "full"}
+    assert first.begin()["kind"] == "consent"
+    second.done(consent, declined=True)
+    assert serving.person().begin()["kind"] == "consent"
+
+
+def test_withdrawing_deletes_and_the_server_forgets(serve, responses):
+    serving = serve()
+    person, other = serving.person(), serving.person()
+    other.until(other.begin(), "done")
+    end = person.until(person.begin(), "done")
+    code = end["withdrawal_code"]
+    stranger = serving.person()
+    assert stranger.post("/api/withdraw", {"code": "aaaa-bbbb-cccc-dddd"}).json() == {"withdrawn": False}
+    assert stranger.post("/api/withdraw", {"code": code.upper()}).json() == {"withdrawn": True}
+    assert stranger.post("/api/withdraw", {"code": code}).json() == {"withdrawn": False}
+    assert person.post("/api/alive", {}).status_code == 401
+    assert len(session_table(responses)) == 1
+    assert answers_frame(responses)["participant"].nunique() == 1
+    assert serving.ask("overview").json()["withdrawn"] == 1
+
+
+def test_the_researchers_page_needs_the_token(serve):
+    serving = serve()
+    for path in ("overview", "answers.csv", "nothing.csv"):
+        for token in ("", "guess", TOKEN[:-1]):
+            assert serving.ask(path, token).status_code == 401
+        assert serving.client.get(f"/api/researcher/{path}").status_code == 401
+    assert serving.ask("nothing.csv").status_code == 404
+
+
+def test_the_researcher_sees_who_is_where_and_takes_the_tables(serve):
+    serving = serve()
+    person, finished = serving.person(), serving.person()
+    finished.until(finished.begin(), "done")
+    view = person.until(person.begin(), "trial")
+    person.post("/api/happened", {"kind": "fault", "detail": {"what": "stalled"}})
+    person.post("/api/happened", {"kind": "focus-lost"})
+    overview = serving.ask("overview").json()
+    assert overview["counts"] == {"at it": 1, "finished": 1, "dropped out": 0, "declined": 0}
+    row = overview["sessions"][0]
+    assert (row["state"], row["step"], row["answers"], row["faults"], row["focus_losses"]) == (
+        "at it",
+        "first",
+        0,
+        1,
+        1,
+    )
+    assert overview["faults"][0]["detail"] == '{"what": "stalled"}'
+    person.answer(view)
+    answers = list(csv.DictReader(io.StringIO(serving.ask("answers.csv").text)))
+    assert len(answers) == 12
+    assert {answer["participant"] for answer in answers} == {one["participant"] for one in overview["sessions"]}
+    for table in overview["tables"]:
+        assert serving.ask(f"{table}.csv").status_code == 200
+
+
+def test_nothing_that_a_participant_typed_is_run(serve):
+    """In JSON it is text, in a spreadsheet it is text; pages set text, never markup (see the browser's tests)."""
+    serving = serve()
+    typed = '=HYPERLINK("http://x")<script>alert(1)</script>'
+    person = serving.person()
+    form = person.done(person.begin(parameters={"PROLIFIC_PID": typed}))
+    person.done(form, values={"age": "20", "remark": typed})
+    rows = list(csv.DictReader(io.StringIO(serving.ask("form.csv").text)))
+    assert [row["value"] for row in rows if row["name"] == "remark"] == ["'" + typed]
+    overview = serving.ask("overview")
+    assert overview.headers["content-type"] == "application/json"
+    assert overview.json()["sessions"][0]["parameters"]["PROLIFIC_PID"] == typed
