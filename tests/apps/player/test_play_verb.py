@@ -223,6 +223,12 @@ def check_against(stored: set[tuple[int, str, int]], out: Path, participant: str
     return len(there)
 
 
+def is_finished(out: Path, participant: str) -> bool:
+    with open_responses(out) as responses:
+        record = find_session(responses, participant)
+        return record is not None and has_event(responses, record, "finished")
+
+
 def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, seed: int = 4) -> tuple[int, int]:
     """Kill sessions at random moments; returns how many kills there were and how many sessions were finished."""
     rng = np.random.default_rng(seed)
@@ -238,15 +244,13 @@ def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, se
         else:
             playing.opened()
             playing.press_all(("space", "s", "7"), float(rng.uniform(0.0, 4.0)))
-        done = not playing.running
+        kills += playing.running
         playing.kill()
-        kills += not done
         stored |= set(playing.stored)
         there = check_against(stored, out, participant)
         assert there >= before, "answers were lost"
         before = there
-        if done:
-            assert playing.process.returncode == 0, playing.said
+        if is_finished(out, participant):
             finished, stored, before = finished + 1, set(), 0
     # What is left is finished: the session resumes where it stopped.
     playing = start(protocol, "--participant", f"p{finished}", "--out", out)
@@ -257,10 +261,7 @@ def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, se
     again = set(playing.stored) & stored
     assert not again, f"asked again: {again}"
     check_against(stored | set(playing.stored), out, f"p{finished}")
-    with open_responses(out) as responses:
-        record = find_session(responses, f"p{finished}")
-        assert record is not None
-        assert has_event(responses, record, "finished")
+    assert is_finished(out, f"p{finished}")
     return kills, finished + 1
 
 
