@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 CANDIDATES = 2000
 """So many pairs of frames are tried before a transition is refused."""
 
+WARPS = 150
+"""So many of them at most with all of their time-warped blends, which take a hundred times longer to cost."""
+
 LONGEST_BLEND_S = 2.0
 FREEDOM_S = 1.0
 """Points are drawn within a second or more of motion: a whole cycle of a gait."""
@@ -412,6 +415,8 @@ def _drawn(
         if not reason:
             return settled
         reasons[reason] = reasons.get(reason, 0) + 1
+        if reasons[reason] >= WARPS and reason.startswith("warped"):
+            break
     raise StimulusError(_none_found(study, transition, reasons, seen))
 
 

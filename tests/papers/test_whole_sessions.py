@@ -1,0 +1,130 @@
+"""The whole sitting of 2004 (section 4) and the study of 2003 (section 4.2), on both libraries, end to end."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from study.analysis.summary import analyse
+from study.experiment.observers import simulate
+from study.experiment.plan import draw_plan
+from study.experiment.protocol import find_protocol, load_protocol
+from study.experiment.responses import answers_frame, open_responses
+from study.experiment.stimuli import check, prepare
+from study.motion.library import open_library
+from study.transitions.candidates import frame_costs
+
+LIBRARIES = ["synthetic", pytest.param("cmu", marks=pytest.mark.mocap)]
+
+
+@pytest.fixture
+def library(request):
+    if request.param == "synthetic":
+        return open_library("synthetic")
+    return open_library(request.getfixturevalue("mocap") / "cmu")
+
+
+def published(name):
+    return load_protocol(find_protocol(name))
+
+
+def test_the_sitting_of_2004_is_as_printed():
+    """Sections 4.1 to 4.5: four studies in one session; the first three as their own protocols have them."""
+    session = published("wang2004_session")
+    one, two, three, four = session.studies
+    for study, alone in (
+        (one, published("blend_length_jnd")),
+        (two, published("geodesic_vs_fixed")),
+        (three, published("velocity_vs_fixed")),
+    ):
+        (own,) = alone.studies
+        for key in ("task", "reference", "comparison", "differences_frames", "fixed_frames", "order", "question"):
+            assert getattr(study, key) == getattr(own, key), key
+        assert [(t.source, t.destination, t.category) for t in session.transitions_of(study)] == [
+            (t.source, t.destination, t.category) for t in alone.transitions
+        ]
+        for transition, known in zip(session.transitions_of(study), alone.transitions, strict=True):
+            assert session.points_for(study, transition) == alone.points_for(own, known)
+    assert (four.task, four.reference, four.comparison) == ("preference", "geodesic", "timewarp")
+    assert len(session.transitions_of(four)) == 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("library", LIBRARIES, indirect=True)
+def test_the_sitting_of_2004_has_42_and_three_times_8_pairs(library, tmp_path):
+    protocol = published("wang2004_session")
+    assert check(protocol, library) == []
+    prepared = prepare(protocol, library)
+    plan = draw_plan(protocol, prepared.pairs, "p01")
+    assert list(Counter(trial.study for trial in plan.trials).values()) == [42, 8, 8, 8]
+    records = {record.id: record for record in prepared.records}
+    for pair in (pair for pair in prepared.pairs if pair.study == "geodesic_vs_timewarp"):
+        plain, warped = records[pair.a], records[pair.b]
+        assert (plain.source.frame, plain.destination.frame) == (warped.source.frame, warped.destination.frame)
+        assert 5 <= plain.blend_frames <= 35
+        (windows,) = (
+            re.findall(r"of (\d+) source and (\d+) destination", note)[0] for note in warped.notes if "warped" in note
+        )
+        lengths = [int(frames) for frames in windows]
+        assert abs(lengths[0] - lengths[1]) >= 5
+        assert warped.blend_frames == max(lengths)
+        assert warped.frames == 60 + warped.blend_frames + 60
+    with open_responses(tmp_path) as responses:
+        simulate(protocol, prepared, responses, 35, seed=2)
+        found = analyse(answers_frame(responses), resamples=50)
+    favoured = {study: rows[0]["published"]["percent"] for study, rows in found["preference"].items()}
+    # 2004 Table 2, which the simulated observers were made to give; three standard errors of 280 answers.
+    for study, percent, within in (
+        ("geodesic_vs_fixed", 96.4, 3.5),
+        ("velocity_vs_fixed", 65.7, 8.5),
+        ("geodesic_vs_timewarp", 55.7, 9.0),
+    ):
+        assert favoured[study] == pytest.approx(percent, abs=within), study
+
+
+def test_the_study_of_2003_is_as_printed():
+    """Section 4.2: two groups by order, six items on a scale from 0 to 4, original against optimised weights."""
+    protocol = published("transition_points")
+    (study,) = protocol.studies
+    assert (study.task, study.reference, study.comparison) == ("rating", "cut-lee2002", "cut-wang2003")
+    assert (study.order, study.scale_points, len(study.items)) == ("by-group", 5, 6)
+    assert (protocol.stimuli.entry_s, protocol.stimuli.exit_s, protocol.fps) == (3.0, 3.0, 30.0)
+    assert protocol.analysis.alpha == 0.05
+
+
+@pytest.mark.parametrize("library", LIBRARIES, indirect=True)
+def test_the_study_of_2003_cuts_where_each_metric_is_least(library, tmp_path):
+    """Six seconds with a cut at three; the F of the published analysis has 1 and 48 degrees of freedom."""
+    protocol = published("transition_points")
+    assert check(protocol, library) == []
+    prepared = prepare(protocol, library)
+    assert [pair.method_a for pair in prepared.pairs] == ["cut-lee2002", "cut-wang2003"]
+    points = []
+    (transition,) = protocol.transitions
+    clips = [library.clip(name, fps=30.0) for name in (transition.source, transition.destination)]
+    for pair, metric in zip(prepared.pairs, ("lee2002", "wang2003"), strict=True):
+        record = prepared.stimulus(pair.a).record
+        assert (record.frames, record.blend_start, record.blend_stop) == (180, 90, 90)
+        points.append((record.source.frame, record.destination.frame))
+        costs = frame_costs(*clips, metric)[90:, : clips[1].frames - 90]
+        assert costs[points[-1][0] - 90, points[-1][1]] == costs.min()
+    assert points[0] != points[1]
+    orders = [
+        tuple(trial.method_a for trial in draw_plan(protocol, prepared.pairs, "p", group=group).trials)
+        for group in (0, 1)
+    ]
+    assert orders == [("cut-lee2002", "cut-wang2003"), ("cut-wang2003", "cut-lee2002")]
+    with open_responses(tmp_path) as responses:
+        simulate(protocol, prepared, responses, 26, seed=3)
+        found = analyse(answers_frame(responses))["rating_anova"]["cuts"]
+    assert len(found) == 6
+    for question in found:
+        effects = question["anova"][:3]
+        assert [(row["degrees_of_freedom"], row["error_degrees_of_freedom"]) for row in effects] == [(1, 48)] * 3
+        assert question["difference"]["of"] == "cut-wang2003 minus cut-lee2002"
+    # The simulated observers prefer the optimised weights, by about as much as the paper's participants did.
+    assert np.mean([question["difference"]["mean"] for question in found]) == pytest.approx(0.7, abs=0.35)
+    assert max(question["anova"][0]["f"] for question in found) > 4.0
