@@ -335,5 +335,5 @@ def read_manifest(folder: str | Path) -> Manifest:
         pairs=tuple(pair_from_json(pair) for pair in data["pairs"]),
         videos=videos,
         versions=data["versions"],
-        made_from=data["made_from"],
+        made_from=data.get("made_from", ""),
     )
