@@ -280,7 +280,8 @@ def _tiles(
     floor_parts = ((bodies, paths), (_quarter_turned(bodies), _quarter_turned(paths)))
     heights = -2 * left.heights
     size = (min(_TILE_ROWS, len(rows)) + overhang) * (min(_TILE_COLUMNS, len(columns)) + overhang)
-    work: AnyFloat = np.empty((3, size), dtype=kind)
+    # Zeros, since what lies in the overhang is added to as well: whatever memory held could be no number at all.
+    work: AnyFloat = np.zeros((3, size), dtype=kind)
     whole_path: AnyFloat = np.zeros(size, dtype=kind)
     whole_floor: AnyFloat = np.zeros(size, dtype=kind)
     for left_column in range(0, len(columns), _TILE_COLUMNS):
