@@ -473,7 +473,9 @@ def key_name(token: int, printed: str | None) -> str:
     return chr(token).lower() if 32 < token < 127 else f"key-{token}"
 
 
-def open_window(title: str = "Segue", *, full_screen: bool = True, size: Size = (1280, 800)) -> Window:
+def open_window(
+    title: str = "Segue", *, full_screen: bool = True, size: Size = (1280, 800), monitor: int = 0
+) -> Window:
     """Open a window of OpenGL 3.3 or later.
 
     Parameters
@@ -481,9 +483,11 @@ def open_window(title: str = "Segue", *, full_screen: bool = True, size: Size = 
     title
         For the window's frame.
     full_screen
-        Take the whole primary display at its present mode; else a window that can be resized.
+        Take a whole monitor at its present mode; else a window that can be resized.
     size
         Of the window, where it is one.
+    monitor
+        Which monitor the full screen takes, counted from 0, the primary one.
 
     Raises
     ------
@@ -494,11 +498,10 @@ def open_window(title: str = "Segue", *, full_screen: bool = True, size: Size = 
     if not glfw.init():
         raise RendererError(NO_DISPLAY.format(reason=_last_error(glfw)))
     try:
-        monitor = glfw.get_primary_monitor()
-        if not monitor:
-            raise RendererError(NO_DISPLAY.format(reason="no monitor is connected"))
-        mode = glfw.get_video_mode(monitor)
-        handle = _create(glfw, title, (mode.size.width, mode.size.height) if full_screen else size, full_screen)
+        screen = _monitor(glfw, monitor)
+        mode = glfw.get_video_mode(screen)
+        full = (mode.size.width, mode.size.height)
+        handle = _create(glfw, title, full if full_screen else size, screen if full_screen else None)
         glfw.make_context_current(handle)
         glfw.swap_interval(1)
         import moderngl
@@ -508,9 +511,9 @@ def open_window(title: str = "Segue", *, full_screen: bool = True, size: Size = 
         glfw.show_window(handle)
         glfw.focus_window(handle)
         about = {
-            "display": _text(glfw.get_monitor_name(monitor)),
-            "display_mm": list(glfw.get_monitor_physical_size(monitor)),
-            "display_pixels": [mode.size.width, mode.size.height],
+            "display": _text(glfw.get_monitor_name(screen)),
+            "display_mm": list(glfw.get_monitor_physical_size(screen)),
+            "display_pixels": list(full),
         }
         return Window(handle, gl, about, float(mode.refresh_rate), full_screen)
     except BaseException:
@@ -518,15 +521,15 @@ def open_window(title: str = "Segue", *, full_screen: bool = True, size: Size = 
         raise
 
 
-def check_display() -> None:
-    """Raise `RendererError` where no window can be opened for want of a display; costs milliseconds."""
+def check_display(monitor: int = 0) -> None:
+    """Raise `RendererError` where no window can be opened for want of that monitor; costs milliseconds."""
     glfw = _load_glfw()
     if not glfw.init():
         raise RendererError(NO_DISPLAY.format(reason=_last_error(glfw)))
-    connected = bool(glfw.get_primary_monitor())
-    glfw.terminate()
-    if not connected:
-        raise RendererError(NO_DISPLAY.format(reason="no monitor is connected"))
+    try:
+        _monitor(glfw, monitor)
+    finally:
+        glfw.terminate()
 
 
 def _load_glfw() -> Any:
@@ -540,7 +543,16 @@ def _load_glfw() -> Any:
     return glfw
 
 
-def _create(glfw: Any, title: str, size: Size, full_screen: bool) -> Any:
+def _monitor(glfw: Any, number: int) -> Any:
+    monitors = glfw.get_monitors()
+    if not monitors:
+        raise RendererError(NO_DISPLAY.format(reason="no monitor is connected"))
+    if not 0 <= number < len(monitors):
+        raise RendererError(f"Expected a monitor from 0 to {len(monitors) - 1}, got {number}.")
+    return monitors[number]
+
+
+def _create(glfw: Any, title: str, size: Size, monitor: Any) -> Any:
     """A window with a context: the system's own kind, else by EGL."""
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
     glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
@@ -551,7 +563,6 @@ def _create(glfw: Any, title: str, size: Size, full_screen: bool) -> Any:
     glfw.window_hint(glfw.VISIBLE, False)
     # A full-screen window that loses the keyboard stays where it is: somebody else's click must not hide a study.
     glfw.window_hint(glfw.AUTO_ICONIFY, False)
-    monitor = glfw.get_primary_monitor() if full_screen else None
     reasons = []
     for kind in (glfw.NATIVE_CONTEXT_API, glfw.EGL_CONTEXT_API):
         glfw.window_hint(glfw.CONTEXT_CREATION_API, kind)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 @library_option
 @OUT
 @click.option("--database", metavar="URL|FILE", help="Where answers go; responses.sqlite in the results folder.")
+@click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Whose full screen it takes.")
 @click.option("--windowed", is_flag=True, help="In a window, not on the full screen.")
 @click.option("--size", default="1280x800", show_default=True, metavar="WIDTHxHEIGHT", help="Of the window.")
 @click.option("--actual-size", is_flag=True, help="Show stimuli in the protocol's pixels, not as large as fits.")
@@ -42,6 +43,7 @@ def play(
     library: str | None,
     out: Path | None,
     database: str | None,
+    monitor: int,
     windowed: bool,
     size: str,
     actual_size: bool,
@@ -58,13 +60,14 @@ def play(
 
     pixels = _size(size)
     loaded = load(protocol)
-    check_display()
+    check_display(monitor)
     stimuli = prepare_stimuli(loaded, library)
     folder = results_folder(loaded, out)
     record(stimuli, folder)
     with open_responses(database or folder) as responses:
         plan = the_plan(responses, loaded, stimuli, participant, seed, group)
-        outcome, window = _sit(responses, loaded, stimuli, plan, pixels if windowed else None, not actual_size, font)
+        place = Place(pixels if windowed else None, monitor, not actual_size, font)
+        outcome, window = _sit(responses, loaded, stimuli, plan, place)
     result = {**asdict(outcome), "participant": participant, "folder": str(folder), "window": window}
     emit(result, as_json, f"{participant}: {outcome.end}; {outcome.answers} answers stored now, in {folder}")
 
@@ -93,16 +96,20 @@ def the_plan(
     return known.plan
 
 
+@dataclass(frozen=True)
+class Place:
+    """Where a session is shown: the size of a window, or None for the full screen of a monitor; how pictures fit it."""
+
+    window_size: tuple[int, int] | None
+    monitor: int
+    fill: bool
+    font: Path | None
+
+
 def _sit(
-    responses: Responses,
-    protocol: Protocol,
-    stimuli: StimulusSet,
-    plan: Plan,
-    window_size: tuple[int, int] | None,
-    fill: bool,
-    font: Path | None,
+    responses: Responses, protocol: Protocol, stimuli: StimulusSet, plan: Plan, place: Place
 ) -> tuple[Outcome, dict[str, Any]]:
-    """Open the window and walk the session; None as size takes the full screen."""
+    """Open the window and walk the session."""
     from renderer.window import open_window
     from study.apps.player.loop import Outcome, play
     from study.apps.player.store import ResponsesStore
@@ -116,10 +123,12 @@ def _sit(
     session = open_session(protocol, plan, answers, passed=passed)
     if answers:
         say(f"{plan.participant} goes on after {len(answers)} answers.")
-    look = page_look(stimuli, font)
-    with open_window(protocol.title, full_screen=window_size is None, size=window_size or (1280, 800)) as window:
+    look, size = page_look(stimuli, place.font), place.window_size
+    with open_window(
+        protocol.title, full_screen=size is None, size=size or (1280, 800), monitor=place.monitor
+    ) as window:
         _tell_of_timing(window)
-        return play(window, session, stimuli.stimulus, store, look, fill=fill, say=say), window.describe()
+        return play(window, session, stimuli.stimulus, store, look, fill=place.fill, say=say), window.describe()
 
 
 def page_look(stimuli: StimulusSet, font: Path | None) -> Look:

@@ -205,7 +205,8 @@ def test_full_screen_takes_the_display_and_keys_arrive_with_their_times(virtual_
 ASK_TO_CLOSE = """
 import ctypes
 class Message(ctypes.Structure):
-    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("sent", ctypes.c_int), ("display", ctypes.c_void_p),
+    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("sent", ctypes.c_int),
+                ("display", ctypes.c_void_p),
                 ("window", ctypes.c_ulong), ("kind", ctypes.c_ulong), ("format", ctypes.c_int),
                 ("data", ctypes.c_long * 5), ("rest", ctypes.c_long * 24)]
 x = ctypes.CDLL("libX11.so.6")

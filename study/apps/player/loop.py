@@ -155,9 +155,11 @@ class _Player:
         self._showings: list[Showing] = []
         self._faults: list[str] = []
         self._answers = self._dropped = self._faulty = 0
+        self._size = window.size
 
     def run(self) -> Outcome:
         """Step after step."""
+        self._check_pages()
         self.store.event("display", self.window.describe())
         end = "finished"
         try:
@@ -170,6 +172,18 @@ class _Player:
         except _Stopped as stopped:
             end = stopped.end
         return Outcome(end, self._answers, self._dropped, self._faulty)
+
+    def _check_pages(self) -> None:
+        """Refuse a text that is too long for this window now, not in mid-session."""
+        read = {step.text: step for step in self.session.steps if step.text}
+        for step in read.values():
+            if step.kind == "consent":
+                page = screens.consent_page(self.protocol, step)
+            elif step.kind == "answer":
+                page = screens.answer_page(self.protocol, step, (0, 1))
+            else:
+                page = screens.reading_page(self.protocol, step, (0, 1))
+            draw_page(page, self.window.size, self.look, must_fit=True)
 
     def _do(self, step: sitting.Step) -> None:
         if step.kind == "consent":
@@ -241,6 +255,9 @@ class _Player:
         """Log what is to be logged; True where somebody wants to leave."""
         leave = False
         for event in events:
+            if isinstance(event, Resized) and event.size != self._size:
+                self._size = event.size
+                self.store.event("resized", {"viewport": list(event.size)})
             leave = leave or isinstance(event, CloseAsked) or (isinstance(event, Key) and event.name == "escape")
             if isinstance(event, Focus) and not event.focused:
                 self._fault("focus lost")

@@ -62,7 +62,7 @@ class Page:
     entry
         What was typed so far into a field; None where there is none.
     hint
-        A small line under the field.
+        Small print under the field or the question.
     chosen
         Which button the arrow keys stand on; -1 for none.
     """
@@ -138,23 +138,32 @@ def moved(page: Page, key: str) -> Page | None:
     return replace(page, chosen=(page.chosen + (1 if key == "right" else -1)) % len(page.buttons))
 
 
-def draw_page(page: Page, size: tuple[int, int], look: Look) -> DrawnPage:
+SMALLEST = (320, 240)
+"""Pages are drawn for a window of this size at least; of a smaller one they stick out."""
+
+
+def draw_page(page: Page, size: tuple[int, int], look: Look, *, must_fit: bool = False) -> DrawnPage:
     """Draw a page for a window of `size` pixels; text too long for it is set smaller, as far as it stays legible.
+
+    Parameters
+    ----------
+    must_fit
+        Refuse a text that does not fit even then, rather than cut it.
 
     Raises
     ------
     SessionError
-        Where the text does not fit even then.
+        With `must_fit`, for a text that is too long; and for a font that can't be read.
     """
     from PIL import Image, ImageDraw
 
-    width, height = size
+    width, height = size = max(size[0], SMALLEST[0]), max(size[1], SMALLEST[1])
     base = min(height / 27.0, width / 40.0)
     for shrink in (1.0, 0.9, 0.8, 0.7, 0.6, 0.5):
         sheet = _Sheet(page, size, look, base, max(base * shrink, 6.0))
         if sheet.height <= height * 0.84:
             break
-    else:
+    if must_fit and sheet.height > height * 0.84:
         words = " ".join((page.text or page.question).split()[:8])
         raise SessionError(
             f"Expected a text that fits on one page of {width} x {height} pixels, found one that is too long, "
@@ -183,6 +192,7 @@ class _Sheet:
         column = min(size[0] * 0.86, base * 33)
         self.text = _wrapped(page.text, self._font(1.0), column)
         self.question = _wrapped(page.question, self._font(1.3), column)
+        self.hint = _wrapped(page.hint, self._font(0.82), column)
         self.rows = self._button_rows(size[0] * 0.92)
         self.parts = self._parts()
         self.height = sum(high for _, high in self.parts) + self._gaps()
@@ -199,7 +209,7 @@ class _Sheet:
         if self.page.entry is not None:
             parts.append(("entry", 2.4 * em))
         if self.page.hint:
-            parts.append(("hint", 1.2 * em))
+            parts.append(("hint", 1.25 * em * len(self.hint)))
         if self.rows:
             row = self._button_height() + 0.8 * em
             parts.append(("buttons", row * len(self.rows) - 0.8 * em))
@@ -218,20 +228,22 @@ class _Sheet:
         return self.em * (3.4 if any(button.key_words for button in self.page.buttons) else 2.4)
 
     def _button_width(self, button: Button) -> float:
-        least = 2.6 if self._scale else 7.0
+        least, margin = (2.6, 1.2) if self._scale else (7.0, 2.0)
         words = max(self._font(1.0).getlength(button.words), self._font(0.68).getlength(button.key_words) + self.em)
-        return max(least * self.em, words + 2.0 * self.em)
+        return max(least * self.em, words + margin * self.em)
 
     @property
     def _scale(self) -> bool:
         return all(len(button.words) <= 2 for button in self.page.buttons)
 
     def _button_rows(self, limit: float) -> list[list[tuple[int, float]]]:
-        """Numbers and widths of the buttons, row by row; all as wide as the widest, where that fits."""
+        """Numbers and widths of the buttons, row by row; all as wide as the widest, where that fits; a scale in one."""
         widths = [self._button_width(button) for button in self.page.buttons]
-        gap = self._button_gap
-        if widths and max(widths) * len(widths) + gap * (len(widths) - 1) <= limit:
-            widths = [max(widths)] * len(widths)
+        gap, count = self._button_gap, len(widths)
+        if widths and max(widths) * count + gap * (count - 1) <= limit:
+            widths = [max(widths)] * count
+        elif self._scale:
+            return [list(enumerate([(limit - gap * (count - 1)) / count] * count))]
         rows: list[list[tuple[int, float]]] = []
         for number, wide in enumerate(widths):
             used = sum(each + gap for _, each in rows[-1]) if rows else limit + 1
@@ -242,7 +254,7 @@ class _Sheet:
 
     @property
     def _button_gap(self) -> float:
-        return self.em * (0.7 if self._scale else 1.6)
+        return self.em * ((0.7 if len(self.page.buttons) < 10 else 0.4) if self._scale else 1.6)
 
     # Drawing
 
@@ -261,7 +273,7 @@ class _Sheet:
             elif name == "entry":
                 self._draw_entry(pen, top)
             elif name == "hint":
-                self._middle(pen, self.page.hint, top + 0.6 * self.em, 0.78, 0.6)
+                self._lines(pen, self.hint, top, 0.82, 1.25, 0.62)
             elif name == "buttons":
                 boxes = self._draw_buttons(pen, top)
             else:

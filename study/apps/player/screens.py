@@ -79,7 +79,7 @@ def stop_page(protocol: Protocol) -> Page:
     """Whether the participant really wants to stop."""
     texts = protocol.texts
     buttons = (Button("stay", texts.stay, "space", texts.space_key), Button("stop", texts.stop, "x", "X"))
-    return Page(texts.stop_note, texts.stop_question, buttons)
+    return Page(question=texts.stop_question, buttons=buttons, hint=texts.stop_note)
 
 
 def away_page(protocol: Protocol) -> Page:
