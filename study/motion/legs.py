@@ -52,6 +52,21 @@ def reach(clip: Clip, shifts: FloatArray, first: int = 0) -> Clip:
     return replace(lowered, rotations=rotations)
 
 
+def beyond_reach(clip: Clip, shifts: FloatArray) -> FloatArray:
+    """How far from a place `reach` would leave each ankle, `(frames, 2)`, metres, where a leg is too short for it."""
+    positions = joint_positions(clip)
+    excess = np.zeros((clip.frames, 2))
+    for foot, side in enumerate("LR"):
+        thigh, shank, reached = _lengths(clip, side)
+        hip, ankle = (positions[:, clip.skeleton.role(f"{part}.{side}")] for part in ("hip", "ankle"))
+        away = hip - (ankle + shifts[:, foot])
+        away[:, 1] -= np.clip(away[:, 1], 0.0, LARGEST_DROP_M)
+        limit = np.maximum(FULL_REACH * (thigh + shank), reached)
+        moved = np.any(shifts[:, foot] != 0.0, axis=1)
+        excess[:, foot] = np.where(moved, np.maximum(np.linalg.norm(away, axis=1) - limit, 0.0), 0.0)
+    return excess
+
+
 def _at(clip: Clip, frames: NDArray[np.int64]) -> Clip:
     return replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions
-from study.motion.legs import reach
+from study.motion.legs import beyond_reach, reach
 from study.transitions.blending import Transition
 
 FloatArray = NDArray[np.float64]
@@ -30,6 +30,11 @@ PLANTED_SPEED, HELD_SPEED = 0.3, 0.6
 PLANTED_HEIGHT, HELD_HEIGHT = 0.03, 0.05
 SHORTEST_CONTACT_S = 0.08
 RELEASE_S = 0.2
+# A foot whose place is further out of reach takes a step instead; how high, at most and as a share of its way.
+_OUT_OF_REACH_M = 0.01
+_LIFT_M, _LIFT_SHARE = 0.06, 0.25
+# Steps that are put into the contacts of one clip, one after the other.
+_MOST_STEPS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +180,8 @@ def remove_foot_slide(
     A planted point is held on the floor, not in height, and the foot keeps its rotation in the world. Corrections
     ease in and out over 0.2 s beside a contact, so the lock releases without a pop. A leg is never stretched beyond
     its length nor beyond where it was already; where the place is out of reach, the pelvis comes down, at most 3 cm.
+    Where that is not enough, as when someone who stood is under way before the blend is over, the foot takes a step:
+    it is let go where it travels fastest, and lifted on its way to where it stands next.
     """
     contacts = find_contacts(clip) if contacts is None else np.asarray(contacts, dtype=bool)
     if contacts.shape != (clip.frames, 2):
@@ -182,8 +189,7 @@ def remove_foot_slide(
     start, stop = region or (0, clip.frames)
     if not 0 <= start < stop <= clip.frames:
         raise MotionError(f"Expected a region within frames 0 to {clip.frames}, got {start} to {stop}.")
-    points = planted_points(clip)
-    shifts = np.stack([_shifts(points[:, foot], contacts[:, foot], start, stop, clip.fps) for foot in range(2)], axis=1)
+    contacts, shifts = _shifts_within_reach(clip, contacts, start, stop)
     corrected = reach(clip, shifts, start) if shifts.any() else clip
     # A margin of one frame, so that the steps into and out of the region count.
     margin = (max(0, start - 1), min(clip.frames, stop + 1))
@@ -195,6 +201,45 @@ def remove_foot_slide(
         history=(*clip.history, f"foot slide reduced from {100 * before:.1f} to {100 * after:.1f} cm"),
     )
     return FootslideResult(corrected, before, after, seconds, contacts, change)
+
+
+def _shifts_within_reach(clip: Clip, contacts: BoolArray, start: int, stop: int) -> tuple[BoolArray, FloatArray]:
+    """Contacts, with a step in those that no leg could hold through, and how far to move each foot in each frame."""
+    points = planted_points(clip)
+    contacts = contacts.copy()
+    lifts = np.zeros((clip.frames, 2))
+    for attempt in range(_MOST_STEPS + 1):
+        shifts = np.stack(
+            [_shifts(points[:, foot], contacts[:, foot], start, stop, clip.fps) for foot in range(2)], axis=1
+        )
+        excess = np.where(contacts, beyond_reach(clip, shifts), 0.0)
+        if attempt == _MOST_STEPS or not (excess > _OUT_OF_REACH_M).any():
+            break
+        for foot in range(2):
+            for run in _runs(contacts[:, foot]):
+                if excess[run[0] : run[1], foot].max() > _OUT_OF_REACH_M:
+                    first, last = _step(points[:, foot], run, (start, stop), clip.fps)
+                    contacts[first:last, foot] = False
+                    travel = np.linalg.norm((points[last - 1, foot] - points[first, foot])[[0, 2]])
+                    bump = np.sin(np.pi * np.arange(1, last - first + 1) / (last - first + 1)) ** 2
+                    lifts[first:last, foot] = min(_LIFT_M, _LIFT_SHARE * travel) * bump
+    shifts[..., 1] += lifts
+    return contacts, shifts
+
+
+def _step(point: FloatArray, run: tuple[int, int], region: tuple[int, int], fps: float) -> tuple[int, int]:
+    """The frames of a contact, within the region, in which the foot had better step: around where it goes fastest."""
+    first, last = max(run[0], region[0]), min(run[1], region[1])
+    speed = np.linalg.norm(np.gradient(point, axis=0)[first:last, [0, 2]], axis=1)
+    fastest = int(np.argmax(speed))
+    quick = speed >= 0.5 * speed[fastest]
+    half = max(1, round(0.5 * RELEASE_S * fps))
+    low, high = max(fastest - half, 0), min(fastest + half + 1, len(speed))
+    while low > 0 and quick[low - 1]:
+        low -= 1
+    while high < len(speed) and quick[high]:
+        high += 1
+    return first + low, first + high
 
 
 def _runs(flags: BoolArray) -> list[tuple[int, int]]:

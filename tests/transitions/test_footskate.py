@@ -9,6 +9,7 @@ from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import global_rotations, joint_positions, moved
 from study.motion.legs import reach
+from study.motion.synthetic import synthesize
 from study.transitions.blending import blend, cut
 from study.transitions.footskate import (
     find_contacts,
@@ -214,3 +215,28 @@ def test_what_cannot_be_planted_is_refused(slider):
         remove_foot_slide(slider, region=(60, 95))
     with pytest.raises(TransitionError, match="a cut has no blended frames"):
         plant_feet(cut(slider, slider, 20, 40), slider, slider)
+
+
+def test_a_foot_that_no_leg_can_hold_takes_a_step():
+    """From standing into a walk over a long blend: the body is away before the feet of the stance may lift."""
+    source, destination = synthesize("stand", seconds=4.0), synthesize("walk", seconds=6.0)
+    joined = blend(source, destination, 40, 96, 40)
+    known = transition_contacts(joined, source, destination)
+    planted, found = plant_feet(joined, source, destination)
+    assert found.slide_after_m < 0.01
+    assert found.slide_after_m_per_s < 0.01
+    stepping = known & ~found.contacts
+    assert stepping.any(), "a step was put in"
+    assert not (found.contacts & ~known).any(), "nothing is planted that was not"
+    assert not stepping[: joined.blend_start].any()
+    height = planted_points(planted.clip)[..., 1]
+    before = planted_points(joined.clip)[..., 1]
+    for foot in range(2):
+        frames = np.flatnonzero(stepping[:, foot])
+        if len(frames):
+            assert 0.01 < np.max(height[frames, foot] - before[frames, foot]) < 0.09, "lifted, and not high"
+    steps = quat.half_angle_between(planted.clip.rotations[1:], planted.clip.rotations[:-1])
+    own = max(
+        np.max(quat.half_angle_between(clip.rotations[1:], clip.rotations[:-1])) for clip in (source, destination)
+    )
+    assert np.max(steps[joined.blend_start - 2 : joined.blend_stop + 2]) < 1.5 * own
