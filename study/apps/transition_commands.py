@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,6 +138,9 @@ def _check_timewarp(specification: str) -> None:
 @click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
 @click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
 @specification_option
+@click.option(
+    "--joint", "joints", multiple=True, metavar="ROLE=FRAMES", help="Blend one joint shorter; can be repeated."
+)
 @click.option("--keep-slide", is_flag=True, help="Leave the feet as blending leaves them, sliding or not.")
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
@@ -154,6 +157,7 @@ def transition(
     frames: int | None,
     weight: str,
     specification: str,
+    joints: tuple[str, ...],
     keep_slide: bool,
     out: Path,
     as_json: bool,
@@ -166,7 +170,7 @@ def transition(
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
     first, second = clip_pair(source, destination, library, fps)
-    joined = join(first, second, (start, end), method, frames, weight, specification)
+    joined = join(first, second, (start, end), method, frames, weight, specification, joint_frames(joints))
     slide = {}
     if not keep_slide:
         joined, planted = plant_feet(joined, first, second)
@@ -195,14 +199,17 @@ def join(
     frames: int | None,
     weight: str,
     specification: str = "start-end",
+    shorter: dict[str, int] | None = None,
 ) -> Transition:
-    """The transition of so many frames, or as long as a method says."""
+    """The transition of so many frames, or as long as a method says; `shorter` has blends of joints' own, by role."""
     from study.transitions.blend_length import blend_length as choose
     from study.transitions.blending import blend
     from study.transitions.timewarp import warp_length, warped_blend
 
     if method == "timewarp":
         _check_timewarp(specification)
+        if shorter:
+            raise click.UsageError("expected no --joint with timewarp: its joints share one warp.")
         warped = warp_length(source, destination, *points)
         windows = (warped.source_frames, warped.destination_frames)
         return warped_blend(source, destination, *points, *windows, weight=weight)
@@ -210,7 +217,22 @@ def join(
     if length is None:
         chosen = choose(source, destination, *points, method=method or "geodesic", specification=specification)
         length = chosen.blend_frames
-    return blend(source, destination, *points, length, weight=weight, specification=specification)
+    return blend(source, destination, *points, length, weight=weight, specification=specification, joint_frames=shorter)
+
+
+def joint_frames(given: Sequence[str]) -> dict[str, int]:
+    """`hip.L=5` and the like, as a mapping."""
+    from study.motion.skeleton import ROLES
+
+    found = {}
+    for text in given:
+        role, _, frames = text.partition("=")
+        if role not in ROLES or not frames.isdigit() or int(frames) < 1:
+            raise click.UsageError(
+                f"expected --joint as ROLE=FRAMES such as shoulder.L=6, found {text!r}; roles: {', '.join(ROLES)}."
+            )
+        found[role] = int(frames)
+    return found
 
 
 def show_lengths(

@@ -182,7 +182,10 @@ def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
         elif study.name in analysis["ratings"]:
             rows, points = analysis["ratings"][study.name], study.scale_points
             variance = analysis.get("rating_anova", {}).get(study.name, ())
-            found.append(sections.ratings_section(study.name, title, rows, variance, mark=mark, points=points))
+            alpha = float(analysis["alpha"])
+            found.append(
+                sections.ratings_section(study.name, title, rows, variance, mark=mark, points=points, alpha=alpha)
+            )
     return found
 
 

@@ -45,11 +45,16 @@ def data_uri(content: bytes, kind: str) -> str:
 def shown_pairs(manifest: Manifest) -> list[tuple[Any, Any]]:
     """The pairs of records worth embedding: the widest difference, or both methods, one pair for each transition."""
     best: dict[tuple[str, str], Any] = {}
+    rated: dict[tuple[str, str], list[Any]] = {}
     for pair in manifest.pairs:
         key = (pair.study, pair.motion)
+        if not pair.b:
+            rated.setdefault(key, []).append(manifest.record(pair.a))
+            continue
         if key not in best or (pair.difference_frames or 0) > (best[key].difference_frames or 0):
             best[key] = pair
-    return [(manifest.record(pair.a), manifest.record(pair.b) if pair.b else None) for pair in best.values()]
+    singly = [(records[0], records[1] if len(records) > 1 else None) for records in rated.values()]
+    return [*((manifest.record(pair.a), manifest.record(pair.b)) for pair in best.values()), *singly]
 
 
 def embed_videos(manifest: Manifest, most_bytes: int = MOST_VIDEO_BYTES) -> list[list[Preview]]:
@@ -72,7 +77,9 @@ def embed_videos(manifest: Manifest, most_bytes: int = MOST_VIDEO_BYTES) -> list
 
 def _caption(record: StimulusRecord) -> str:
     added = f" {record.difference_frames:+d}".replace("-", "− ").replace("+", "+ ") if record.difference_frames else ""
-    how = f"{record.method}{added}: {record.blend_frames} frames" if record.blend_frames else "cut, no blend"
+    how = (
+        f"{record.method}{added}: {record.blend_frames} frames" if record.blend_frames else f"{record.method}, no blend"
+    )
     return f"{record.transition.replace('_', ' ')}, {how}"
 
 

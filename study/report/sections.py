@@ -350,7 +350,14 @@ def preference_motion_table(name: str, comparison: Result) -> Table:
 
 
 def ratings_section(
-    name: str, title: str, rows: Sequence[Result], variance: Sequence[Result] = (), *, mark: str, points: int
+    name: str,
+    title: str,
+    rows: Sequence[Result],
+    variance: Sequence[Result] = (),
+    *,
+    mark: str,
+    points: int,
+    alpha: float = 0.05,
 ) -> Section:
     """Return the section of a rating study: means, and where two methods or more were rated, their comparison.
 
@@ -378,6 +385,7 @@ def ratings_section(
         if best
         else None
     )
+    headline = _compared(variance, alpha) or headline
     drawing = Drawing(
         figures.ratings_figure(rows, f"study-{name}-ratings", mark, points), "Mean ratings with 95% intervals."
     )
@@ -391,6 +399,31 @@ def ratings_section(
         (table, *compared),
         tuple(dict.fromkeys(question["note"] for question in variance if question["note"])),
     )
+
+
+def _compared(questions: Sequence[Result], alpha: float) -> tuple[str, str] | None:
+    """In how many questions one method was rated higher, with the F of each; None where there is no pair of methods."""
+    known = [question for question in questions if question["difference"] and question["anova"]]
+    if not known:
+        return None
+    # "a minus b", as `rating_anova` names it.
+    first, _, second = str(known[0]["difference"]["of"]).partition(" minus ")
+    up = [question for question in known if question["difference"]["mean"] > 0]
+    if 2 * len(up) < len(known):
+        first, second = second, first
+        up = [question for question in known if question["difference"]["mean"] < 0]
+    clear = [q for q in up if q["anova"][0]["p_value"] is not None and q["anova"][0]["p_value"] < alpha]
+    statement = (
+        f"{words.sentence(words.readable(first))} was rated higher than {words.readable(second)} in {len(up)} of "
+        f"{words.number(len(known), 'question')}, in {len(clear)} significantly at {alpha:g}."
+    )
+    tests = [
+        f"{words.readable(question['item']) or 'rating'}: F({row['degrees_of_freedom']}, "
+        f"{row['error_degrees_of_freedom']}) = {row['f']:.2f}"
+        for question in known
+        if (row := question["anova"][0])["f"] is not None
+    ]
+    return statement, "; ".join(tests)
 
 
 def _variance_table(name: str, questions: Sequence[Result]) -> Table:

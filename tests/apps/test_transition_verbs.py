@@ -171,3 +171,38 @@ def test_advice_comes_as_table_csv_json_and_strips(capsys: pytest.CaptureFixture
     assert run(["advise", "dance", "box", "--no-strips"]) == 0
     assert "velocity" in capsys.readouterr().out
     assert run(["advise", "walk"]) == 2
+
+
+def test_a_joint_can_blend_for_a_time_of_its_own(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    from study.motion.files import read_clip
+
+    clips = []
+    for name, option in (("together.bvh", ()), ("apart.bvh", ("--joint", "shoulder.L=4"))):
+        out = tmp_path / name
+        points = ("--start", 60, "--end", 80, "--frames", 12, "--keep-slide")
+        ask(capsys, "transition", "walk", "run", *points, *option, "--out", out)
+        clips.append(read_clip(out))
+    differ = np.abs(clips[0].rotations - clips[1].rotations).max(axis=(0, 2)) > 1e-4
+    assert np.flatnonzero(differ).tolist() == [clips[0].skeleton.role("shoulder.L")]
+    for wrong in ("shoulder=4", "shoulder.L=0", "shoulder.L"):
+        assert (
+            run(
+                [
+                    "transition",
+                    "walk",
+                    "run",
+                    "--start",
+                    "60",
+                    "--end",
+                    "80",
+                    "--frames",
+                    "12",
+                    "--joint",
+                    wrong,
+                    "--out",
+                    "x.bvh",
+                ]
+            )
+            == 2
+        )
+        assert "ROLE=FRAMES" in capsys.readouterr().err
