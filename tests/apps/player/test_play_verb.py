@@ -243,7 +243,7 @@ def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, se
             time.sleep(float(rng.uniform(0.0, 2.0)))
         else:
             playing.opened()
-            playing.press_all(("space", "s", "7"), float(rng.uniform(0.0, 4.0)))
+            playing.press_all(("space", "s", "7"), float(rng.uniform(0.0, 3.0)))
         kills += playing.running
         playing.kill()
         stored |= set(playing.stored)

@@ -1,0 +1,125 @@
+"""Pages: where buttons are, which one a key or click means, and that texts fit and can be read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.apps.player.pages import Button, Look, Page, default_font, draw_page, moved
+from study.errors import SessionError
+
+LIGHT = Look((222, 223, 225), default_font())
+DARK = Look((20, 22, 26), default_font())
+TWO = (Button("same", "Same", "s", "S"), Button("different", "Different", "d", "D"))
+ASK = Page(question="Were the two motions the same or different?", buttons=TWO)
+
+
+@pytest.mark.parametrize("size", [(640, 480), (1280, 800), (1920, 1080), (3840, 2160), (600, 1000)])
+def test_buttons_lie_apart_inside_the_window_in_the_same_place_for_every_size(size: tuple[int, int]) -> None:
+    (a, top, b, bottom), (c, _, d, _) = draw_page(ASK, size, LIGHT).boxes
+    assert 0 < a < b < c < d < size[0]
+    assert 0.4 * size[1] < top < bottom < 0.75 * size[1]
+    assert (a + d) / 2 == pytest.approx(size[0] / 2)
+    assert b - a == pytest.approx(d - c)
+
+
+def test_a_click_on_a_button_means_it_and_beside_it_nothing() -> None:
+    drawn = draw_page(ASK, (1280, 800), LIGHT)
+    left, top, right, bottom = drawn.boxes[1]
+    assert drawn.clicked((left + right) / 2, (top + bottom) / 2) == TWO[1]
+    for x, y in ((left - 1, top + 5), (right + 1, top + 5), (left + 5, top - 1), (left + 5, bottom + 1), (0, 0)):
+        assert drawn.clicked(x, y) is None
+
+
+def test_keys_mean_their_buttons_and_enter_the_chosen_one() -> None:
+    drawn = draw_page(ASK, (640, 480), LIGHT)
+    assert drawn.pressed("s") == TWO[0]
+    assert drawn.pressed("enter") is None
+    assert drawn.pressed("x") is None
+    assert drawn.pressed("") is None
+    chosen = draw_page(replace(ASK, chosen=1), (640, 480), LIGHT)
+    assert chosen.pressed("enter") == TWO[1]
+
+
+def test_arrow_keys_go_round() -> None:
+    page = ASK
+    for key, chosen in (("right", 0), ("right", 1), ("right", 0), ("left", 1)):
+        page = moved(page, key) or page
+        assert page.chosen == chosen
+    assert moved(page, "up") is None
+    assert moved(Page("Nothing to choose."), "left") is None
+    last = moved(ASK, "left")
+    assert last is not None
+    assert last.chosen == 1
+
+
+def ink(rgb: np.ndarray, ground: tuple[int, int, int]) -> np.ndarray:
+    return np.abs(rgb.astype(int) - np.array(ground)).max(axis=2)
+
+
+@pytest.mark.parametrize("look", [LIGHT, DARK], ids=["light", "dark"])
+def test_text_stands_out_from_the_ground_which_is_that_of_the_stimuli(look: Look) -> None:
+    rgb = draw_page(replace(ASK, progress=(3, 40), progress_words="3 of 40 done"), (1280, 800), look).rgb
+    assert tuple(rgb[3, 3]) == look.ground
+    distance = ink(rgb, look.ground)
+    assert distance.max() > 150  # a contrast of 10 and more between text and ground
+    assert 0.005 < (distance > 100).mean() < 0.1
+
+
+def test_a_scale_of_eleven_points_is_one_row_with_its_words_at_the_ends() -> None:
+    points = tuple(Button(str(i), str(i), str(i) if i < 10 else "") for i in range(11))
+    page = Page(question="How natural was it?", buttons=points, low="not at all", high="very")
+    for size in ((640, 480), (1280, 800)):
+        boxes = draw_page(page, size, LIGHT).boxes
+        assert len({top for _, top, _, _ in boxes}) == 1
+        assert boxes[0][0] > 0
+        assert boxes[-1][2] < size[0]
+        assert all(one[2] < other[0] for one, other in pairwise(boxes))
+
+
+def test_many_long_choices_take_several_rows() -> None:
+    choices = tuple(Button(f"c{i}", f"a rather long choice, number {i}", str(i), str(i)) for i in range(1, 7))
+    boxes = draw_page(Page(question="Which?", buttons=choices), (1000, 700), LIGHT).boxes
+    assert len({top for _, top, _, _ in boxes}) > 1
+    assert all(0 < left < right < 1000 and 0 < top < bottom < 700 for left, top, right, bottom in boxes)
+
+
+def test_long_texts_are_set_smaller_and_longer_ones_refused() -> None:
+    long = Page("Words that go on and on. " * 60, buttons=TWO)
+    drawn = draw_page(long, (1280, 800), LIGHT, must_fit=True)
+    assert drawn.boxes[0][3] < 800
+    with pytest.raises(
+        SessionError, match=r"fits on one page of 1280 x 800 pixels, found one that is too long, 'Words"
+    ):
+        draw_page(Page("Words that go on and on. " * 400, buttons=TWO), (1280, 800), LIGHT, must_fit=True)
+
+
+def test_a_tiny_window_still_gets_a_page() -> None:
+    assert draw_page(Page("Words that go on and on. " * 400, buttons=TWO), (1, 1), LIGHT).rgb.shape == (240, 320, 3)
+
+
+def test_paragraphs_letters_of_other_scripts_and_words_without_spaces() -> None:
+    text = "Größe, ещё раз, ναι.\n\n" + "a" * 300
+    drawn = draw_page(Page(text, buttons=TWO), (800, 600), LIGHT)
+    distance = ink(drawn.rgb, LIGHT.ground)
+    columns = np.flatnonzero((distance > 60).any(axis=0))
+    assert columns[0] > 20
+    assert columns[-1] < 780  # the long word was cut, not pushed out
+
+
+def test_what_is_typed_is_shown() -> None:
+    empty = draw_page(Page(question="Age?", entry="", buttons=TWO[:1]), (640, 480), LIGHT)
+    typed = draw_page(Page(question="Age?", entry="34", buttons=TWO[:1]), (640, 480), LIGHT)
+    assert (empty.rgb != typed.rgb).any()
+    assert empty.boxes == typed.boxes
+
+
+def test_a_font_that_is_none_is_refused(tmp_path: Path) -> None:
+    broken = tmp_path / "font.ttf"
+    broken.write_text("no font")
+    with pytest.raises(SessionError, match=r"Expected a font file at .*font.ttf"):
+        draw_page(ASK, (640, 480), Look((0, 0, 0), broken))
