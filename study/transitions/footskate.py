@@ -217,7 +217,8 @@ def _shifts_within_reach(clip: Clip, contacts: BoolArray, start: int, stop: int)
             break
         for foot in range(2):
             for run in _runs(contacts[:, foot]):
-                if excess[run[0] : run[1], foot].max() > _OUT_OF_REACH_M:
+                within = run[0] < stop and run[1] > start
+                if within and excess[run[0] : run[1], foot].max() > _OUT_OF_REACH_M:
                     first, last = _step(points[:, foot], run, (start, stop), clip.fps)
                     contacts[first:last, foot] = False
                     travel = np.linalg.norm((points[last - 1, foot] - points[first, foot])[[0, 2]])
