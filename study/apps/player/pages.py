@@ -99,6 +99,14 @@ class Look:
         red, green, blue = (round(ground + share * (ink - ground)) for ground in self.ground)
         return red, green, blue
 
+    @property
+    def raised(self) -> RGB:
+        """Of buttons and fields: lighter than the ground, whichever that is."""
+        if self.dark:
+            return self.mix(0.14)
+        red, green, blue = (round(value + 0.6 * (255 - value)) for value in self.ground)
+        return red, green, blue
+
 
 def default_font() -> Path:
     """DejaVu Sans, out of matplotlib."""
@@ -316,11 +324,10 @@ class _Sheet:
 
     def _draw_button(self, pen: ImageDraw, button: Button, box: Box, chosen: bool) -> None:
         em, (left, top, right, bottom) = self.em, box
-        lift = 0.22 if self.look.dark else -0.6
         pen.rounded_rectangle(
             box,
             radius=0.45 * em,
-            fill=self.look.mix(0.14) if self.look.dark else _lighter(self.look.ground, -lift),
+            fill=self.look.raised,
             outline=self.look.mix(0.95 if chosen else 0.38),
             width=max(1, round(em * (0.16 if chosen else 0.06))),
         )
@@ -349,9 +356,8 @@ class _Sheet:
         font, words = self._font(1.1), self.page.entry or ""
         half = max(8 * em, font.getlength(words) / 2 + em)
         box = (middle - half, top, middle + half, top + 2.4 * em)
-        fill = self.look.mix(0.14) if self.look.dark else _lighter(self.look.ground, 0.75)
         outline, width = self.look.mix(0.6), max(1, round(em * 0.08))
-        pen.rounded_rectangle(box, radius=0.3 * em, fill=fill, outline=outline, width=width)
+        pen.rounded_rectangle(box, radius=0.3 * em, fill=self.look.raised, outline=outline, width=width)
         self._middle(pen, words, top + 1.2 * em, 1.1, 1.0)
         x = middle + font.getlength(words) / 2 + 0.12 * em
         pen.line((x, top + 0.6 * em, x, top + 1.8 * em), fill=self.look.mix(0.8), width=width)
@@ -372,11 +378,6 @@ class _Sheet:
             part = max(high, 2 * half * done / max(total, 1))
             pen.rounded_rectangle((box[0], y, box[0] + part, y + high), radius=high / 2, fill=self.look.mix(0.55))
         self._middle(pen, self.page.progress_words, y - 0.9 * em, 0.72 * em / self.em, 0.55)
-
-
-def _lighter(colour: RGB, share: float) -> RGB:
-    red, green, blue = (round(value + share * (255 - value)) for value in colour)
-    return red, green, blue
 
 
 def _wrapped(text: str, font: Any, limit: float) -> list[str]:
