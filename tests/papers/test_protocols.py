@@ -153,7 +153,9 @@ def test_published_protocols_are_shown_on_cmu_clips(name, cmu):
 
 @pytest.mark.mocap
 def test_the_demo_is_shown_on_cmu_clips(cmu):
-    shown_on("demo", cmu)
+    prepared, plan = shown_on("demo", cmu)
+    assert len(plan.trials) == 17
+    assert not prepared.synthetic
 
 
 def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path, synthetic):

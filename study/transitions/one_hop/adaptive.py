@@ -81,6 +81,9 @@ def geodesic_blends(a: Clip, b: Clip, weights: NDArray[np.float64], shortest: in
     return Blends(counts, lengths)
 
 
+_ONE_SEARCH = "Expected adaptive blends to be searched by build_adaptive, found another search; call that one."
+
+
 @dataclass(frozen=True)
 class _GeodesicDistance:
     """What a `Problem` for adaptive blends says of its cost; it has no windows of one length."""
@@ -89,10 +92,10 @@ class _GeodesicDistance:
     words: str = WORDS
 
     def prepare(self, clip: Clip, blend_frames: int) -> Clip:
-        raise NotImplementedError("adaptive blends are searched by build_adaptive")
+        raise TransitionError(_ONE_SEARCH)
 
     def counts(self, a: Clip, b: Clip, blend_frames: int, rows: range, columns: range) -> IntArray:
-        raise NotImplementedError("adaptive blends are searched by build_adaptive")
+        raise TransitionError(_ONE_SEARCH)
 
 
 def build_adaptive(
