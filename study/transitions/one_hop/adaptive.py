@@ -92,9 +92,11 @@ class _GeodesicDistance:
     words: str = WORDS
 
     def prepare(self, clip: Clip, blend_frames: int) -> Clip:
+        del clip, blend_frames
         raise TransitionError(_ONE_SEARCH)
 
     def counts(self, a: Clip, b: Clip, blend_frames: int, rows: range, columns: range) -> IntArray:
+        del a, b, blend_frames, rows, columns
         raise TransitionError(_ONE_SEARCH)
 
 
