@@ -15,6 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
+from study.analysis.bradley_terry import fit_bradley_terry
+from study.analysis.group_models import preference_models
+from study.analysis.no_effect import no_preference
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -109,7 +112,9 @@ def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
     return given
 
 
-def compare(answers: pd.DataFrame, confidence: float = 0.95, alpha: float = 0.05) -> list[dict[str, Any]]:
+def compare(
+    answers: pd.DataFrame, confidence: float = 0.95, alpha: float = 0.05, *, models: bool = True
+) -> list[dict[str, Any]]:
     """Analyse every pair of methods that was compared.
 
     Parameters
@@ -120,6 +125,8 @@ def compare(answers: pd.DataFrame, confidence: float = 0.95, alpha: float = 0.05
         Of the intervals.
     alpha
         Level of significance that the sentence in `answer` speaks of.
+    models
+        Whether to fit mixed models and estimating equations too, which takes longer.
 
     Returns
     -------
@@ -127,12 +134,14 @@ def compare(answers: pd.DataFrame, confidence: float = 0.95, alpha: float = 0.05
         One entry a pair of methods, in the order of first appearance: `method_a`, `method_b`, `published` (pooled
         test), `participants` (one share a participant against one half; Wilcoxon's test; robust chi-square),
         `clustering`, `motions` (the pooled test a motion pair, p-values adjusted by Holm), `order` (effect of
-        the order of presentation), `answer` (a sentence).
+        the order of presentation), `no_preference` (equivalence test and Bayes factor), `models` (mixed model, GEE),
+        `answer` (a sentence).
     """
     given = preference_answers(answers)
     results = []
     for (method_a, method_b), part in given.groupby(["method_a", "method_b"], sort=False):
-        results.append(_compare_two(str(method_a), str(method_b), part, confidence, alpha))
+        result = _compare_two(str(method_a), str(method_b), part, confidence, alpha)
+        results.append({**result, "models": preference_models(part, confidence) if models else None})
     return results
 
 
@@ -149,8 +158,51 @@ def _compare_two(method_a: str, method_b: str, part: pd.DataFrame, confidence: f
         "clustering": estimates.plain(estimates.clustering(chosen, shown)),
         "motions": motion_table(part, confidence).to_dict("records"),
         "order": order_effect(part, confidence),
+        "no_preference": estimates.plain(no_preference(chosen[shown > 0] / shown[shown > 0])),
         "answer": _in_words(method_a, method_b, published, participants, alpha),
     }
+
+
+def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any] | None:
+    """Return Bradley-Terry strengths of the methods of one study; None where only two were compared.
+
+    With two methods the strengths say nothing that their percentage does not.
+    """
+    given = preference_answers(answers)
+    if len({*given["method_a"].astype(str), *given["method_b"].astype(str)}) < 3:
+        return None
+    ordered = "a_first" in given.columns and given["a_first"].notna().all()
+    a_first = given["a_first"].astype(bool).to_numpy() if ordered else np.ones(len(given), dtype=bool)
+    a, b = given["method_a"].astype(str).to_numpy(), given["method_b"].astype(str).to_numpy()
+    first, second = np.where(a_first, a, b), np.where(a_first, b, a)
+    favoured = (given["chose_a"].to_numpy(dtype=np.float64) == a_first).astype(np.float64)
+    found = fit_bradley_terry(
+        [str(name) for name in first],
+        [str(name) for name in second],
+        favoured,
+        np.ones(len(given)),
+        with_order=bool(ordered),
+        confidence=confidence,
+    )
+    return {"note": found} if isinstance(found, str) else dict(estimates.plain(found))
+
+
+def confirmatory(comparisons: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
+    """Return the default tests of all comparisons of a sitting, adjusted together by Holm's method."""
+    rows = [
+        {
+            "study": study,
+            "method_a": compared["method_a"],
+            "method_b": compared["method_b"],
+            "test": compared["participants"]["test"],
+            "p_value": compared["participants"]["p_value"],
+        }
+        for study, found in comparisons.items()
+        for compared in found
+    ]
+    known = np.array([np.nan if row["p_value"] is None else row["p_value"] for row in rows], dtype=np.float64)
+    adjusted = estimates.holm(known)
+    return [{**row, "holm_p_value": estimates.finite(p)} for row, p in zip(rows, adjusted, strict=True)]
 
 
 def participant_tests(chosen: FloatArray, shown: FloatArray, confidence: float = 0.95) -> dict[str, Any]:

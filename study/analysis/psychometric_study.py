@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
+from study.analysis.group_models import psychometric_mixed
+from study.analysis.mixed import Link
 from study.analysis.psychometric import Estimate, Model, PsychometricFit, curve_of, fit_psychometric, make_model
-from study.analysis.psychometric_likelihood import fit_likelihood
+from study.analysis.psychometric_likelihood import LikelihoodFit, fit_likelihood
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FloatArray = NDArray[np.float64]
+
+LINKS_OF: dict[str, Link] = {"normal": "probit", "logistic": "logit"}
 
 
 def analyse_psychometric(
@@ -42,7 +46,8 @@ def analyse_psychometric(
     dict
         JSON-able: `participants` (one fit each), `pooled` (all answers as one person's), `likelihood` (maximum,
         profile interval and deviance of the same), `group` (mean over participants of their thresholds, with Student's
-        interval), `levels` (answers by level), `answer` (a sentence).
+        interval), `mixed` (threshold of a typical participant by a mixed model; None for one participant), `levels`
+        (answers by level), `answer` (a sentence).
     """
     chosen = model or make_model()
     own = []
@@ -56,6 +61,7 @@ def analyse_psychometric(
         "pooled": pooled,
         "likelihood": {"note": best} if isinstance(best, str) else estimates.plain(best),
         "group": _group(own, chosen, confidence),
+        "mixed": _typical(trials, chosen, best, confidence),
         "levels": _by_level(trials),
     }
     return {**dict(estimates.plain(result)), "answer": _in_words(pooled, own)}
@@ -79,6 +85,14 @@ def describe(fit: PsychometricFit) -> dict[str, Any]:
         "curve": curve_of(fit),
         "note": fit.note,
     }
+
+
+def _typical(trials: pd.DataFrame, model: Model, best: LikelihoodFit | str, confidence: float) -> dict[str, Any] | None:
+    """The threshold of a typical participant; guess and lapse rate are held at those of all answers."""
+    if isinstance(best, str) or trials["participant"].nunique() < 2 or model.sigmoid.name not in LINKS_OF:
+        return None
+    link = LINKS_OF[model.sigmoid.name]
+    return psychometric_mixed(trials, link=link, guess=best.guess, lapse=best.lapse, confidence=confidence)
 
 
 def _group(own: list[dict[str, Any]], model: Model, confidence: float) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from study.analysis import estimates
 from study.analysis.anova import rating_anova
 from study.analysis.jnd import analyse_jnd
-from study.analysis.preference import compare
+from study.analysis.preference import compare, confirmatory, strengths
 from study.analysis.quality import quality
 from study.analysis.ratings import rating_table
 from study.errors import AnalysisError
@@ -47,7 +47,9 @@ def analyse(
     -------
     dict
         `jnd` (by name of a same-different study), `preference` (by name of a preference study, a list of compared
-        pairs of methods), `ratings` and `rating_anova` (by name of a rating study), each empty where there is none;
+        pairs of methods), `confirmatory` (their default tests, adjusted together by Holm's method), `bradley_terry`
+        (strengths by study, where more than two methods were compared), `ratings` and `rating_anova` (by name of a
+        rating study), each empty where there is none;
         `quality`, `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
 
     Raises
@@ -61,7 +63,7 @@ def analyse(
     strange = sorted(set(answers["task"].astype(str)) - set(TASKS))
     if strange:
         raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {strange[0]!r}")
-    result: dict[str, Any] = {"jnd": {}, "preference": {}, "ratings": {}, "rating_anova": {}}
+    result: dict[str, Any] = {"jnd": {}, "preference": {}, "bradley_terry": {}, "ratings": {}, "rating_anova": {}}
     for (task, study), part in answers.groupby([answers["task"].astype(str), _studies(answers)], sort=False):
         if task == "same-different":
             result["jnd"][study] = analyse_jnd(
@@ -69,9 +71,11 @@ def analyse(
             )
         elif task == "preference":
             result["preference"][study] = compare(part, confidence, alpha)
+            result["bradley_terry"][study] = strengths(part, confidence)
         else:
             result["ratings"][study] = rating_table(part, confidence)
             result["rating_anova"][study] = rating_anova(part, confidence)
+    result["confirmatory"] = confirmatory(result["preference"])
     result |= {"quality": quality(answers), "data": kind_of_data(answers), "confidence": confidence, "alpha": alpha}
     return dict(estimates.plain(result))
 

@@ -1,0 +1,143 @@
+"""Mixed models: against direct integration and known groups; what can't be estimated is said."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import quad
+from scipy.special import expit
+from scipy.stats import norm
+
+from study.analysis.group_models import preference_models, psychometric_mixed
+from study.analysis.mixed import MixedFit, fit_mixed, marginal_share
+from study.errors import AnalysisError
+
+
+def group(rng: np.random.Generator, people: int, answers: int, mean: float, spread: float) -> np.ndarray:
+    return rng.binomial(answers, expit(mean + spread * rng.normal(size=people))).astype(float)
+
+
+def test_the_likelihood_is_the_one_that_direct_integration_gives() -> None:
+    yes = group(np.random.default_rng(1), 12, 8, 0.6, 1.0)
+    fit = fit_mixed(np.ones((12, 1)), np.ones((12, 1)), yes, np.full(12, 8.0), range(12))
+    assert isinstance(fit, MixedFit)
+    mean, spread = fit.effects[0].value, fit.spread[0]
+
+    def integrated(mean: float, spread: float) -> float:
+        total = 0.0
+        for count in yes:
+
+            def density(b: float, count: float = count) -> float:
+                p = expit(mean + b)
+                return float(p**count * (1 - p) ** (8 - count) * norm.pdf(b, scale=spread))
+
+            total += np.log(quad(density, -12, 12, epsabs=1e-14)[0])
+        return total
+
+    assert fit.log_likelihood == pytest.approx(integrated(mean, spread), abs=1e-5)
+    for moved in ((0.02, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02)):
+        assert integrated(mean + moved[0], spread + moved[1]) < fit.log_likelihood
+    error = fit.effects[0].standard_error
+    assert error is not None
+    assert error == pytest.approx(np.sqrt(spread**2 + 1 / (8 * 0.22)) / np.sqrt(12), rel=0.2)
+
+
+def test_a_known_group_is_found_again_by_random_intercept_and_slope() -> None:
+    rng = np.random.default_rng(2)
+    levels = np.tile(np.arange(7.0), 60)
+    who = np.repeat(np.arange(60), 7)
+    own = rng.multivariate_normal([-3.0, 1.0], [[0.16, 0.02], [0.02, 0.04]], size=60)
+    chance = norm.cdf(own[who, 0] + own[who, 1] * levels)
+    trials = pd.DataFrame({"participant": who, "level": levels, "yes": rng.binomial(40, chance), "shown": 40})
+    found = psychometric_mixed(trials)
+    assert found["threshold"] == pytest.approx(3.0, abs=0.2)
+    assert found["low"] < 3.0 < found["high"]
+    assert found["slope"] == pytest.approx(1.0, abs=0.12)
+    assert found["slope_spread"] == pytest.approx(0.2, abs=0.07)
+
+
+def test_a_typical_participant_is_further_from_one_half_than_the_population() -> None:
+    rng = np.random.default_rng(3)
+    people = 120
+    chance = expit(1.2 + 1.5 * rng.normal(size=people))
+    first = np.tile([True, False], people * 4)
+    who = np.repeat(np.arange(people), 8)
+    chosen = rng.random(people * 8) < expit(np.log(chance / (1 - chance))[who] + np.where(first, 0.4, -0.4))
+    found = preference_models(pd.DataFrame({"participant": who, "chose_a": chosen.astype(float), "a_first": first}))
+    mixed, gee = found["mixed"], found["gee"]
+    assert mixed["percent"] == pytest.approx(100 * expit(1.2), abs=6)
+    assert mixed["participants_spread"] == pytest.approx(1.5, abs=0.4)
+    assert mixed["order_logit"] == pytest.approx(0.8, abs=0.4)
+    assert gee["percent"] < mixed["percent"] - 2
+    assert gee["percent"] == pytest.approx(100 * chance.mean(), abs=4)
+    assert mixed["population_percent"] == pytest.approx(gee["percent"], abs=2)
+    assert "nearer to one half" in found["differ"]
+
+
+def test_gee_standard_error_is_that_of_the_participants() -> None:
+    """With equal numbers of answers the estimating equations' mean is the mean of the participants' shares."""
+    rng = np.random.default_rng(4)
+    chosen = rng.random((30, 8)) < rng.beta(3, 2, size=(30, 1))
+    data = pd.DataFrame({"participant": np.repeat(np.arange(30), 8), "chose_a": chosen.ravel().astype(float)})
+    found = preference_models(data)["gee"]
+    shares = chosen.mean(axis=1)
+    assert found["percent"] == pytest.approx(100 * shares.mean(), abs=1e-4)
+    error = shares.std(ddof=1) / np.sqrt(30)
+    half = (found["high"] - found["low"]) / 200
+    assert half == pytest.approx(2.045 * error, rel=0.06)
+
+
+def test_marginal_share_is_an_average_over_participants() -> None:
+    yes = group(np.random.default_rng(5), 50, 30, 1.0, 1.2)
+    fit = fit_mixed(np.ones((50, 1)), np.ones((50, 1)), yes, np.full(50, 30.0), range(50))
+    assert isinstance(fit, MixedFit)
+    drawn = expit(fit.effects[0].value + fit.spread[0] * np.random.default_rng(0).normal(size=400_000)).mean()
+    assert marginal_share(fit, [1.0]) == pytest.approx(float(drawn), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("yes", "people", "says"),
+    [([8, 8, 8], 3, "all answers alike"), ([0, 0], 2, "all answers alike"), ([4], 1, "one participant")],
+)
+def test_degenerate_groups_are_said(yes: list[int], people: int, says: str) -> None:
+    found = fit_mixed(np.ones((people, 1)), np.ones((people, 1)), yes, np.full(people, 8.0), range(people))
+    assert isinstance(found, str)
+    assert says in found
+
+
+def test_missing_cells_and_empty_data() -> None:
+    design = np.column_stack([np.ones(4), np.zeros(4)])
+    assert "can't be told" in str(fit_mixed(design, np.ones((4, 1)), [1, 2, 3, 2], [4] * 4, range(4)))
+    assert "no answers" in str(fit_mixed(design, np.ones((4, 1)), [0] * 4, [0] * 4, range(4)))
+    everyone_the_same = fit_mixed(np.ones((6, 1)), np.ones((6, 1)), [4] * 6, [8] * 6, range(6))
+    assert isinstance(everyone_the_same, MixedFit)
+    assert "spread" in everyone_the_same.note
+    three = pd.DataFrame({"participant": list("aabbcc"), "chose_a": [1.0, 0, 1, 1, 0, 1]})
+    assert "too few" in preference_models(three)["gee"]["note"]
+    alike = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": 1.0})
+    assert preference_models(alike)["mixed"]["percent"] is None
+    separated = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": [1.0, 0] * 5, "a_first": [True, False] * 5})
+    assert preference_models(separated)["mixed"]["note"]
+
+
+def test_refusals() -> None:
+    with pytest.raises(AnalysisError, match="expected the link probit or logit, found 'cloglog'"):
+        fit_mixed([[1.0]], [[1.0]], [1], [2], ["a"], link="cloglog")  # type: ignore[arg-type]
+    with pytest.raises(AnalysisError, match="as many rows"):
+        fit_mixed(np.ones((3, 1)), np.ones((2, 1)), [1, 1, 1], [2, 2, 2], list("abc"))
+
+
+def test_eight_participants_are_fast() -> None:
+    """Ten times what benchmarks/calibration.py measures would still pass."""
+    rng = np.random.default_rng(6)
+    levels, who = np.tile(np.linspace(-1.5, 1.5, 7), 8), np.repeat(np.arange(8), 7)
+    design = np.column_stack([np.ones(56), levels])
+    own = rng.normal(size=(8, 2)) * 0.4 + [0.3, 1.5]
+    yes = rng.binomial(30, norm.cdf((own[who] * design).sum(axis=1)))
+    start = time.perf_counter()
+    fit = fit_mixed(design, design, yes, np.full(56, 30), who, link="probit")
+    assert time.perf_counter() - start < 2.0
+    assert isinstance(fit, MixedFit)
