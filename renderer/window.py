@@ -15,7 +15,7 @@ frame.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -24,15 +24,13 @@ from numpy.typing import NDArray
 from renderer.camera import Camera, check_positions
 from renderer.capsules import Figure
 from renderer.errors import RendererError
+from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Size, Typed, key_name
 from renderer.floor import Floor
+from renderer.pacing import OWN_CLOCK_HZ, Pacing, find_pacing, next_flip
 from renderer.painter import SCREEN, Painter
 from renderer.shapes import Shapes, lay_out
 
 RGB = tuple[int, int, int]
-Size = tuple[int, int]
-
-OWN_CLOCK_HZ = 60.0
-"""The rate of the own frame clock where the display names none."""
 
 _TRIAL_SWAPS, _WARM_UP = 40, 10
 _SPIN_S = 0.001
@@ -41,113 +39,6 @@ NO_DISPLAY = (
     "Expected a display to open a window on, found none that works ({reason}). Run it at the machine's own screen, "
     "name the display (DISPLAY or WAYLAND_DISPLAY), or use a virtual one (xvfb-run); `segue serve` needs no display."
 )
-
-
-@dataclass(frozen=True)
-class Key:
-    """A key went down: a letter or digit as it is printed on the key, or `space`, `enter`, `escape`, `left`, ..."""
-
-    name: str
-    time_s: float
-
-
-@dataclass(frozen=True)
-class Typed:
-    """A character was typed; for text fields. It comes besides its `Key`."""
-
-    character: str
-    time_s: float
-
-
-@dataclass(frozen=True)
-class Click:
-    """The left mouse button went down; place in pixels of the picture from the top left corner."""
-
-    x: float
-    y: float
-    time_s: float
-
-
-@dataclass(frozen=True)
-class Focus:
-    """The window got the keyboard, or lost it."""
-
-    focused: bool
-    time_s: float
-
-
-@dataclass(frozen=True)
-class Resized:
-    """The picture has another size, in pixels, or was damaged: what it shows must be drawn again."""
-
-    size: Size
-    time_s: float
-
-
-@dataclass(frozen=True)
-class CloseAsked:
-    """Somebody asked the window to close; it stays until it is closed."""
-
-    time_s: float
-
-
-Event = Key | Typed | Click | Focus | Resized | CloseAsked
-
-
-@dataclass(frozen=True)
-class Pacing:
-    """What flips follow.
-
-    Parameters
-    ----------
-    refresh_hz
-        Flips per second.
-    reported_hz
-        What the display says of itself; 0 where it says nothing.
-    swap_s
-        The median time between swaps when the window was opened, seconds.
-    own_clock
-        Whether flips follow the own frame clock, since swaps wait for nothing.
-    """
-
-    refresh_hz: float
-    reported_hz: float
-    swap_s: float
-    own_clock: bool
-
-    @property
-    def measured(self) -> bool:
-        """Whether the times of flips are those of the display."""
-        return not self.own_clock
-
-    @property
-    def period_s(self) -> float:
-        """Seconds from one flip to the next."""
-        return 1.0 / self.refresh_hz
-
-
-def find_pacing(swap_intervals_s: NDArray[np.float64], reported_hz: float) -> Pacing:
-    """What to pace flips by, from trial swaps and the refresh rate that the display reports.
-
-    The reported rate is a whole number (59 for 59.94), so the measured one is taken where both agree within a tenth.
-    Swaps that come faster wait for nothing; slower ones do wait, and the machine only misses some at the start.
-    """
-    swap_s = float(np.median(swap_intervals_s))
-    if reported_hz <= 0:
-        return Pacing(OWN_CLOCK_HZ, 0.0, swap_s, own_clock=True)
-    if swap_s < 0.9 / reported_hz:
-        return Pacing(reported_hz, reported_hz, swap_s, own_clock=True)
-    agrees = swap_s < 1.1 / reported_hz
-    return Pacing(1.0 / swap_s if agrees else reported_hz, reported_hz, swap_s, own_clock=False)
-
-
-def next_flip(last_flip_s: float, period_s: float, now_s: float) -> float:
-    """When the next flip can be, if it is asked for now: the first whole number of periods after the last one.
-
-    Half a millisecond is left for the swap itself.
-    """
-    periods = max(1.0, np.ceil((now_s + 0.0005 - last_flip_s) / period_s))
-    return float(last_flip_s + periods * period_s)
 
 
 class Picture:
@@ -443,34 +334,6 @@ class Window:
         glfw.set_window_focus_callback(handle, lambda _, on: add(Focus(bool(on), glfw.get_time())))
         glfw.set_framebuffer_size_callback(handle, lambda _, w, h: add(Resized((w, h), glfw.get_time())))
         glfw.set_window_refresh_callback(handle, lambda _: add(Resized(self.size, glfw.get_time())))
-
-
-_NAMED_KEYS = {
-    32: "space", 256: "escape", 257: "enter", 335: "enter", 258: "tab", 259: "backspace",
-    262: "right", 263: "left", 264: "down", 265: "up",
-}  # fmt: skip
-"""glfw's numbers of the keys that have no character; they are part of its interface."""
-
-
-def key_name(token: int, printed: str | None) -> str:
-    """A key's name: of letters the one that is printed on it in this layout, of digits the digit in every layout.
-
-    Parameters
-    ----------
-    token
-        glfw's number, which is the key's character on a US keyboard.
-    printed
-        What the keyboard's layout says that the key gives; None where it gives no character.
-    """
-    if token in _NAMED_KEYS:
-        return _NAMED_KEYS[token]
-    if 48 <= token <= 57:
-        return chr(token)
-    if 320 <= token <= 329:  # the digits of the keypad
-        return str(token - 320)
-    if printed and len(printed) == 1 and printed.isprintable():
-        return printed.lower()
-    return chr(token).lower() if 32 < token < 127 else f"key-{token}"
 
 
 def open_window(

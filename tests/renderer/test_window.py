@@ -12,8 +12,10 @@ import pytest
 
 from renderer.camera import Camera, frame_group
 from renderer.errors import RendererError
+from renderer.events import key_name
 from renderer.figure import make_figure
-from renderer.window import Drawing, find_pacing, fitted_camera, key_name, next_flip
+from renderer.pacing import find_pacing, next_flip
+from renderer.window import Drawing, fitted_camera
 
 ROOT = Path(__file__).parents[2]
 

@@ -13,75 +13,19 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
-from typing import Protocol as Shape
 
-import numpy as np
-from numpy.typing import NDArray
-
-from renderer.window import Click, CloseAsked, Event, Focus, Key, Pacing, Resized, Typed
+from renderer.events import Focus, Resized
 from study.apps.player import screens
-from study.apps.player.pages import Button, DrawnPage, Look, Page, draw_page, moved
+from study.apps.player.desk import Desk, Stopped
+from study.apps.player.display import Display
+from study.apps.player.pages import Look, draw_page
 from study.apps.player.showing import Showing, frame_at
 from study.apps.player.store import Store
-from study.errors import SessionError
 from study.experiment import session as sitting
-from study.experiment.protocol_parts import FormField
 from study.experiment.responses import Presentation
 from study.experiment.stimulus_set import Stimulus
-
-RGB = tuple[int, int, int]
-
-
-class Display(Shape):
-    """What the player needs of a window: `renderer.window.Window`, or a scripted one."""
-
-    pacing: Pacing
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height, pixels."""
-
-    @property
-    def focused(self) -> bool:
-        """Whether keys come here."""
-
-    def describe(self) -> dict[str, Any]:
-        """For the record."""
-
-    def now(self) -> float:
-        """The time, seconds."""
-
-    def next_flip_s(self) -> float:
-        """When a flip that is asked for now will be presented."""
-
-    def flip(self) -> float:
-        """Present what was drawn; returns when that was."""
-
-    def picture(self, rgb: NDArray[np.uint8]) -> Any:
-        """Load a picture; it has a `release`."""
-
-    def drawing(self, positions: Any, figure: Any, camera: Any, fps: float, *, fill: bool = True) -> Any:
-        """Prepare a motion; it has `frames`."""
-
-    def clear(self, colour: RGB) -> None:
-        """One colour."""
-
-    def paint(self, picture: Any, background: RGB) -> None:
-        """Draw a picture."""
-
-    def paint_frame(self, drawing: Any, frame: int) -> None:
-        """Draw a frame of a motion."""
-
-    def poll(self) -> tuple[Event, ...]:
-        """What happened."""
-
-    def wait(self, timeout_s: float | None = None) -> tuple[Event, ...]:
-        """Sleep until something happens."""
-
-    def cursor(self, visible: bool) -> None:
-        """Show or hide the pointer."""
 
 
 @dataclass(frozen=True)
@@ -92,14 +36,6 @@ class Outcome:
     answers: int
     dropped_flips: int
     faulty_trials: int
-
-
-class _Stopped(Exception):  # noqa: N818 - not an error: the participant leaves
-    """The participant leaves, from wherever the session stands."""
-
-    def __init__(self, end: str) -> None:
-        super().__init__(end)
-        self.end = end
 
 
 def play(
@@ -134,7 +70,7 @@ def play(
     return _Player(window, session, stimulus, store, look, fill, say).run()
 
 
-class _Player:
+class _Player(Desk):
     """The state of a sitting: the session, and what was shown of the present trial."""
 
     def __init__(
@@ -147,15 +83,10 @@ class _Player:
         fill: bool,
         say: Callable[[str], None],
     ) -> None:
-        self.window, self.session, self.store, self.look = window, session, store, look
-        self.protocol = session.protocol
+        super().__init__(window, session, store, look)
         self._stimulus, self._fill, self._say = stimulus, fill, say
         self._drawings: dict[str, Any] = {}
-        self._pages: dict[tuple[Page, tuple[int, int]], tuple[DrawnPage, Any]] = {}
-        self._showings: list[Showing] = []
-        self._faults: list[str] = []
         self._answers = self._dropped = self._faulty = 0
-        self._size = window.size
 
     def run(self) -> Outcome:
         """Step after step."""
@@ -168,8 +99,8 @@ class _Player:
             while (step := sitting.current(self.session)).kind != "done":
                 self._do(step)
             self.store.event("finished")
-            self._read_until(screens.last_page(self.protocol, self.protocol.texts.finished))
-        except _Stopped as stopped:
+            self.read_until(screens.last_page(self.protocol, self.protocol.texts.finished))
+        except Stopped as stopped:
             end = stopped.end
         return Outcome(end, self._answers, self._dropped, self._faulty)
 
@@ -199,107 +130,17 @@ class _Player:
         else:
             self._read(step)
 
-    # Pages
-
-    def _drawn(self, page: Page) -> tuple[DrawnPage, Any]:
-        """A page's picture, in the window's memory; the latest few are kept."""
-        key = (page, self.window.size)
-        if key not in self._pages:
-            drawn = draw_page(page, self.window.size, self.look)
-            while len(self._pages) >= 6:
-                self._pages.pop(next(iter(self._pages)))[1].release()
-            self._pages[key] = (drawn, self.window.picture(drawn.rgb))
-        return self._pages[key]
-
-    def _show_page(self, page: Page) -> tuple[DrawnPage, float]:
-        drawn, picture = self._drawn(page)
-        self.window.paint(picture, self.look.ground)
-        return drawn, self._flip_away()
-
-    def _flip_away(self) -> float:
-        """Flip to something that is no stimulus: the last frame of the stimulus before ends here."""
-        at = self.window.flip()
-        if self._showings and self._showings[-1].ended_s is None:
-            self._showings[-1] = replace(self._showings[-1], ended_s=at)
-        return at
-
-    def _ask(self, page: Page, deadline_s: float | None = None) -> tuple[Button | None, float]:
-        """Show a page until one of its buttons is chosen; the button and when, or None once the time is over."""
-        self.window.cursor(True)
-        drawn, _ = self._show_page(page)
-        # Keys from before the page stood there answer nothing.
-        self._notice(self.window.poll())
-        while True:
-            left = None if deadline_s is None else deadline_s - self.window.now()
-            if left is not None and left <= 0:
-                return None, self.window.now()
-            for event in self.window.wait(left):
-                button = _chosen(drawn, event)
-                if button is not None and (deadline_s is None or event.time_s <= deadline_s):
-                    return button, event.time_s
-                if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:
-                    drawn, _ = self._show_page(turned)
-                elif self._notice((event,)):
-                    self._ask_to_stop()
-                    drawn, _ = self._show_page(drawn.page)
-                elif isinstance(event, Resized):
-                    drawn, _ = self._show_page(drawn.page)
-
-    def _read_until(self, page: Page) -> str:
-        """Show a page that has no time limit; the name of the button that was chosen."""
-        button, _ = self._ask(page)
-        assert button is not None, "without a deadline there is a button"
-        return button.name
-
-    def _notice(self, events: tuple[Event, ...]) -> bool:
-        """Log what is to be logged; True where somebody wants to leave."""
-        leave = False
-        for event in events:
-            if isinstance(event, Resized) and event.size != self._size:
-                self._size = event.size
-                self.store.event("resized", {"viewport": list(event.size)})
-            leave = leave or isinstance(event, CloseAsked) or (isinstance(event, Key) and event.name == "escape")
-            if isinstance(event, Focus) and not event.focused:
-                self._fault("focus lost")
-            if isinstance(event, Focus):
-                step = sitting.current(self.session)
-                self.store.event("focus", {"focused": event.focused, "trial": step.trial, "step": step.kind})
-        return leave
-
-    def _fault(self, what: str) -> None:
-        if self._showings and what not in self._faults:
-            self._faults.append(what)
-
-    def _ask_to_stop(self) -> None:
-        """Whether the participant wants to leave; asks inside the question change nothing."""
-        drawn, _ = self._show_page(screens.stop_page(self.protocol))
-        self.window.cursor(True)
-        self._fault("interrupted")
-        while True:
-            for event in self.window.wait(None):
-                button = _chosen(drawn, event)
-                if button is not None and button.name == "stop":
-                    step = sitting.current(self.session)
-                    self.store.event("stopped", {"trial": step.trial, "step": step.kind})
-                    raise _Stopped("stopped")
-                if button is not None or (isinstance(event, Key) and event.name == "escape"):
-                    return
-                if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:
-                    drawn, _ = self._show_page(turned)
-                elif isinstance(event, Resized):
-                    drawn, _ = self._show_page(drawn.page)
-
     def _read(self, step: sitting.Step) -> None:
         page = screens.reading_page(self.protocol, step, sitting.progress(self.session))
-        while self._read_until(page) == "example":
+        while self.read_until(page) == "example":
             self._show(step.stimulus)
             self._blank_for(0.3)
         self.session = sitting.advanced(self.session)
 
     def _consent(self, step: sitting.Step) -> None:
-        if self._read_until(screens.consent_page(self.protocol, step)) == "decline":
-            self._read_until(screens.last_page(self.protocol, self.protocol.consent.declined))
-            raise _Stopped("declined")
+        if self.read_until(screens.consent_page(self.protocol, step)) == "decline":
+            self.read_until(screens.last_page(self.protocol, self.protocol.consent.declined))
+            raise Stopped("declined")
         self.store.begin()
         self.store.event("consent")
         self.session = sitting.advanced(self.session)
@@ -307,48 +148,24 @@ class _Player:
     # The form, one question at a time
 
     def _form(self) -> None:
-        values = {field.name: self._field(field) for field in self.protocol.form}
+        values = {field.name: self.field(field) for field in self.protocol.form}
         self.session, taken = sitting.filled(self.session, values)
         self.store.form(taken)
-
-    def _field(self, field: FormField) -> str:
-        if field.kind == "choice":
-            name = self._read_until(screens.field_page(self.protocol, field, "", False))
-            return "" if name == "go-on" else field.choices[int(name.removeprefix("choice-")) - 1]
-        entry, complaint = "", False
-        drawn, _ = self._show_page(screens.field_page(self.protocol, field, entry, complaint))
-        while True:
-            for event in self.window.wait(None):
-                button = _chosen(drawn, event)
-                if button is not None:
-                    try:
-                        return sitting.field_value(field, entry.strip())
-                    except SessionError:
-                        complaint = True
-                elif isinstance(event, Typed):
-                    entry, complaint = (entry + event.character)[: sitting.LONGEST_TEXT], False
-                elif isinstance(event, Key) and event.name == "backspace":
-                    entry, complaint = entry[:-1], False
-                elif self._notice((event,)):
-                    self._ask_to_stop()
-                elif not isinstance(event, Resized):
-                    continue
-                drawn, _ = self._show_page(screens.field_page(self.protocol, field, entry, complaint))
 
     # A trial
 
     def _stimulus_step(self, step: sitting.Step) -> None:
         if step.kind == "first":
-            self._showings, self._faults = [], []
+            self.showings, self.faults = [], []
             self._prepare(step)
             if not self.window.focused:
-                self._read_until(screens.away_page(self.protocol))
+                self.read_until(screens.away_page(self.protocol))
                 self._blank_for(0.3)
         showing = self._show(step.stimulus)
         if showing is None:
             self._start_again()
             return
-        self._showings.append(showing)
+        self.showings.append(showing)
         self.session = sitting.advanced(self.session)
 
     def _prepare(self, step: sitting.Step) -> None:
@@ -361,7 +178,7 @@ class _Player:
         for identifier in wanted:
             self._drawing(identifier)
         asked = next(one for one in own if one.kind == "answer")
-        self._drawn(screens.answer_page(self.protocol, asked, sitting.progress(self.session)))
+        self.drawn(screens.answer_page(self.protocol, asked, sitting.progress(self.session)))
 
     def _drawing(self, identifier: str) -> Any:
         if identifier not in self._drawings:
@@ -377,7 +194,7 @@ class _Player:
         fps, period_s = self.protocol.fps, window.pacing.period_s
         frames: list[int] = []
         flips: list[float] = []
-        faults: list[str] = []
+        wrong: list[str] = []
         window.cursor(False)
         with _calm():
             while True:
@@ -389,14 +206,15 @@ class _Player:
                 flips.append(window.flip())
                 frames.append(frame)
                 events = window.poll()
-                if any(isinstance(event, Resized) for event in events) and "resized" not in faults:
-                    faults.append("resized")
+                # A window that is merely to be drawn again, at its size, is: at the next flip.
+                if any(isinstance(event, Resized) and event.size != self.size for event in events):
+                    wrong.append("resized")
                 if any(isinstance(event, Focus) and not event.focused for event in events):
-                    faults.append("focus lost")
-                if self._notice(events):
-                    self._ask_to_stop()
+                    wrong.append("focus lost")
+                if self.notice(events):
+                    self.ask_to_stop()
                     return None
-        shown = Showing(identifier, fps, period_s, tuple(frames), tuple(flips), drawing.frames, None, tuple(faults))
+        shown = Showing(identifier, fps, period_s, tuple(frames), tuple(flips), drawing.frames, None, tuple(wrong))
         self._dropped += shown.dropped_flips
         return shown
 
@@ -420,15 +238,15 @@ class _Player:
         window = self.window
         window.cursor(False)
         window.clear(self.look.ground)
-        end_s = self._flip_away() + duration_s - 0.5 * window.pacing.period_s
+        end_s = self.flip_away() + duration_s - 0.5 * window.pacing.period_s
         if prepare:
             following = self.session.steps[self.session.position + 1]
             if following.kind == "first":
                 self._prepare_next(following)
         while (left := end_s - window.now()) > 0:
             events = window.wait(left)
-            if self._notice(events):
-                self._ask_to_stop()
+            if self.notice(events):
+                self.ask_to_stop()
                 return False
             if any(isinstance(event, Resized) for event in events):
                 window.clear(self.look.ground)
@@ -444,10 +262,10 @@ class _Player:
     def _answer(self, step: sitting.Step) -> None:
         """Ask, and store the answer with how its stimuli were shown before anything else."""
         page = screens.answer_page(self.protocol, step, sitting.progress(self.session))
-        zero_s = self._showings[-1].last_frame_s
+        zero_s = self.showings[-1].last_frame_s
         deadline_s = None if step.duration_s is None else zero_s + step.duration_s
-        button, at = self._ask(page, deadline_s)
-        shown_well = not self._faults and all(showing.shown_well for showing in self._showings)
+        button, at = self.ask(page, deadline_s)
+        shown_well = not self.faults and all(showing.shown_well for showing in self.showings)
         before = self.session
         if button is None:
             self.session, answer = sitting.missed(before, shown_well=shown_well)
@@ -462,8 +280,8 @@ class _Player:
         self._say(f"{which}, showing {step.attempt}: answer stored{badly}")
 
     def _reasons(self) -> list[str]:
-        reasons = [*self._faults, *(fault for showing in self._showings for fault in showing.faults)]
-        worst = max(showing.longest_gap_frames for showing in self._showings)
+        reasons = [*self.faults, *(fault for showing in self.showings for fault in showing.faults)]
+        worst = max(showing.longest_gap_frames for showing in self.showings)
         if not reasons:
             reasons.append(f"a picture stood for {worst:.1f} frames")
         return list(dict.fromkeys(reasons))
@@ -471,8 +289,8 @@ class _Player:
     def _presentations(self, step: sitting.Step) -> list[Presentation]:
         method = "own clock" if self.window.pacing.own_clock else "swap"
         rows = []
-        for place, showing in zip(("first", "second"), self._showings, strict=False):
-            detail: Mapping[str, Any] = {**showing.detail(), "faults": [*showing.faults, *self._faults]}
+        for place, showing in zip(("first", "second"), self.showings, strict=False):
+            detail: Mapping[str, Any] = {**showing.detail(), "faults": [*showing.faults, *self.faults]}
             rows.append(
                 Presentation(
                     step.trial,
@@ -483,19 +301,11 @@ class _Player:
                     showing.frames_in_all,
                     len(showing.presented),
                     round(showing.longest_gap_frames, 4),
-                    showing.shown_well and not self._faults,
+                    showing.shown_well and not self.faults,
                     detail,
                 )
             )
         return rows
-
-
-def _chosen(drawn: DrawnPage, event: Event) -> Button | None:
-    if isinstance(event, Key):
-        return drawn.pressed(event.name)
-    if isinstance(event, Click):
-        return drawn.clicked(event.x, event.y)
-    return None
 
 
 @contextmanager

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.window import Click, Event, Key, Pacing, next_flip
+from renderer.events import Click, Event, Key
+from renderer.pacing import Pacing, next_flip
 from study.errors import SessionError
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from renderer.window import CloseAsked, Focus, Key, Resized, Typed
+from renderer.events import CloseAsked, Focus, Key, Resized, Typed
 from study.apps.player.loop import Outcome, play
 from study.apps.player.pages import Look, default_font
 from study.apps.player.scripted import Act, ScriptedWindow, click, press

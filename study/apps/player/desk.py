@@ -1,0 +1,166 @@
+"""The desk: puts pages before the participant and waits for what they choose, whatever else happens to the window.
+
+Used by `loop`, which knows what the pages are for. Escape and a window that is asked to close lead to a question first;
+focus and sizes are logged; a page is drawn again where the window changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Typed
+from study.apps.player import screens
+from study.apps.player.display import Display
+from study.apps.player.pages import Button, DrawnPage, Look, Page, draw_page, moved
+from study.apps.player.showing import Showing
+from study.apps.player.store import Store
+from study.errors import SessionError
+from study.experiment import session as sitting
+from study.experiment.protocol_parts import FormField
+
+_KEPT_PAGES = 6
+
+
+class Stopped(Exception):  # noqa: N818 - not an error: the participant leaves
+    """The participant leaves, from wherever the session stands."""
+
+    def __init__(self, end: str) -> None:
+        super().__init__(end)
+        self.end = end
+
+
+class Desk:
+    """A window with pages on it, and what was shown and went wrong in the present trial."""
+
+    def __init__(self, window: Display, session: sitting.Session, store: Store, look: Look) -> None:
+        self.window, self.session, self.store, self.look = window, session, store, look
+        self.protocol = session.protocol
+        self.pages: dict[tuple[Page, tuple[int, int]], tuple[DrawnPage, Any]] = {}
+        self.showings: list[Showing] = []
+        self.faults: list[str] = []
+        self.size = window.size
+
+    def drawn(self, page: Page) -> tuple[DrawnPage, Any]:
+        """A page's picture, in the window's memory; the latest few are kept."""
+        key = (page, self.window.size)
+        if key not in self.pages:
+            drawn = draw_page(page, self.window.size, self.look)
+            while len(self.pages) >= _KEPT_PAGES:
+                self.pages.pop(next(iter(self.pages)))[1].release()
+            self.pages[key] = (drawn, self.window.picture(drawn.rgb))
+        return self.pages[key]
+
+    def show_page(self, page: Page) -> tuple[DrawnPage, float]:
+        """Put a page up; with it comes when it was presented."""
+        drawn, picture = self.drawn(page)
+        self.window.paint(picture, self.look.ground)
+        return drawn, self.flip_away()
+
+    def flip_away(self) -> float:
+        """Flip to something that is no stimulus: the last frame of the stimulus before ends here."""
+        at = self.window.flip()
+        if self.showings and self.showings[-1].ended_s is None:
+            self.showings[-1] = replace(self.showings[-1], ended_s=at)
+        return at
+
+    def ask(self, page: Page, deadline_s: float | None = None) -> tuple[Button | None, float]:
+        """Show a page until one of its buttons is chosen; the button and when, or None once the time is over."""
+        self.window.cursor(True)
+        drawn, _ = self.show_page(page)
+        # Keys from before the page stood there answer nothing.
+        self.notice(self.window.poll())
+        while True:
+            left = None if deadline_s is None else deadline_s - self.window.now()
+            if left is not None and left <= 0:
+                return None, self.window.now()
+            for event in self.window.wait(left):
+                button = chosen(drawn, event)
+                if button is not None and (deadline_s is None or event.time_s <= deadline_s):
+                    return button, event.time_s
+                if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:
+                    drawn, _ = self.show_page(turned)
+                elif self.notice((event,)):
+                    self.ask_to_stop()
+                    drawn, _ = self.show_page(drawn.page)
+                elif isinstance(event, Resized):
+                    drawn, _ = self.show_page(drawn.page)
+
+    def read_until(self, page: Page) -> str:
+        """Show a page that has no time limit; the name of the button that was chosen."""
+        button, _ = self.ask(page)
+        assert button is not None, "without a deadline there is a button"
+        return button.name
+
+    def notice(self, events: tuple[Event, ...]) -> bool:
+        """Log what is to be logged; True where somebody wants to leave."""
+        leave = False
+        for event in events:
+            if isinstance(event, Resized) and event.size != self.size:
+                self.size = event.size
+                self.store.event("resized", {"viewport": list(event.size)})
+            leave = leave or isinstance(event, CloseAsked) or (isinstance(event, Key) and event.name == "escape")
+            if isinstance(event, Focus) and not event.focused:
+                self.fault("focus lost")
+            if isinstance(event, Focus):
+                step = sitting.current(self.session)
+                self.store.event("focus", {"focused": event.focused, "trial": step.trial, "step": step.kind})
+        return leave
+
+    def fault(self, what: str) -> None:
+        """Note what went wrong in a trial that has begun to be shown."""
+        if self.showings and what not in self.faults:
+            self.faults.append(what)
+
+    def ask_to_stop(self) -> None:
+        """Whether the participant wants to leave; asks inside the question change nothing."""
+        drawn, _ = self.show_page(screens.stop_page(self.protocol))
+        self.window.cursor(True)
+        self.fault("interrupted")
+        while True:
+            for event in self.window.wait(None):
+                button = chosen(drawn, event)
+                if button is not None and button.name == "stop":
+                    step = sitting.current(self.session)
+                    self.store.event("stopped", {"trial": step.trial, "step": step.kind})
+                    raise Stopped("stopped")
+                if button is not None or (isinstance(event, Key) and event.name == "escape"):
+                    return
+                if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:
+                    drawn, _ = self.show_page(turned)
+                elif isinstance(event, Resized):
+                    drawn, _ = self.show_page(drawn.page)
+
+    def field(self, field: FormField) -> str:
+        """Ask one question of the form until what is filled in can be taken; empty where it was skipped."""
+        if field.kind == "choice":
+            name = self.read_until(screens.field_page(self.protocol, field, "", False))
+            return "" if name == "go-on" else field.choices[int(name.removeprefix("choice-")) - 1]
+        entry, complaint = "", False
+        drawn, _ = self.show_page(screens.field_page(self.protocol, field, entry, complaint))
+        while True:
+            for event in self.window.wait(None):
+                button = chosen(drawn, event)
+                if button is not None:
+                    try:
+                        return sitting.field_value(field, entry.strip())
+                    except SessionError:
+                        complaint = True
+                elif isinstance(event, Typed):
+                    entry, complaint = (entry + event.character)[: sitting.LONGEST_TEXT], False
+                elif isinstance(event, Key) and event.name == "backspace":
+                    entry, complaint = entry[:-1], False
+                elif self.notice((event,)):
+                    self.ask_to_stop()
+                elif not isinstance(event, Resized):
+                    continue
+                drawn, _ = self.show_page(screens.field_page(self.protocol, field, entry, complaint))
+
+
+def chosen(drawn: DrawnPage, event: Event) -> Button | None:
+    """The button that a key or a click means."""
+    if isinstance(event, Key):
+        return drawn.pressed(event.name)
+    if isinstance(event, Click):
+        return drawn.clicked(event.x, event.y)
+    return None
