@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import differencing, estimates
+from study.analysis.decision_rules import compare_rules, fit_independent, order_test, profile_intervals
 from study.analysis.same_different import (
     Counts,
     Threshold,
@@ -49,7 +50,9 @@ def analyse_jnd(
         JSON-able: `participants`, `answers`, `missed`, `level`, `percent_different` (rows of Figure 6), `published`
         (crossings by side), `model` (`ModelFit` as a dict, or None), `model_note`, `d_prime` (rows by level),
         `clustering` (answers at the pairs with a difference), `motions` (the same per motion), `across_motions`
-        (tests), `order` (share of "different" by which came first), `answer` (a sentence).
+        (tests), `order` (share of "different" by which came first), `order_test` (`decision_rules.order_test`), `rules`
+        (differencing against independent observations), `profile` (intervals by profile likelihood, by side),
+        `answer` (a sentence).
     """
     rng = np.random.default_rng(seed)
     counts = count_answers(answers)
@@ -72,6 +75,11 @@ def analyse_jnd(
         "motions": _by_motion(given, level, confidence, resamples, rng),
         "across_motions": across_motions(given),
         "order": _by_order(given),
+        "order_test": order_test(given),
+        "rules": compare_rules(
+            fit_independent(counts, level), fitted.log_likelihood if isinstance(fitted, ModelFit) else None
+        ),
+        "profile": profile_intervals(counts, level, confidence),
     }
     return {**dict(estimates.plain(result)), "answer": in_words(published, fitted, level)}
 

@@ -48,6 +48,8 @@ class ModelFit:
         Against free percentages at each level; a small p-value says that the curve does not follow the data.
     curve
         Points (difference in frames, percent) for drawing.
+    log_likelihood
+        At the maximum, without binomial coefficients.
     note
         What to be careful about.
     """
@@ -66,6 +68,7 @@ class ModelFit:
     fit_degrees_of_freedom: int
     fit_p_value: float | None
     curve: tuple[tuple[float, float], ...]
+    log_likelihood: float
     note: str = ""
 
 
@@ -132,6 +135,7 @@ def fit_model(
         fit_degrees_of_freedom=freedom,
         fit_p_value=estimates.chi_square_probability(deviance, freedom) if freedom > 0 else None,
         curve=tuple((float(x), 100 * float(y)) for x, y in zip(line, curve, strict=True)),
+        log_likelihood=float(best.log_likelihood[0]),
         note=_caution(best),
     )
 
