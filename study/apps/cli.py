@@ -40,6 +40,7 @@ VERBS = {
     "report": "study_commands:report",
     "export": "study_commands:export",
     "fit": "analysis_commands:fit",
+    "power": "power_command:power",
     "doctor": "doctor_command:doctor",
 }
 
