@@ -120,6 +120,11 @@ def prepared(text: str = PROTOCOL) -> Any:
 def unfilmed(folder: Path, text: str = PROTOCOL) -> Manifest:
     """A results folder whose films are noise: all that a client without a screen needs."""
     record(prepared(text), folder)
+    return served_manifest(folder)
+
+
+def served_manifest(folder: Path) -> Manifest:
+    """The manifest of such a folder; its films are made where they are missing."""
     manifest = read_manifest(folder)
     videos = {}
     for number, stimulus in enumerate(manifest.records):

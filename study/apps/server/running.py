@@ -9,6 +9,7 @@ from pathlib import Path
 import uvicorn
 
 from study.apps.server.hosting import Host, Settings
+from study.apps.server.limits import Limits
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.protocol import Protocol
@@ -34,26 +35,30 @@ def run(
         Where the address can't be listened at.
     """
     manifest = read_manifest(folder)
-    listening = _listen(host, port)
+    listening = listen(host, port)
     name = f"[{host}]" if ":" in host else host
     with open_responses(folder) as responses:
         app = make_app(Host(protocol, manifest, responses, settings))
-        config = uvicorn.Config(
-            app,
-            log_level="warning",
-            access_log=False,
-            server_header=False,
-            proxy_headers=behind_proxy,
-            timeout_keep_alive=75,
-            timeout_graceful_shutdown=5,
-            backlog=2048,
-        )
         if started:
             started(f"http://{name}:{listening.getsockname()[1]}")
-        uvicorn.Server(config).run(sockets=[listening])
+        uvicorn.Server(configuration(app, behind_proxy=behind_proxy)).run(sockets=[listening])
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def configuration(app: Limits, *, behind_proxy: bool = False) -> uvicorn.Config:
+    """How uvicorn runs: quiet, with connections that outlive a trial, ending within seconds."""
+    return uvicorn.Config(
+        app,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        proxy_headers=behind_proxy,
+        timeout_keep_alive=75,
+        timeout_graceful_shutdown=5,
+    )
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket that listens; 0 is any free port."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

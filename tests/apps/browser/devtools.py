@@ -8,7 +8,7 @@ import subprocess
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +31,9 @@ class Tab:
 
     def __init__(self, browser: Browser, target: str, context: str) -> None:
         self.browser, self.target, self.context = browser, target, context
-        self.socket: ClientConnection = connect(
-            f"ws://127.0.0.1:{browser.port}/devtools/page/{target}", max_size=None, ping_interval=None, open_timeout=30
+        self.open_things = ExitStack()
+        self.socket: ClientConnection = self.open_things.enter_context(
+            connect(f"ws://127.0.0.1:{browser.port}/devtools/page/{target}", max_size=None, ping_interval=None)
         )
         self.number = 0
         self.events: list[dict[str, Any]] = []
@@ -41,15 +42,21 @@ class Tab:
 
     def call(self, method: str, timeout: float = 30, **params: Any) -> dict[str, Any]:
         self.number += 1
-        self.socket.send(json.dumps({"id": self.number, "method": method, "params": params}))
+        number = self.number
+        self.socket.send(json.dumps({"id": number, "method": method, "params": params}))
         end = time.monotonic() + timeout
         while True:
             message = json.loads(self.socket.recv(timeout=max(0.1, end - time.monotonic())))
-            if message.get("id") == self.number:
+            if message.get("id") == number:
                 assert "error" not in message, f"{method}: {message['error']}"
                 return message["result"]
             if "method" in message:
                 self.events.append(message)
+            if message.get("method") == "Page.javascriptDialogOpening":
+                # A page that asks whether one really wants to leave: one does.
+                self.number += 1
+                accept = {"id": self.number, "method": "Page.handleJavaScriptDialog", "params": {"accept": True}}
+                self.socket.send(json.dumps(accept))
 
     def open(self, address: str) -> None:
         self.call("Page.navigate", url=address)
@@ -82,15 +89,23 @@ class Tab:
         self.wait(f"document.body && document.body.innerText.includes({json.dumps(text)})", timeout)
 
     def click(self, text: str) -> None:
-        """A real click, at the middle of the button or link with a text."""
-        where = self.wait(
+        """A real click, at the middle of the button or link with a text, as soon as it is there."""
+        end = time.monotonic() + 30
+        while not self.try_click(text):
+            assert time.monotonic() < end, f"no {text!r} to click; the page says: {self.text()!r}"
+            time.sleep(0.05)
+
+    def try_click(self, text: str) -> bool:
+        """The same, where it is there now."""
+        where = self.run(
             "(() => { const b = [...document.querySelectorAll('button, a')].find("
             f"(b) => !b.disabled && b.innerText.includes({json.dumps(text)}));"
             "if (!b) return null; const r = b.getBoundingClientRect();"
             "return [r.x + r.width / 2, r.y + r.height / 2]; })()"
         )
-        for kind in ("mousePressed", "mouseReleased"):
+        for kind in ("mousePressed", "mouseReleased") if where else ():
             self.call("Input.dispatchMouseEvent", type=kind, x=where[0], y=where[1], button="left", clickCount=1)
+        return bool(where)
 
     def key(self, key: str, timestamp: float | None = None) -> None:
         more = {} if timestamp is None else {"timestamp": timestamp}
@@ -119,7 +134,7 @@ class Tab:
         return found
 
     def close(self) -> None:
-        self.socket.close()
+        self.open_things.close()
         self.browser.http(f"/json/close/{self.target}")
 
 
@@ -128,7 +143,10 @@ class Browser:
 
     def __init__(self, process: subprocess.Popen[bytes], port: int, path: str) -> None:
         self.process, self.port = process, port
-        self.socket = connect(f"ws://127.0.0.1:{port}{path}", max_size=None, ping_interval=None)
+        self.open_things = ExitStack()
+        self.socket: ClientConnection = self.open_things.enter_context(
+            connect(f"ws://127.0.0.1:{port}{path}", max_size=None, ping_interval=None)
+        )
         self.number = 0
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
@@ -151,8 +169,10 @@ class Browser:
     def tab(self, person: str | None = None) -> Tab:
         """A tab of a person (a new one unless given)."""
         person = person or self.person()
-        target = self.call("Target.createTarget", url="about:blank", browserContextId=person, width=1280, height=720)
-        return Tab(self, target["targetId"], person)
+        target = self.call("Target.createTarget", url="about:blank", browserContextId=person, newWindow=True)
+        tab = Tab(self, target["targetId"], person)
+        tab.size(1280, 720)
+        return tab
 
 
 @contextmanager
@@ -171,7 +191,7 @@ def chromium(executable: str, profile: Path) -> Iterator[Browser]:
         port, path = file.read_text().split("\n")[:2]
         browser = Browser(process, int(port), path)
         yield browser
-        browser.socket.close()
+        browser.open_things.close()
     finally:
         process.terminate()
         try:

@@ -1,0 +1,80 @@
+"""A study of tiny films, a server, and a real Chromium; where all parts are required, a missing one fails."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from devtools import Browser, Tab, chromium
+from serving import PROTOCOL, Site, prepared
+
+from study.experiment.rendering import render
+
+EXECUTABLES = ("chromium", "chromium-browser", "google-chrome")
+
+
+def missing(part: str, how: str) -> None:
+    message = f"{part} is missing: {how}"
+    if os.environ.get("SEGUE_REQUIRE_ALL") == "1":
+        pytest.fail(message)
+    pytest.skip(message)
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    executable = next((found for name in EXECUTABLES if (found := shutil.which(name))), None)
+    if executable is None:
+        missing("Chromium", "on Debian, apt-get install chromium")
+    with chromium(str(executable), tmp_path_factory.mktemp("profile")) as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def films(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A results folder with films; sites get copies."""
+    from renderer.errors import RendererError
+    from study.errors import StimulusError
+
+    folder = tmp_path_factory.mktemp("films")
+    try:
+        render(prepared(PROTOCOL), folder, workers=1)
+    except (RendererError, StimulusError) as error:
+        missing("a context to draw films with", str(error))
+    return folder
+
+
+@pytest.fixture
+def make_site(films: Path, tmp_path: Path) -> Iterator[Callable[..., Site]]:
+    """`make_site(**settings)`: a running server on a copy of the study."""
+    sites: list[Site] = []
+
+    def make(**settings: Any) -> Site:
+        folder = tmp_path / f"site-{len(sites)}"
+        shutil.copytree(films, folder)
+        sites.append(Site(folder, **settings))
+        return sites[-1]
+
+    yield make
+    for site in sites:
+        site.film_fault = None
+        site.stop()
+
+
+@pytest.fixture
+def make_tab(browser: Browser) -> Iterator[Callable[..., Tab]]:
+    """`make_tab(person=None)`: a tab; at the end no page may have thrown anything."""
+    tabs: list[Tab] = []
+
+    def make(person: str | None = None) -> Tab:
+        tabs.append(browser.tab(person))
+        return tabs[-1]
+
+    yield make
+    complaints = [complaint for tab in tabs for complaint in tab.complaints()]
+    for tab in tabs:
+        tab.close()
+    assert complaints == []

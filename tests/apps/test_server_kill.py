@@ -1,0 +1,140 @@
+"""The server is killed at random moments: every acknowledged answer is there, none twice, and sessions go on."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from serving import answer_to, free_port, unfilmed
+
+from study.experiment.responses import answers_frame, open_responses
+
+ROLES = ("trial", "practice", "check")
+CLIENTS = 3
+
+
+@dataclass
+class Client:
+    """A participant who answers as fast as can be and sends again what was not acknowledged."""
+
+    address: str
+    number: int
+    stop: threading.Event
+    cookie: str = ""
+    finished: int = 0
+    acknowledged: list[tuple[str, int, str, int, str | None]] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+
+    @property
+    def page(self) -> str:
+        return f"page-of-client-{self.number}"
+
+    def post(self, path: str, body: object) -> dict[str, object]:
+        """Until the server has it."""
+        headers = {
+            "content-type": "application/json",
+            "x-segue-page": f"page-of-client-{self.number}",
+            "cookie": self.cookie,
+        }
+        request = urllib.request.Request(f"{self.address}{path}", json.dumps(body).encode(), headers)
+        while not self.stop.is_set():
+            try:
+                with urllib.request.urlopen(request, timeout=5) as response:
+                    if cookie := response.headers.get("set-cookie"):
+                        self.cookie = cookie.split(";")[0]
+                    return json.loads(response.read())
+            except urllib.error.HTTPError as refusal:
+                self.wrong.append(f"{path}: {refusal.code} {refusal.read()!r}")
+                self.stop.set()
+            except (OSError, ValueError):
+                time.sleep(0.01)
+        return {}
+
+    def run(self) -> None:
+        while not self.stop.is_set():
+            self.cookie = ""
+            name = f"c{self.number}-{self.finished}"
+            view = self.post("/api/begin", {"page": self.page, "parameters": {"participant": name}})
+            if view.get("kind") == "taken":
+                # The session was begun, and the server was killed before its cookie arrived.
+                self.finished += 1
+                continue
+            while view and view["kind"] != "done":
+                if view["kind"] == "trial":
+                    message = answer_to(view, random.choice(view["question"]["options"])["value"])
+                    view = self.post("/api/answer", message)
+                    if view:
+                        if view["counted"] is not True:
+                            self.wrong.append(f"{name}: {message['trial']} was not counted")
+                        key = (name, message["trial"], message["item"], message["attempt"], message["value"])
+                        self.acknowledged.append(key)
+                else:
+                    values = {"age": "33"} if view["kind"] == "form" else {}
+                    view = self.post("/api/done", {"step": view["step"], "values": values})
+            self.finished += bool(view)
+
+
+def start(folder: Path, port: int) -> subprocess.Popen[bytes]:
+    here = Path(__file__).parent
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(here), str(here.parents[1])))}
+    command = [sys.executable, str(here / "server_child.py"), str(folder), str(port)]
+    child = subprocess.Popen(command, env=environment)
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        assert child.poll() is None, "the server ended at once"
+        try:
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/api/study", timeout=1).close()
+        except OSError:
+            time.sleep(0.02)
+        else:
+            return child
+    raise AssertionError("the server did not start")
+
+
+@pytest.mark.parametrize("kills", [4, pytest.param(200, marks=pytest.mark.slow)])
+def test_acknowledged_answers_survive_kills(tmp_path, kills):
+    unfilmed(tmp_path)
+    port, stop = free_port(), threading.Event()
+    clients = [Client(f"http://127.0.0.1:{port}", number, stop) for number in range(CLIENTS)]
+    threads = [threading.Thread(target=client.run) for client in clients]
+    dice = random.Random(5)
+    child = start(tmp_path, port)
+    for thread in threads:
+        thread.start()
+    try:
+        for _ in range(kills):
+            time.sleep(dice.uniform(0.02, 0.6))
+            os.kill(child.pid, signal.SIGKILL)
+            child.wait()
+            child = start(tmp_path, port)
+        time.sleep(0.3)
+    finally:
+        stop.set()
+        for thread in threads:
+            thread.join()
+        child.kill()
+        child.wait()
+    assert [wrong for client in clients for wrong in client.wrong] == []
+    acknowledged = [key for client in clients for key in client.acknowledged]
+    assert len(acknowledged) > 3 * kills
+    with open_responses(tmp_path) as responses:
+        table = answers_frame(responses, roles=ROLES, all_attempts=True)
+    columns = ["participant", "trial", "item", "attempt", "answer"]
+    stored = [tuple(row) for row in table[columns].itertuples(index=False)]
+    print(f"{kills} kills, {len(acknowledged)} acknowledged answers, {len(stored)} stored")
+    assert len({row[:4] for row in stored}) == len(stored)
+    assert set(acknowledged) <= set(stored)
+    assert len(acknowledged) == len(set(acknowledged))
+    # At most the one that each client had under way was stored without its word of it arriving.
+    assert len(stored) - len(acknowledged) <= CLIENTS * 2
