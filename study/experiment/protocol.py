@@ -244,6 +244,29 @@ class StudySpec(_Part):
         return (self.reference,) if self.comparison is None else (self.reference, self.comparison)
 
 
+class Exclusions(_Part):
+    """What the analysis leaves out, stated before there is data; nothing where nothing is stated."""
+
+    fastest_s: float | None = Field(
+        default=None, gt=0, le=10, description="Leave out answers sooner than this. [seconds]"
+    )
+    badly_shown: bool = Field(
+        default=False, description="Leave out answers after a stimulus that stalled or was hidden."
+    )
+    most_missed: float | None = Field(
+        default=None, ge=0, lt=1, description="Leave out participants who missed a larger share of their trials."
+    )
+    most_failed_checks: float | None = Field(
+        default=None, ge=0, lt=1, description="Leave out participants who failed more of the attention checks."
+    )
+    most_too_fast: float | None = Field(
+        default=None,
+        ge=0,
+        lt=1,
+        description="Leave out participants with a larger share of answers sooner than `fastest_s`, or 0.2 s.",
+    )
+
+
 class AnalysisSettings(_Part):
     """What was decided about the analysis before there was data."""
 
@@ -251,6 +274,7 @@ class AnalysisSettings(_Part):
         default=0.75, gt=0, lt=1, description="Proportion that defines the just noticeable difference."
     )
     alpha: float = Field(default=0.01, gt=0, lt=1, description="Level of significance (2004 section 5.2).")
+    exclusions: Exclusions = Field(default=Exclusions(), description="Who and what is left out.")
 
 
 class Protocol(_Part):
