@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from study.analysis import estimates
 from study.analysis.anova import rating_anova
+from study.analysis.exclusions import Rules, exclude
 from study.analysis.jnd import analyse_jnd
 from study.analysis.preference import compare, confirmatory, strengths
 from study.analysis.quality import quality
@@ -26,6 +27,8 @@ def analyse(
     alpha: float = 0.05,
     resamples: int = 1000,
     seed: int = 0,
+    rules: Rules | None = None,
+    checks: pd.DataFrame | None = None,
 ) -> dict[str, Any]:
     """Analyse every study in a table of answers.
 
@@ -42,6 +45,8 @@ def analyse(
         Level of significance that sentences speak of.
     resamples, seed
         Of the bootstrap over participants behind the standard errors; the same seed gives the same numbers.
+    rules, checks
+        What is left out, as stated before there was data, and the answers to attention checks.
 
     Returns
     -------
@@ -50,7 +55,9 @@ def analyse(
         pairs of methods), `confirmatory` (their default tests, adjusted together by Holm's method), `bradley_terry`
         (strengths by study, where more than two methods were compared), `ratings` and `rating_anova` (by name of a
         rating study), each empty where there is none;
-        `quality`, `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
+        `exclusions` (what was left out by which rule), `without_exclusions` (the same results of all answers; None
+        where none was left out), `quality` (of all answers),
+        `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
 
     Raises
     ------
@@ -63,6 +70,24 @@ def analyse(
     strange = sorted(set(answers["task"].astype(str)) - set(TASKS))
     if strange:
         raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {strange[0]!r}")
+    kept = exclude(answers, rules or Rules(), checks)
+    settings = (threshold, confidence, alpha, resamples, seed)
+    result = _studies_analysed(kept.answers, settings)
+    left_out = {name: getattr(kept, name) for name in ("rules", "participants", "answers_left_out")}
+    result |= {
+        "exclusions": left_out,
+        "without_exclusions": _studies_analysed(answers, settings) if kept.answers_left_out else None,
+        "quality": quality(answers),
+        "data": kind_of_data(answers),
+        "confidence": confidence,
+        "alpha": alpha,
+    }
+    return dict(estimates.plain(result))
+
+
+def _studies_analysed(answers: pd.DataFrame, settings: tuple[float, float, float, int, int]) -> dict[str, Any]:
+    """Every study of a table of answers."""
+    threshold, confidence, alpha, resamples, seed = settings
     result: dict[str, Any] = {"jnd": {}, "preference": {}, "bradley_terry": {}, "ratings": {}, "rating_anova": {}}
     for (task, study), part in answers.groupby([answers["task"].astype(str), _studies(answers)], sort=False):
         if task == "same-different":
@@ -76,8 +101,7 @@ def analyse(
             result["ratings"][study] = rating_table(part, confidence)
             result["rating_anova"][study] = rating_anova(part, confidence)
     result["confirmatory"] = confirmatory(result["preference"])
-    result |= {"quality": quality(answers), "data": kind_of_data(answers), "confidence": confidence, "alpha": alpha}
-    return dict(estimates.plain(result))
+    return result
 
 
 def _studies(answers: pd.DataFrame) -> pd.Series[str]:

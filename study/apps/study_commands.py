@@ -80,6 +80,7 @@ def simulate_participants(
 
 def analyse_results(folder: Path) -> dict[str, Any]:
     """All analyses of a results folder, as its protocol decided."""
+    from study.analysis.exclusions import rules_of
     from study.analysis.summary import analyse as analyse_all
     from study.experiment.protocol import load_protocol
     from study.experiment.rendering import PROTOCOL
@@ -87,8 +88,9 @@ def analyse_results(folder: Path) -> dict[str, Any]:
 
     settings = load_protocol(folder / PROTOCOL).analysis
     with open_responses(folder) as responses:
-        answers = answers_frame(responses)
-    return analyse_all(answers, threshold=settings.threshold, alpha=settings.alpha)
+        answers, checks = answers_frame(responses), answers_frame(responses, roles=("check",))
+    rules = rules_of(settings.exclusions.model_dump())
+    return analyse_all(answers, threshold=settings.threshold, alpha=settings.alpha, rules=rules, checks=checks)
 
 
 def headlines(analysis: dict[str, Any]) -> list[str]:

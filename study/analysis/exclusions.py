@@ -1,0 +1,159 @@
+"""Who and what is left out, by rules stated before there was data: answers in, those that are kept and a count out.
+
+Rules come from the protocol. Each answer or participant left out is counted under the first rule that it breaks, and
+the analysis is given with and without them, so that nobody has to trust the rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is left out; None and False leave nothing out.
+
+    Attributes
+    ----------
+    fastest_s
+        Answers sooner than this. [seconds]
+    badly_shown
+        Answers after a stimulus that stalled or was hidden.
+    most_missed
+        Participants who missed a larger share of their trials.
+    most_failed_checks
+        Participants who failed a larger share of the attention checks.
+    most_too_fast
+        Participants with a larger share of answers sooner than `fastest_s` (0.2 s where that is not stated).
+    """
+
+    fastest_s: float | None = None
+    badly_shown: bool = False
+    most_missed: float | None = None
+    most_failed_checks: float | None = None
+    most_too_fast: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What is left.
+
+    Attributes
+    ----------
+    answers
+        Rows that are kept.
+    rules
+        In words, with `participants` and `answers` left out by each.
+    participants
+        Those left out, each with a reason.
+    answers_left_out
+        All of them, those of participants left out included.
+    """
+
+    answers: pd.DataFrame
+    rules: tuple[dict[str, Any], ...]
+    participants: tuple[dict[str, str], ...]
+    answers_left_out: int
+
+
+IMPOSSIBLE_S = 0.2
+
+
+def rules_of(settings: Mapping[str, Any]) -> Rules:
+    """Return rules from a protocol's table of them."""
+    return Rules(**{name: settings[name] for name in Rules.__dataclass_fields__ if name in settings})
+
+
+def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = None) -> Kept:
+    """Apply the rules.
+
+    Parameters
+    ----------
+    answers
+        The table of answers.
+    rules
+        From the protocol.
+    checks
+        Answers to attention checks: `participant`, `answer`, `expected`; needed by that rule alone.
+
+    Notes
+    -----
+    Participants are judged by all their answers, before single answers are left out.
+    """
+    import pandas as pd
+
+    who = answers["participant"].astype(str)
+    gone = pd.Series(False, index=answers.index)
+    counts: list[dict[str, Any]] = []
+    people: list[dict[str, str]] = []
+    for words, reasons in _participants_out(answers, rules, checks):
+        fresh = {name: reason for name, reason in reasons.items() if name not in {row["participant"] for row in people}}
+        rows = who.isin(list(fresh)) & ~gone
+        gone |= rows
+        people += [{"participant": name, "reason": reason} for name, reason in sorted(fresh.items())]
+        counts.append({"rule": words, "participants": len(fresh), "answers": int(rows.sum())})
+    for words, rows in _answers_out(answers, rules):
+        rows &= ~gone
+        gone |= rows
+        counts.append({"rule": words, "participants": 0, "answers": int(rows.sum())})
+    return Kept(answers[~gone], tuple(counts), tuple(people), int(gone.sum()))
+
+
+def _times(answers: pd.DataFrame) -> pd.Series[float]:
+    import pandas as pd
+
+    if "response_s" not in answers.columns:
+        return pd.Series(np.nan, index=answers.index)
+    return pd.to_numeric(answers["response_s"], errors="coerce").astype(float)
+
+
+def _participants_out(
+    answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None
+) -> list[tuple[str, dict[str, str]]]:
+    """For each rule on participants, in words, whom it leaves out and why."""
+    found = []
+    missed = answers["answer"].isna().groupby(answers["participant"].astype(str)).mean()
+    if rules.most_missed is not None:
+        words = f"participants who missed more than {100 * rules.most_missed:g}% of their trials"
+        found.append((words, {str(n): f"missed {100 * s:.0f}%" for n, s in missed.items() if s > rules.most_missed}))
+    if rules.most_failed_checks is not None:
+        words = f"participants who failed more than {100 * rules.most_failed_checks:g}% of the attention checks"
+        failed: dict[str, str] = {}
+        if checks is not None and len(checks):
+            wrong = (checks["answer"].isna() | (checks["answer"] != checks["expected"])).astype(float)
+            shares = wrong.groupby(checks["participant"].astype(str)).mean()
+            failed = {
+                str(n): f"failed {100 * s:.0f}% of the checks"
+                for n, s in shares.items()
+                if s > rules.most_failed_checks
+            }
+        found.append((words, failed))
+    if rules.most_too_fast is not None:
+        least = rules.fastest_s if rules.fastest_s is not None else IMPOSSIBLE_S
+        words = f"participants with more than {100 * rules.most_too_fast:g}% of answers sooner than {least:g} s"
+        given = answers[answers["answer"].notna()]
+        fast = (_times(given) < least).groupby(given["participant"].astype(str)).mean()
+        found.append((words, {str(n): f"{100 * s:.0f}% too fast" for n, s in fast.items() if s > rules.most_too_fast}))
+    return found
+
+
+def _answers_out(answers: pd.DataFrame, rules: Rules) -> list[tuple[str, pd.Series[bool]]]:
+    """For each rule on answers, in words, which it leaves out."""
+    found = []
+    if rules.fastest_s is not None:
+        found.append((f"answers sooner than {rules.fastest_s:g} s", (_times(answers) < rules.fastest_s).fillna(False)))
+    if rules.badly_shown:
+        import pandas as pd
+
+        badly = pd.Series(False, index=answers.index)
+        if "shown_well" in answers.columns:
+            badly = answers["answer"].notna() & ~answers["shown_well"].fillna(True).astype(bool)
+        found.append(("answers after a stimulus that stalled or was hidden", badly))
+    return found
