@@ -27,7 +27,7 @@ def film_name(participant: Participant, step: Step) -> str:
 def step_key(session: Session) -> str:
     """The name of a step that is read, the same after a restart of the server."""
     step = sitting.current(session)
-    trial = next((other.trial for other in session.steps[session.position :] if other.trial), 0)
+    trial = next((other.trial for other in _near(session)), 0)
     return f"{step.kind}/{step.study}/{trial}"
 
 
@@ -35,16 +35,21 @@ def films_due(session: Session) -> list[Step]:
     """The steps whose films a participant may load now: those of this trial and of the next, or the example."""
     step = sitting.current(session)
     due = [step] if step.kind == "instructions" and step.stimulus else []
-    return due + [
-        other
-        for other in session.steps[session.position :]
-        if other.kind in ("first", "second") and other.trial in _next_trials(session)
-    ]
+    return due + [other for other in _near(session) if other.kind in ("first", "second")]
 
 
-def _next_trials(session: Session) -> tuple[int, ...]:
-    trials = dict.fromkeys(step.trial for step in session.steps[session.position :] if step.trial)
-    return tuple(trials)[:2]
+def _near(session: Session) -> list[Step]:
+    """The steps of the next two trials that there are."""
+    near: list[Step] = []
+    trials: set[tuple[int, int]] = set()
+    for position in range(session.position, len(session.steps)):
+        step = session.steps[position]
+        if step.trial:
+            trials.add((step.trial, step.attempt))
+            if len(trials) > 2:
+                break
+            near.append(step)
+    return near
 
 
 def to_view(session: Session) -> Session:
@@ -79,15 +84,18 @@ def view(session: Session, participant: Participant, frames: Mapping[str, int]) 
 
 def _trial(session: Session, participant: Participant, frames: Mapping[str, int]) -> dict[str, Any]:
     step = sitting.current(session)
-    own = [other for other in session.steps[session.position :] if other.trial == step.trial]
-    own = [other for other in own if other.attempt == step.attempt]
+    near = _near(session)
+    own = [other for other in near if (other.trial, other.attempt) == (step.trial, step.attempt)]
     question = next(other for other in own if other.kind == "answer")
-    following = _next_trials(session)[1:]
     return {
         **_asking(session, question),
         "films": [_film(other, participant, frames) for other in own if other.kind in ("first", "second")],
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
-        "ahead": [_film(other, participant, frames) for other in films_due(session) if other.trial in following],
+        "ahead": [
+            _film(other, participant, frames)
+            for other in near
+            if other not in own and other.kind in ("first", "second")
+        ],
     }
 
 
