@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from study.experiment.protocol import Protocol
+    from study.experiment.responses import Responses
     from study.experiment.stimuli import Manifest
 
 Result = Mapping[str, Any]
@@ -38,6 +39,8 @@ class Material:
     manifest: Manifest
     answers: pd.DataFrame
     sessions: pd.DataFrame
+    checks: pd.DataFrame
+    presentations: pd.DataFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,11 @@ class Page:
     warnings: tuple[str, ...]
     sections: tuple[Section, ...]
     response: Drawing | None
+    learning: Drawing | None
+    course: tables.Table
+    presentation: tables.Table | None
+    exclusions: tables.Table | None
+    exclusion_sentence: str
     quality: Result
     quality_sentence: str
     strips: tuple[Preview, ...]
@@ -86,12 +94,20 @@ def write_report(results_folder: str | Path, *, resamples: int = 1000) -> Path:
     SegueError
         When a part of the folder is missing or can't be read.
     """
+    from study.analysis.exclusions import rules_of
     from study.analysis.summary import analyse
 
     folder = Path(results_folder)
     material = gather(folder)
     settings = material.protocol.analysis
-    analysis = analyse(material.answers, threshold=settings.threshold, alpha=settings.alpha, resamples=resamples)
+    analysis = analyse(
+        material.answers,
+        threshold=settings.threshold,
+        alpha=settings.alpha,
+        resamples=resamples,
+        rules=rules_of(settings.exclusions.model_dump()),
+        checks=material.checks,
+    )
     page = compose(material, analysis)
     write_tables(folder / "tables", all_tables(page), analysis)
     path = folder / "report.html"
@@ -122,14 +138,27 @@ def gather(folder: Path) -> Material:
         )
     with open_responses(database) as responses:
         answers, sessions = answers_frame(responses), session_table(responses)
+        checks, presentations = answers_frame(responses, roles=("check",)), _presentations(responses)
     if answers.empty:
         raise AnalysisError(f"{database}: expected answers, found none; collect or simulate sessions first")
-    return Material(protocol, manifest, answers, sessions)
+    return Material(protocol, manifest, answers, sessions, checks, presentations)
+
+
+def _presentations(responses: Responses) -> pd.DataFrame:
+    """How every stimulus was shown."""
+    import pandas as pd
+    import sqlalchemy as sa
+
+    from study.experiment.response_tables import presentations
+
+    with responses.engine.connect() as connection:
+        rows = connection.execute(sa.select(presentations)).mappings().all()
+    return pd.DataFrame([dict(row) for row in rows], columns=[column.name for column in presentations.c])
 
 
 def compose(material: Material, analysis: Result) -> Page:
     """Turn material and analysis into what the page shows."""
-    from study.report import figures, media, shown
+    from study.report import course, figures, media, shown
 
     protocol, manifest, answers = material.protocol, material.manifest, material.answers
     data, quality = str(analysis["data"]), analysis["quality"]
@@ -139,6 +168,9 @@ def compose(material: Material, analysis: Result) -> Page:
     if svg:
         caption = "Response times: all answers with the median, and the median over the session."
         response = Drawing(svg, caption)
+    learned = course.learning_table(answers)
+    line = course.learning_figure(learned, "learning", mark)
+    learning = Drawing(line, learned.caption) if line else None
     return Page(
         title=protocol.title,
         source=words.sentence(protocol.source),
@@ -148,6 +180,11 @@ def compose(material: Material, analysis: Result) -> Page:
         ),
         sections=tuple(_sections(material, analysis, mark)),
         response=response,
+        learning=learning,
+        course=learned,
+        presentation=course.presentation_table(material.presentations) if len(material.presentations) else None,
+        exclusions=course.exclusion_table(analysis),
+        exclusion_sentence=course.exclusion_sentence(analysis),
         quality=quality,
         quality_sentence=_quality_sentence(quality),
         strips=tuple(media.embed_strips(manifest)),
@@ -178,7 +215,8 @@ def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
             found.append(sections.jnd_section(study.name, title, result, fps=fps, data=data, mark=mark, known=truth))
         elif study.name in analysis["preference"]:
             comparisons = [_in_order(comparison, names) for comparison in analysis["preference"][study.name]]
-            found.append(sections.preference_section(study.name, title, comparisons, mark=mark))
+            strong = analysis["bradley_terry"].get(study.name)
+            found.append(sections.preference_section(study.name, title, comparisons, mark=mark, strengths=strong))
         elif study.name in analysis["ratings"]:
             rows, points = analysis["ratings"][study.name], study.scale_points
             variance = analysis.get("rating_anova", {}).get(study.name, ())
@@ -235,7 +273,7 @@ def _quality_sentence(quality: Result) -> str:
     if quality["shown_badly"]:
         badly = words.number(quality["shown_badly"], "answer")
         text += f" {badly} followed a stimulus that stalled or was hidden, and count all the same."
-    return text + f" {words.number(quality['flagged'], 'participant')} flagged; nobody was left out."
+    return text + f" {words.number(quality['flagged'], 'participant')} flagged."
 
 
 def _shown_sentence(manifest: Manifest) -> str:
@@ -282,7 +320,8 @@ def _versions(material: Material) -> tuple[tuple[str, str], ...]:
 def all_tables(page: Page) -> list[tables.Table]:
     """Every table of the page."""
     found = [table for section in page.sections for table in (*section.tables, *section.folded)]
-    return [*found, page.stimuli, page.motions, page.participants]
+    optional = [table for table in (page.presentation, page.exclusions) if table is not None]
+    return [*found, page.stimuli, page.motions, page.participants, page.course, *optional]
 
 
 def write_tables(folder: Path, chosen: Sequence[tables.Table], analysis: Result) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from study.report import figures, tables, words
+from study.report import course, figures, tables, words
 from study.report.tables import Table
 
 Result = Mapping[str, Any]
@@ -254,7 +254,9 @@ def recovery_table(name: str, result: Result, known: Result) -> Table:
 # Preferences
 
 
-def preference_section(name: str, title: str, comparisons: Sequence[Result], *, mark: str) -> Section:
+def preference_section(
+    name: str, title: str, comparisons: Sequence[Result], *, mark: str, strengths: Result | None = None
+) -> Section:
     """Return the section of a preference study."""
     anchor = f"study-{name}"
     drawings, shown, folded, notes = [], [], [], []
@@ -271,8 +273,22 @@ def preference_section(name: str, title: str, comparisons: Sequence[Result], *, 
         shown.append(preference_table(name + suffix, comparison))
         folded.append(preference_motion_table(name + suffix, comparison))
         notes += words.preference_notes(comparison)
+    if strengths is not None and strengths.get("strengths"):
+        shown.append(course.strengths_table(name, strengths))
     headlines = tuple(words.preference_headline(comparison) for comparison in comparisons)
     return Section(anchor, title, "preference", headlines, tuple(drawings), tuple(shown), tuple(notes), tuple(folded))
+
+
+def _model_rows(models: Result | None) -> list[dict[str, Any]]:
+    """The mixed model and the estimating equations, where they could be fitted."""
+    if not models:
+        return []
+    names = (("mixed", "a typical participant", "logistic mixed model"), ("gee", "the population", "GEE"))
+    return [
+        {"reading": reading, "test": test, **{key: models[name][key] for key in ("percent", "low", "high", "p_value")}}
+        for name, reading, test in names
+        if models[name]["percent"] is not None
+    ]
 
 
 def preference_table(name: str, comparison: Result) -> Table:
@@ -306,13 +322,15 @@ def preference_table(name: str, comparison: Result) -> Table:
             "p_value": people["robust_p_value"],
         },
         {"reading": "orders balanced", "percent": order.get("balanced_percent")},
+        *_model_rows(comparison.get("models")),
     ]
     return tables.make(
         f"{name}_preference",
         f"Percent favouring {words.readable(comparison['method_a'])} over {words.readable(comparison['method_b'])}. "
         "As published: all answers as independent, which a participant’s answers are not. Corrected: one share a "
         "participant, by Student’s t and by ranks; and the pooled percentage with its variance over participants. "
-        "Orders balanced: the mean of the percentages with the first method shown first and second.",
+        "Orders balanced: the mean of the percentages with the first method shown first and second. A typical "
+        "participant and the population: models with a term for the order, which differ where participants do.",
         [
             ("reading", "reading", "text"),
             ("percent", "percent", "one"),

@@ -113,7 +113,7 @@ def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
     ]
     return tables.make(
         "participants",
-        "Participants. Flags follow the rules above; nobody was left out.",
+        "Participants. Flags follow the rules above and leave nobody out.",
         [
             ("participant", "participant", "text"),
             ("kind", "kind", "text"),

@@ -146,6 +146,15 @@ def jnd_notes(result: Result) -> list[str]:
             notes.append(_equal_slopes(model["equal_slopes"]))
         if model["note"]:
             notes.append(f"Caution: {model['note']}.")
+    if result.get("rules", {}).get("independent"):
+        notes.append(result["rules"]["answer"])
+    order = result.get("order_test") or {}
+    if order.get("p_value") is not None:
+        gap = f"{order['difference_percent']:+.1f}".replace("-", "−")
+        notes.append(
+            f"By order: {gap} percentage points more “different” where the reference came first, p "
+            f"{_p(order['p_value'])} over participants; neither rule expects the order to matter."
+        )
     if motions["chi_square_p_value"] is not None:
         notes.append(_across_motions(motions))
     effect = result["clustering"]["design_effect"]
@@ -215,7 +224,26 @@ def preference_notes(comparison: Result) -> list[str]:
     if order["first_percent"] is not None:
         test = f", p {_p(order['p_value'])} over participants" if order["p_value"] is not None else ""
         notes.append(f"The transition shown first was favoured in {order['first_percent']:.1f}% of the answers{test}.")
+    notes += _no_preference(comparison.get("no_preference"))
+    if (comparison.get("models") or {}).get("differ"):
+        notes.append(comparison["models"]["differ"])
     return notes
+
+
+def _no_preference(found: Result | None) -> list[str]:
+    """The evidence for no preference, where it could be weighed."""
+    if not found or found["equivalence_p_value"] is None:
+        return []
+    margin, factor = 100 * found["margin"], found["bayes_factor_null"]
+    text = (
+        f"Evidence for no preference: the share lies within {50 - margin:g} to {50 + margin:g}% with p "
+        f"{_p(found['equivalence_p_value'])} (two one-sided tests over participants)"
+    )
+    if factor is None:
+        return [f"{text}."]
+    weight, side = (factor, "without") if factor >= 1 else (1 / factor, "with")
+    times = f"{weight:.1f}" if weight < 1000 else "over 1,000"
+    return [f"{text}; the data are {times} times likelier {side} a preference (Bayes factor, Cauchy prior of 0.71)."]
 
 
 def methods_paragraph(protocol: Any, manifest: Any, analysis: Result, participants: str) -> list[str]:
@@ -250,9 +278,18 @@ def methods_paragraph(protocol: Any, manifest: Any, analysis: Result, participan
         "intervals are Student’s, on the logarithm, from a jackknife over participants. Preferences were tested as "
         "published (chi-square over all answers) and with one share a participant (Student’s t). The level of "
         f"significance is {protocol.analysis.alpha:g}, intervals are of {100 * analysis['confidence']:g}%. Missed "
-        "answers were left out and counted; no participant was excluded."
+        "answers were left out and counted. " + _excluded(analysis)
     )
     return [first, second]
+
+
+def _excluded(analysis: Result) -> str:
+    found = analysis["exclusions"]
+    if not found["rules"]:
+        return "No participant was excluded."
+    rules = joined([rule["rule"] for rule in found["rules"]])
+    people = number(len(found["participants"]), "participant")
+    return f"Left out, as stated beforehand, were {rules}: {found['answers_left_out']} answers in all, {people} wholly."
 
 
 def _task(study: Any) -> str:

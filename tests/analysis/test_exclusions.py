@@ -66,4 +66,5 @@ def test_everybody_left_out_is_no_crash(answers: pd.DataFrame) -> None:
     result = analyse(answers, resamples=10, rules=Rules(fastest_s=5.0))
     assert result["exclusions"]["answers_left_out"] == 80
     assert result["data"] == "simulated"
-    assert result["preference"]["geodesic"] == []
+    assert result["preference"] == {}
+    assert len(result["without_exclusions"]["preference"]["geodesic"]) == 1
