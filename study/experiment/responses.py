@@ -324,7 +324,7 @@ def record_answer(
     """
     try:
         with responses.engine.begin() as connection:
-            insert_answer(connection, record, answer, shown, clock())
+            insert_rows(connection, answer_rows(record, answer, shown, clock()))
     except sa.exc.IntegrityError as error:
         if answer in stored_answers(responses, record.id):
             return False
@@ -335,15 +335,23 @@ def record_answer(
     return True
 
 
-def insert_answer(
-    connection: sa.Connection, record: SessionRecord, answer: Answer, shown: Sequence[Presentation], at: datetime
-) -> None:
-    """The rows of one answer within a transaction of the caller's."""
+Row = tuple[sa.Insert, dict[str, Any]]
+
+
+def answer_rows(record: SessionRecord, answer: Answer, shown: Sequence[Presentation], at: datetime) -> list[Row]:
+    """The rows of one answer, for a transaction of the caller's (`insert_rows`)."""
     values = {**_trial_values(record.plan.trial(answer.trial)), **_answer_values(record.plan, answer)}
-    connection.execute(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values})
-    if shown:
-        rows = [{"session_id": record.id, "at": at, **_presentation_values(one)} for one in shown]
-        connection.execute(_INSERT_PRESENTATION, rows)
+    presented = [(_INSERT_PRESENTATION, {"session_id": record.id, "at": at, **_presentation_values(o)}) for o in shown]
+    return [(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values}), *presented]
+
+
+def insert_rows(connection: sa.Connection, rows: Sequence[Row]) -> None:
+    """Insert rows of any tables within a transaction; those of one table together, in their order."""
+    tables: dict[sa.Insert, list[dict[str, Any]]] = {}
+    for statement, row in rows:
+        tables.setdefault(statement, []).append(row)
+    for statement, together in tables.items():
+        connection.execute(statement, together)
 
 
 _INSERT_ANSWER, _INSERT_PRESENTATION, _INSERT_EVENT = sa.insert(answers), sa.insert(presentations), sa.insert(events)
@@ -388,15 +396,13 @@ def record_event(
 ) -> None:  # fmt: skip
     """Append what happened in a session besides answers (finished, faults, focus lost)."""
     with responses.engine.begin() as connection:
-        insert_event(connection, record, kind, detail, clock())
+        insert_rows(connection, [event_row(record, kind, detail, clock())])
 
 
-def insert_event(
-    connection: sa.Connection, record: SessionRecord, kind: str, detail: Mapping[str, Any] | None, at: datetime
-) -> None:
-    """The row of one event within a transaction of the caller's."""
+def event_row(record: SessionRecord, kind: str, detail: Mapping[str, Any] | None, at: datetime) -> Row:
+    """The row of one event, for a transaction of the caller's."""
     text = None if detail is None else json.dumps(detail, sort_keys=True)
-    connection.execute(_INSERT_EVENT, {"session_id": record.id, "kind": kind, "at": at, "detail_json": text})
+    return _INSERT_EVENT, {"session_id": record.id, "kind": kind, "at": at, "detail_json": text}
 
 
 def has_event(responses: Responses, record: SessionRecord, kind: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import os
 import random
@@ -57,7 +58,7 @@ class Client:
             except urllib.error.HTTPError as refusal:
                 self.wrong.append(f"{path}: {refusal.code} {refusal.read()!r}")
                 self.stop.set()
-            except (OSError, ValueError):
+            except (OSError, ValueError, http.client.HTTPException):
                 time.sleep(0.01)
         return {}
 

@@ -30,11 +30,11 @@ from study.experiment.responses import (
     Presentation,
     Responses,
     SessionRecord,
+    answer_rows,
     begin_session,
+    event_row,
     find_session,
     has_event,
-    insert_answer,
-    insert_event,
     record_form,
     session_by_id,
     steps_passed,
@@ -261,7 +261,7 @@ class Host:
                 state, answer = flow.answered(state, message.value, message.response_s, shown_well=well)
             at = datetime.now(UTC)
             shown = [self._presentation(sitting, message, one) for one in message.shown]
-            await self.writer.put(lambda connection: insert_answer(connection, sitting.record, answer, shown, at))
+            await self.writer.put(answer_rows(sitting.record, answer, shown, at))
             sitting.answers[key] = answer
             sitting.state = views.to_view(state)
             sitting.shown_trial = None
@@ -299,8 +299,7 @@ class Host:
         if sitting.events >= MOST_EVENTS:
             return
         sitting.events += 1
-        at = datetime.now(UTC)
-        await self.writer.put(lambda connection: insert_event(connection, sitting.record, kind, detail, at))
+        await self.writer.put([event_row(sitting.record, kind, detail, datetime.now(UTC))])
 
     # What is shown
 

@@ -1,7 +1,7 @@
 """Writer: one thread that commits what many participants send in groups, each write acknowledged after its commit.
 
-A function of a connection comes in; its result goes out once it is on disk. When many answers arrive at one time, one
-transaction holds them all, so the disk is waited for once. A write that fails takes no other with it.
+Rows come in; the caller goes on once they are on disk. When many answers arrive at one time, one transaction holds them
+all, so the disk is waited for once. Rows that fail take no others with them.
 """
 
 from __future__ import annotations
@@ -10,22 +10,21 @@ import asyncio
 import contextlib
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 import sqlalchemy as sa
 
-Result = TypeVar("Result")
+from study.experiment.responses import Row, insert_rows
 
 LARGEST_GROUP = 256
 
 
 @dataclass(frozen=True)
 class _Job:
-    write: Callable[[sa.Connection], Any]
+    rows: Sequence[Row]
     loop: asyncio.AbstractEventLoop
-    future: asyncio.Future[Any]
+    future: asyncio.Future[None]
 
 
 class Writer:
@@ -37,12 +36,12 @@ class Writer:
         self._thread = threading.Thread(target=self._run, name="writer", daemon=True)
         self._thread.start()
 
-    async def put(self, write: Callable[[sa.Connection], Result]) -> Result:
-        """Run a write in a transaction; returns when it is committed, raises what it raised."""
+    async def put(self, rows: Sequence[Row]) -> None:
+        """Insert rows; returns when they are committed, raises what went wrong."""
         loop = asyncio.get_running_loop()
-        future: asyncio.Future[Result] = loop.create_future()
-        self._jobs.put(_Job(write, loop, future))
-        return await future
+        future: asyncio.Future[None] = loop.create_future()
+        self._jobs.put(_Job(rows, loop, future))
+        await future
 
     def close(self) -> None:
         """Finish what was put, then end."""
@@ -68,7 +67,7 @@ class Writer:
     def _commit(self, group: list[_Job]) -> None:
         try:
             with self._engine.begin() as connection:
-                results = [job.write(connection) for job in group]
+                insert_rows(connection, [row for job in group for row in job.rows])
         except Exception as error:  # whatever it was, the page has to be told, and the thread has to go on
             if len(group) > 1:
                 # One of them failed, and the whole group was rolled back: each on its own now.
@@ -77,18 +76,18 @@ class Writer:
             else:
                 _settle(group[0], error=error)
             return
-        for job, result in zip(group, results, strict=True):
-            _settle(job, result)
+        for job in group:
+            _settle(job)
 
 
-def _settle(job: _Job, result: Any = None, error: Exception | None = None) -> None:
+def _settle(job: _Job, error: Exception | None = None) -> None:
     """Tell the coroutine that waits; it may be gone, or its loop may be closed, and the write stands all the same."""
 
     def tell() -> None:
         if job.future.done():
             return
         if error is None:
-            job.future.set_result(result)
+            job.future.set_result(None)
         else:
             job.future.set_exception(error)
 
