@@ -1,8 +1,8 @@
 """How far intervals and tests can be trusted: simulated studies with known truth through the real analysis.
 
-Run it from the repository: `python benchmarks/calibration.py [studies] [same-different|preference]`; 2,000 studies a
-cell take some minutes. Observers are drawn here, by code that the analysis does not use. The design is 2004's: 35
-people (or fewer), 6 answers at each of 7 levels, or 8 preferences.
+Run it from the repository: `python benchmarks/calibration.py [studies] [preference|psychometric|mixed|same-different]`;
+2,000 studies a cell take some minutes. Observers are drawn here, by code that the analysis does not use. In
+2004's design: 35 people (or fewer), 6 answers at each of 7 levels, or 8 preferences.
 """
 
 from __future__ import annotations
@@ -11,10 +11,14 @@ import sys
 import time
 
 import numpy as np
+import pandas as pd
 from scipy.special import ndtr
 from scipy.stats import beta
 
+from study.analysis.group_models import psychometric_mixed
 from study.analysis.preference import participant_tests, published_test
+from study.analysis.psychometric import fit_psychometric, make_model
+from study.analysis.psychometric_likelihood import fit_likelihood
 from study.analysis.same_different import Counts, crossing_of_lines, crossings
 from study.analysis.same_different_model import ModelFit, fit_model
 
@@ -103,10 +107,67 @@ def preference(studies):
         print(f"{correlation:11} {rates[0]:12.3f} {rates[1]:7.3f} {rates[2]:9.3f}", flush=True)
 
 
+def psychometric(studies):
+    """Coverage of posterior and profile intervals of thresholds, at small and usual sizes, and milliseconds a fit."""
+    heads = ("task", "levels", "answers", "rho", "bias", "posterior", "ms", "profile", "ms")
+    print(" ".join(f"{head:>9}" for head in heads))
+    cells = (("2afc", 5, 20, 0.0), ("2afc", 7, 40, 0.0), ("2afc", 7, 40, 0.02),
+             ("yes-no", 7, 20, 0.0), ("yes-no", 7, 50, 0.0), ("yes-no", 7, 50, 0.02))  # fmt: skip
+    for task, count, answers, rho in cells:
+        rng, levels, model = np.random.default_rng(4), np.arange(1.0, count + 1), make_model(task)
+        guess, middle = (0.5, levels.mean()) if task == "2afc" else (0.05, levels.mean())
+        share = guess + (1 - guess - 0.02) * ndtr((levels - middle) / 3 * 2 * 1.6449)
+        rows, spent = [], np.zeros(2)
+        for place in range(studies):
+            own = rng.beta(share * (1 / rho - 1), (1 - share) * (1 / rho - 1)) if rho else share
+            yes, shown = rng.binomial(answers, own), np.full(count, answers)
+            started = time.perf_counter()
+            fit = fit_psychometric(levels, yes, shown, model)
+            spent[0] += time.perf_counter() - started
+            row = [fit.threshold.value or np.nan, holds(fit.threshold.interval, middle)]
+            if place < studies // 10:
+                started = time.perf_counter()
+                row.append(holds(fit_likelihood(levels, yes, shown, model).interval, middle))
+                spent[1] += time.perf_counter() - started
+            else:
+                row.append(np.nan)
+            rows.append(row)
+        mean, inside, profile = np.nanmean(np.array(rows, dtype=float), axis=0)
+        numbers = (mean - middle, inside, 1000 * spent[0] / studies, profile, 1000 * spent[1] / (studies // 10))
+        print(f"{task:>9} {count:9} {answers:9} {rho:9} " + " ".join(f"{n:9.3f}" for n in numbers), flush=True)
+
+
+def holds(interval, truth):
+    """Whether an interval holds the truth; open ends hold all beyond."""
+    return (interval.low is None or interval.low <= truth) and (interval.high is None or truth <= interval.high)
+
+
+def mixed(studies):
+    """Coverage and time of the mixed model's threshold: 8 participants, 7 levels, 30 answers each, 2AFC."""
+    rng, inside, estimates = np.random.default_rng(5), [], []
+    levels, who = np.tile(np.arange(7.0), 8), np.repeat(np.arange(8), 7)
+    started = time.perf_counter()
+    for _ in range(studies):
+        own = rng.multivariate_normal([-3.0, 1.0], [[0.16, 0.0], [0.0, 0.04]], size=8)
+        chance = 0.5 + 0.5 * ndtr(own[who, 0] + own[who, 1] * levels)
+        table = pd.DataFrame({"participant": who, "level": levels, "yes": rng.binomial(30, chance), "shown": 30})
+        found = psychometric_mixed(table, guess=0.5)
+        if found["threshold"] is not None:
+            inside.append(found["low"] <= 3.0 <= found["high"])
+            estimates.append(found["threshold"])
+    spent = 1000 * (time.perf_counter() - started) / studies
+    print(f"mixed: {len(inside)} fitted, mean {np.mean(estimates):.3f} (true 3), covers {np.mean(inside):.3f}")
+    print(f"{spent:.0f} ms a study")
+
+
 if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
     wanted = sys.argv[2] if len(sys.argv) > 2 else "all"
     if wanted in ("all", "preference"):
         preference(number)
+    if wanted in ("all", "psychometric"):
+        psychometric(number)
+    if wanted in ("all", "mixed"):
+        mixed(number)
     if wanted in ("all", "same-different"):
         same_different(number)

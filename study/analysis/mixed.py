@@ -30,6 +30,7 @@ NODES = 9
 MODE_STEPS = 12
 NO_SPREAD = 1e-3
 LARGEST_EFFECT = 12.0
+LARGEST_ERROR = 4.0
 
 
 @dataclass(frozen=True)
@@ -327,7 +328,8 @@ def _effects(
     for place, value in enumerate(values):
         name = names[place] if place < len(names) else f"effect {place + 1}"
         variance = covariance[place, place]
-        if not np.isfinite(variance) or variance <= 0 or abs(value) >= LARGEST_EFFECT - 1e-6:
+        # An error as large as that says nothing: the answers nearly separate, or the spread can't be told.
+        if not np.isfinite(variance) or not 0 < variance < LARGEST_ERROR**2 or abs(value) >= LARGEST_EFFECT - 1e-6:
             found.append(Effect(name, float(value), None, Interval(None, None, confidence), None))
             continue
         error = math.sqrt(variance)
@@ -348,6 +350,8 @@ def _caution(values: FloatArray, covariance: FloatArray, spread: FloatArray, set
         notes.append("an effect grows without end: the answers separate perfectly, and it can't be estimated")
     elif not np.isfinite(covariance).all() or (np.diag(covariance) <= 0).any():
         notes.append("the likelihood is flat: standard errors can't be given")
+    elif (np.diag(covariance) > LARGEST_ERROR**2).any():
+        notes.append("the answers nearly separate: an effect is large, and how large can't be told")
     if (spread < NO_SPREAD).any():
         notes.append("a spread between participants is estimated as none; it may only not have been seen")
     if not settled:

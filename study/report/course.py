@@ -42,12 +42,14 @@ def _studies(answers: pd.DataFrame) -> Any:
 
 
 def _course(study: str, task: str, part: pd.DataFrame) -> list[dict[str, Any]]:
-    """Percentages by sixth of one study; none for ratings."""
+    """Percentages by sixth of one study; none for ratings, nor where there are too few trials to part."""
     given = part[part["answer"].notna()]
     if task not in ("same-different", "preference") or len(given) < FEWEST_ANSWERS:
         return []
     place = part.groupby("participant")["trial"].rank(method="first")
     most = place.groupby(part["participant"]).transform("max")
+    if most.max() < PARTS:
+        return []
     sixth = np.ceil(place / most * PARTS).loc[given.index]
     if task == "same-different":
         counted = ((given["answer"] == "different") == (given["difference_frames"] != 0)).astype(float)
