@@ -60,6 +60,10 @@ function blobOf(url) {
   return blobs.get(url);
 }
 
+export function forget(films) {
+  for (const film of films) blobs.delete(film.url);
+}
+
 export function loadAhead(films) {
   for (const film of films ?? []) blobOf(film.url).catch(() => {});
 }
@@ -88,6 +92,8 @@ async function seek(video, seconds) {
 }
 
 async function prove(film, fps, blob) {
+  // Browsers may find a last frame in half a file, and fail only while playing: the file has to be whole, too.
+  if (blob.size !== film.bytes) throw new FilmFault(`${blob.size} of ${film.bytes} bytes`);
   const video = document.createElement("video");
   Object.assign(video, { muted: true, playsInline: true, preload: "auto", disablePictureInPicture: true });
   video.setAttribute("muted", "");

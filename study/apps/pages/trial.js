@@ -1,7 +1,7 @@
 // A trial: films, gap, question, as the server's view says. Resolves with the message that is the answer.
 
 import { ask, element, heading, show, sleep, status } from "./dom.js";
-import { FilmFault, load, loadAhead, play, release } from "./film.js";
+import { FilmFault, forget, load, loadAhead, play, release } from "./film.js";
 import { tell } from "./server.js";
 
 const MOST_RESTARTS = 3;
@@ -173,6 +173,7 @@ export async function trial(view, study, pauseOver, earlier) {
       break;
     } catch (error) {
       if (!(error instanceof FilmFault)) throw error;
+      forget(view.films);
       tell("fault", { what: error.why, trial: view.trial, hidden: document.hidden ? 1 : 0 });
       restarts += 1;
       // A closed lid stops films: they start again when somebody looks.

@@ -90,7 +90,10 @@ class Host:
     def __init__(self, protocol: Protocol, manifest: Manifest, responses: Responses, settings: Settings) -> None:
         self.protocol, self.manifest, self.responses, self.settings = protocol, manifest, responses, settings
         self.writer = Writer(responses.engine)
-        self.frames = {record.id: record.frames for record in manifest.records}
+        self.films = {
+            record.id: {"frames": record.frames, "bytes": int(manifest.videos.get(record.id, {}).get("bytes", 0))}
+            for record in manifest.records
+        }
         self.groups = settings.groups or groups_of(protocol, manifest.pairs)
         self.sittings: dict[str, Sitting] = {}
         self.recent: set[int] = set()
@@ -283,7 +286,7 @@ class Host:
             place=shown.place,
             stimulus=stimulus,
             method=shown.method,
-            frames_expected=self.frames.get(stimulus),
+            frames_expected=self.films.get(stimulus, {}).get("frames"),
             frames_presented=shown.frames_presented,
             longest_gap_frames=shown.longest_gap_frames,
             shown_well=shown.shown_well,
@@ -305,7 +308,7 @@ class Host:
 
     async def _view(self, sitting: Sitting) -> dict[str, Any]:
         step = flow.current(sitting.state)
-        view = views.view(sitting.state, sitting.participant, self.frames)
+        view = views.view(sitting.state, sitting.participant, self.films)
         sitting.shown_trial = (step.trial, step.attempt) if step.kind == "first" else None
         if step.kind in ("debrief", "done"):
             view["withdrawal_code"] = sitting.participant.withdrawal_code

@@ -16,6 +16,7 @@ from study.experiment.protocol import Protocol
 from study.experiment.session import Session, Step
 
 FILMS = "/films"
+Films = Mapping[str, Mapping[str, int]]
 
 
 def film_name(participant: Participant, step: Step) -> str:
@@ -59,13 +60,13 @@ def to_view(session: Session) -> Session:
     return session
 
 
-def view(session: Session, participant: Participant, frames: Mapping[str, int]) -> dict[str, Any]:
-    """What the page shows now; `frames` is the length of every stimulus."""
+def view(session: Session, participant: Participant, films: Films) -> dict[str, Any]:
+    """What the page shows now; `films` has the frames and bytes of every stimulus."""
     step, protocol = sitting.current(session), session.protocol
     done, total = sitting.progress(session)
     shown: dict[str, Any] = {"kind": step.kind, "text": step.text, "progress": [done, total]}
     if step.kind == "first":
-        return {**shown, **_trial(session, participant, frames), "kind": "trial"}
+        return {**shown, **_trial(session, participant, films), "kind": "trial"}
     if step.kind == "answer":
         # The films of this trial were shown; further questions about them follow.
         return {**shown, **_asking(session, step), "films": [], "gap_s": 0, "ahead": [], "kind": "trial"}
@@ -77,24 +78,22 @@ def view(session: Session, participant: Participant, frames: Mapping[str, int]) 
     if step.kind == "instructions":
         study = protocol.study(step.study) if step.study else None
         shown["fps"] = protocol.fps
-        shown["example"] = _film(step, participant, frames) if step.stimulus else None
+        shown["example"] = _film(step, participant, films) if step.stimulus else None
         shown["keys"] = _options(protocol, sitting.legal_answers(study)) if study and study.task != "rating" else []
     return shown
 
 
-def _trial(session: Session, participant: Participant, frames: Mapping[str, int]) -> dict[str, Any]:
+def _trial(session: Session, participant: Participant, films: Films) -> dict[str, Any]:
     step = sitting.current(session)
     near = _near(session)
     own = [other for other in near if (other.trial, other.attempt) == (step.trial, step.attempt)]
     question = next(other for other in own if other.kind == "answer")
     return {
         **_asking(session, question),
-        "films": [_film(other, participant, frames) for other in own if other.kind in ("first", "second")],
+        "films": [_film(other, participant, films) for other in own if other.kind in ("first", "second")],
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
         "ahead": [
-            _film(other, participant, frames)
-            for other in near
-            if other not in own and other.kind in ("first", "second")
+            _film(other, participant, films) for other in near if other not in own and other.kind in ("first", "second")
         ],
     }
 
@@ -111,9 +110,9 @@ def _asking(session: Session, step: Step) -> dict[str, Any]:
     }
 
 
-def _film(step: Step, participant: Participant, frames: Mapping[str, int]) -> dict[str, Any]:
+def _film(step: Step, participant: Participant, films: Films) -> dict[str, Any]:
     place = "first" if step.kind == "instructions" else step.kind
-    return {"place": place, "url": f"{FILMS}/{film_name(participant, step)}.mp4", "frames": frames[step.stimulus]}
+    return {"place": place, "url": f"{FILMS}/{film_name(participant, step)}.mp4", **films[step.stimulus]}
 
 
 def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
