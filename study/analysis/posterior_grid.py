@@ -26,7 +26,7 @@ OVERDISPERSION = np.array([0.0, 0.06, 0.13, 0.25])
 OVERDISPERSION_EDGES = np.array([0.0, 0.03, 0.095, 0.19, 0.999])
 KNOTS = 200
 PRIOR_POWER = 10
-OVERDISPERSION_POWER = 18
+OVERDISPERSION_POWER = 25
 # The coarse pass looks at the likelihood to this power, so that overdispersion, left out there, can't fall outside.
 TEMPER = 0.4
 NEGLIGIBLE = 2e-4

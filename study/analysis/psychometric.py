@@ -201,7 +201,7 @@ def fit_psychometric(
     -----
     Priors: flat for thresholds within the levels, falling to none half their range outside; flat for the logarithm of
     the width from half the smallest step between levels to the whole range, falling to none at a quarter and at four
-    times; Beta(1, 10) for lapse and guess rate, Beta(1, 18) for overdispersion.
+    times; Beta(1, 10) for lapse and guess rate, Beta(1, 25) for overdispersion.
 
     Examples
     --------
