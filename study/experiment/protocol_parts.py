@@ -90,7 +90,7 @@ class Texts(Part):
     practice: str = Field(default="Practice", description="Shown above practice trials.")
     practice_right: str = Field(default="That was right.", description="After a right answer in practice.")
     practice_wrong: str = Field(
-        default="That was not right: they were {answer}.",
+        default="That was not right: the answer is “{answer}”.",
         description="After a wrong answer in practice; {answer} is the right one.",
     )
     practice_noted: str = Field(

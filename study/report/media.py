@@ -105,11 +105,15 @@ def embed_strips(manifest: Manifest, most: int = MOST_STRIPS) -> list[Preview]:
 
 def strip_of_video(path: Path, blend_start: int, blend_stop: int) -> bytes:
     """Return a PNG of evenly spaced frames, each cropped about the figure, with a line under those of the blend."""
+    import av
     from PIL import Image
 
-    frames = _frames(path)
-    places = _moments(len(frames), blend_start, blend_stop)
-    cells = _cropped([frames[place] for place in places])
+    with av.open(str(path)) as container:
+        # Decoding is cheap; only what is shown is turned into RGB.
+        frames = list(container.decode(video=0))
+        places = _moments(len(frames), blend_start, blend_stop)
+        shown = [np.asarray(frames[place].to_ndarray(format="rgb24"), dtype=np.uint8) for place in places]
+    cells = _cropped(shown)
     blended = [blend_start <= place < blend_stop for place in places]
     picture = np.concatenate([_underlined(cell, inside) for cell, inside in zip(cells, blended, strict=True)], axis=1)
     image = Image.fromarray(picture)
@@ -129,18 +133,11 @@ def _moments(frames: int, blend_start: int, blend_stop: int) -> NDArray[np.intp]
     return places
 
 
-def _frames(path: Path) -> list[Bytes]:
-    import av
-
-    with av.open(str(path)) as container:
-        return [np.asarray(frame.to_ndarray(format="rgb24"), dtype=np.uint8) for frame in container.decode(video=0)]
-
-
 def _cropped(frames: Sequence[Bytes]) -> list[Bytes]:
     """Crop all frames to one size, each about its own figure: whatever differs from the corner's colour."""
     boxes = []
     for frame in frames:
-        figure = np.abs(frame.astype(int) - frame[0, 0].astype(int)).max(axis=2) > 40
+        figure = (np.abs(frame.astype(np.int16) - frame[0, 0].astype(np.int16)) > 40).any(axis=2)
         rows, columns = np.flatnonzero(figure.any(axis=1)), np.flatnonzero(figure.any(axis=0))
         if not len(rows):
             rows, columns = np.array([0, frame.shape[0] - 1]), np.array([0, frame.shape[1] - 1])

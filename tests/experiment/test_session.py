@@ -251,7 +251,7 @@ def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people):
     run(open_session(protocol, plan, passed=("consent", "form")), seen=seen)
     assert [step.kind for step in seen].count("feedback") == 4
     said = {step.text for step in seen if step.kind == "feedback"}
-    assert said == {"That was right.", "That was not right: they were Different."}
+    assert said == {"That was right.", "That was not right: the answer is “Different”."}
     for trial in checks:
         step = next(step for step in seen if step.trial == trial.trial and step.kind == "answer")
         assert step.text.endswith(f"Please answer: {trial.expected.capitalize()}")
