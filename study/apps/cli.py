@@ -126,3 +126,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def main() -> None:
     """Entry point of the `segue` script."""
     sys.exit(run())
+
+
+if __name__ == "__main__":
+    main()

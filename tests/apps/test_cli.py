@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from study import __version__
 from study.apps.cli import VERBS, run
 
 ROOT = Path(__file__).parents[2]
@@ -39,6 +42,12 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     shown = capsys.readouterr().out
     for verb in VERBS:
         assert f"\n  {verb} " in shown
+
+
+def test_the_command_line_runs_as_a_module_too() -> None:
+    asked = [sys.executable, "-m", "study.apps.cli", "--version"]
+    told = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert __version__ in told.stdout
 
 
 def test_every_verb_is_in_the_readme_or_the_docs() -> None:
