@@ -19,6 +19,7 @@ from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
 from study.motion.flips import FLIP_RAD, LegFlips, leg_flips, turn_back
+from study.motion.upright import lying_axis
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -59,7 +60,7 @@ class Defect:
     kind
         `"t-pose"` (an added pose at the start), `"end-jump"` (frames at an end that don't continue into the motion),
         `"root-jump"`, `"joint-flip"` (a leg turned to its wrong side), `"joint-jump"`, `"below-floor"`, `"floating"`,
-        `"not-upright"` (a file with another axis up; not mended).
+        `"not-upright"` (a body that lies, or a file with another axis up; not mended).
     frame_start, frame_stop
         The frames concerned, as a slice counts them; a jump concerns the frames before and after it.
     joint
@@ -304,8 +305,8 @@ def _clusters(jumps: IntArray, gap: int) -> list[IntArray]:
 
 def _floor_defects(found: _Findings) -> list[Defect]:
     clip = found.clip
-    if (lying := _lying_axis(clip)) is not None:
-        message = f"the body stands along {lying}: export the file again with Y up"
+    if (lying := lying_axis(clip)) is not None:
+        message = f"the body lies along {lying}, but not in its rest pose: if it stands, export the file with Y up"
         return [Defect("not-upright", 0, clip.frames, "", np.pi / 2, "rad", message, "major")]
     feet = _foot_heights(trim(clip, found.start, max(found.stop, found.start + 1)))
     if not feet:
@@ -323,23 +324,6 @@ def _floor_defects(found: _Findings) -> list[Defect]:
             message = f"{foot.name} points through the floor, up to {depth * 100:.0f} cm deep"
             defects.append(Defect("below-floor", 0, clip.frames, foot.name, depth, "m", message, "minor"))
     return defects
-
-
-def _lying_axis(clip: Clip) -> str | None:
-    """The axis other than Y along which the legs stretch out in nearly all frames, so not for a while on the floor."""
-    roles = clip.skeleton.roles
-    ends = [f"{part}.{side}" for part in ("hip", "ankle") for side in "LR"]
-    if not all(role in roles for role in ends):
-        return None
-    positions = joint_positions(clip)
-    hip_l, hip_r, ankle_l, ankle_r = (positions[:, roles[role]] for role in ends)
-    up = hip_l + hip_r - ankle_l - ankle_r
-    up = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9)
-    along = np.quantile(np.abs(up), 0.1, axis=0)
-    axis = int(np.argmax(along))
-    if axis == 1 or along[axis] < np.cos(np.radians(35.0)):
-        return None
-    return f"{'-' if np.median(up[:, axis]) < 0 else ''}{'XYZ'[axis]}"
 
 
 class _Foot(NamedTuple):

@@ -1,4 +1,4 @@
-"""Any motion file to a clip, by its suffix."""
+"""Any motion file to a clip, by its suffix, with Y up."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from study.errors import MotionError, MotionFileError
 from study.motion.acclaim import CMU_FPS, read_amc
 from study.motion.bvh import read_bvh
 from study.motion.clip import Clip
+from study.motion.upright import put_upright
 
 SUFFIXES = (".bvh", ".amc")
 
 
 def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: float | None = None) -> Clip:
-    """Read a motion file.
+    """Read a motion file; where another axis than Y is up, the clip is put upright and its history says so.
 
     Parameters
     ----------
@@ -38,9 +39,9 @@ def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: fl
             raise MotionError(f"Expected {label} above 0 for {path}, got {value}.")
     suffix = path.suffix.lower()
     if suffix == ".amc":
-        return read_amc(path, metres_per_unit=metres_per_unit, fps=CMU_FPS if fps is None else fps)
+        return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=CMU_FPS if fps is None else fps))
     if suffix == ".bvh":
-        clip = read_bvh(path, metres_per_unit=metres_per_unit)
+        clip = put_upright(read_bvh(path, metres_per_unit=metres_per_unit))
         if fps is None or fps == clip.fps:
             return clip
         note = f"taken at {fps:g} fps, as told, and not at the file's {clip.fps:g}"

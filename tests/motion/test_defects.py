@@ -191,7 +191,7 @@ def test_a_floor_at_another_height_is_found_and_put_right(shift: float, kind: st
     assert mend(moved, policy="refuse") is moved
 
 
-def test_a_file_with_z_up_is_told() -> None:
+def test_a_body_that_lies_is_told() -> None:
     clip = swinging()
     turn = quat.from_axis_angle([1.0, 0, 0], np.pi / 2)
     rotations = clip.rotations.copy()
@@ -199,7 +199,7 @@ def test_a_file_with_z_up_is_told() -> None:
     lying = replace(clip, rotations=rotations, root_positions=quat.rotate(turn, clip.root_positions))
     (defect,) = find_defects(lying)
     assert defect.kind == "not-upright"
-    assert "stands along Z" in defect.message
+    assert "lies along Z" in defect.message
 
 
 def test_policies() -> None:
