@@ -8,14 +8,15 @@ participant belong together.
 from __future__ import annotations
 
 import math
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
+from study.analysis.estimating_equations import estimating_equations
 from study.analysis.mixed import Link, MixedFit, fit_mixed, marginal_share
+from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -109,12 +110,14 @@ def _gee(design: FloatArray, chosen: FloatArray, who: NDArray[Any], confidence: 
         return {**nothing, "note": f"{people} participants are too few for estimating equations"}
     if chosen.min() == chosen.max():
         return {**nothing, "note": "all answers alike: effects can't be estimated"}
+    too_alike = {**nothing, "note": "the answers vary too little between participants for estimating equations"}
     try:
-        values, errors = _estimating_equations(design, chosen, who)
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-        values, errors = np.full(design.shape[1], np.nan), np.full(design.shape[1], np.nan)
+        found = estimating_equations(design, chosen, who)
+    except AnalysisError:
+        return too_alike
+    values, errors = found.values, found.errors
     if not (np.isfinite(values).all() and np.isfinite(errors).all()) or (errors <= 1e-9).any():
-        return {**nothing, "note": "the answers vary too little between participants for estimating equations"}
+        return too_alike
     times = estimates.t_quantile(confidence, people - 1)
     tests = [estimates.t_probability(float(v / e), people - 1) for v, e in zip(values, errors, strict=True)]
     return {
@@ -126,19 +129,6 @@ def _gee(design: FloatArray, chosen: FloatArray, who: NDArray[Any], confidence: 
         "order_p_value": tests[1] if len(values) > 1 else None,
         "note": "",
     }
-
-
-def _estimating_equations(design: FloatArray, chosen: FloatArray, who: NDArray[Any]) -> tuple[FloatArray, FloatArray]:
-    from statsmodels.genmod.cov_struct import Exchangeable
-    from statsmodels.genmod.families import Binomial
-    from statsmodels.genmod.generalized_estimating_equations import GEE
-
-    order = np.argsort(who, kind="stable")
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")  # whatever did not work shows in the standard errors, which are checked
-        model = GEE(chosen[order], design[order], who[order], family=Binomial(), cov_struct=Exchangeable())
-        found = model.fit(cov_type="bias_reduced")
-    return np.asarray(found.params, dtype=np.float64), np.asarray(found.bse, dtype=np.float64)
 
 
 def _differ(mixed: dict[str, Any], gee: dict[str, Any]) -> str:

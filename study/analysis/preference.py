@@ -175,7 +175,8 @@ def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
     a_first = given["a_first"].astype(bool).to_numpy() if ordered else np.ones(len(given), dtype=bool)
     a, b = given["method_a"].astype(str).to_numpy(), given["method_b"].astype(str).to_numpy()
     first, second = np.where(a_first, a, b), np.where(a_first, b, a)
-    favoured = (given["chose_a"].to_numpy(dtype=np.float64) == a_first).astype(np.float64)
+    chosen = given["chose_a"].to_numpy(dtype=np.float64)
+    favoured = np.where(a_first, chosen, 1 - chosen)
     found = fit_bradley_terry(
         [str(name) for name in first],
         [str(name) for name in second],
@@ -183,6 +184,7 @@ def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
         np.ones(len(given)),
         with_order=bool(ordered),
         confidence=confidence,
+        participants=[str(name) for name in given["participant"]],
     )
     return {"note": found} if isinstance(found, str) else dict(estimates.plain(found))
 
@@ -256,9 +258,8 @@ def _wilcoxon(share: FloatArray) -> float | None:
     lean = share[share != 0.5] - 0.5
     if len(lean) < 2:
         return None
-    from scipy.stats import rankdata
-
-    ranks = rankdata(np.round(np.abs(lean), 12))
+    _, place, ties = np.unique(np.round(np.abs(lean), 12), return_inverse=True, return_counts=True)
+    ranks = (np.cumsum(ties) - (ties - 1) / 2)[place]  # tied values share the mean of their ranks
     positive, mean = float(ranks[lean > 0].sum()), float(ranks.sum()) / 2
     if len(lean) <= 50:
         return _exact_signed_rank(ranks, positive)
