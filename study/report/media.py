@@ -23,6 +23,8 @@ MOST_VIDEO_BYTES = 1_800_000
 MOST_STRIPS = 12
 POSES = 10
 STRIP_HEIGHT = 150
+MARGIN = 6
+"""About the figure in a strip. [pixels of the video]"""
 BLEND_COLOUR = (11, 95, 165)
 
 Bytes = NDArray[np.uint8]
@@ -134,23 +136,33 @@ def _moments(frames: int, blend_start: int, blend_stop: int) -> NDArray[np.intp]
 
 
 def _cropped(frames: Sequence[Bytes]) -> list[Bytes]:
-    """Crop all frames to one size, each about its own figure: whatever differs from the corner's colour."""
-    boxes = []
-    for frame in frames:
-        figure = (np.abs(frame.astype(np.int16) - frame[0, 0].astype(np.int16)) > 40).any(axis=2)
-        rows, columns = np.flatnonzero(figure.any(axis=1)), np.flatnonzero(figure.any(axis=0))
-        if not len(rows):
-            rows, columns = np.array([0, frame.shape[0] - 1]), np.array([0, frame.shape[1] - 1])
-        boxes.append((rows[0], rows[-1] + 1, columns[0], columns[-1] + 1))
-    top, bottom = min(box[0] for box in boxes) - 6, max(box[1] for box in boxes) + 6
-    half = max(box[3] - box[2] for box in boxes) // 2 + 6
+    """Crop all frames to one size, each about its own figure."""
+    boxes = [_box(frame) for frame in frames]
+    top, bottom = min(box[0] for box in boxes) - MARGIN, max(box[1] for box in boxes) + MARGIN
+    half = max(box[3] - box[2] for box in boxes) // 2 + MARGIN
     cells = []
     for frame, box in zip(frames, boxes, strict=True):
-        pad = half + 8
-        padded = np.pad(frame, ((pad, pad), (pad, pad), (0, 0)), mode="edge")
-        middle = (box[2] + box[3]) // 2 + pad
-        cells.append(padded[top + pad : bottom + pad, middle - half : middle + half])
+        middle = (box[2] + box[3]) // 2
+        # Beyond the picture its edge goes on.
+        rows = np.arange(top, bottom).clip(0, frame.shape[0] - 1)
+        columns = np.arange(middle - half, middle + half).clip(0, frame.shape[1] - 1)
+        cells.append(frame[np.ix_(rows, columns)])
     return cells
+
+
+def _box(frame: Bytes) -> tuple[int, int, int, int]:
+    """Top, bottom, left and right of the figure: of whatever differs from the corner's colour; else the whole frame.
+
+    Every second pixel is looked at, which is four times faster and off by one at most, well within the margin.
+    """
+    sampled, ground = frame[::2, ::2], frame[0, 0].astype(int)
+    lowest, highest = (ground - 40).clip(0, 255).astype(np.uint8), (ground + 40).clip(0, 255).astype(np.uint8)
+    channels = (sampled < lowest) | (sampled > highest)
+    figure = channels[..., 0] | channels[..., 1] | channels[..., 2]  # `any` over three values is slow
+    rows, columns = np.flatnonzero(figure.any(axis=1)), np.flatnonzero(figure.any(axis=0))
+    if not len(rows):
+        return 0, frame.shape[0], 0, frame.shape[1]
+    return 2 * int(rows[0]), 2 * int(rows[-1]) + 1, 2 * int(columns[0]), 2 * int(columns[-1]) + 1
 
 
 def _underlined(cell: Bytes, inside: bool) -> Bytes:
