@@ -239,6 +239,13 @@ def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray
     return path
 
 
+def camera_path(positions: FloatArray, camera: Camera, fps: float) -> FloatArray:
+    """How far the camera has come at each frame, `(frames, 3)`, metres; nowhere, where it stands still."""
+    if camera.track_seconds is None:
+        return np.zeros((len(positions), 3))
+    return smooth_path(positions, camera.track_seconds, fps)
+
+
 def project(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Where points `(..., 3)` land: pixels `(..., 2)`, y down, and the nearness `(...)`, 1 / distance along the view.
 

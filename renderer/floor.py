@@ -1,6 +1,7 @@
 """A floor to stand on: a plane that fades into the background, with a faint grid of metres, and soft contact shadows.
 
-The plane is computed once for a camera that stands still, here and not on the GPU: it is the same for all frames.
+The plane is computed here and not on the GPU, once for a camera; where it travels, only the grid's lines are moved. (A
+window moves them by a shader, `texels`, since a large floor takes longer here than a frame lasts.)
 Shadows are capsules like any other, flattened onto the floor: dark and narrow under a foot that stands, wide and faint
 under one that is lifted.
 """
@@ -59,27 +60,45 @@ class Floor:
         frame[height:, 1::2] = round(self._ground[2])
         return frame
 
-    def rgb(self) -> NDArray[np.uint8]:
+    def rgb(self, shift: FloatArray) -> NDArray[np.uint8]:
         """The same as RGB `(height, width, 3)`."""
-        luma = self.luma(np.zeros(3))
+        luma = self.luma(shift)
         return to_rgb(luma, np.full_like(luma, self._ground[1]), np.full_like(luma, self._ground[2]))
+
+    def texels(self) -> tuple[NDArray[np.float32], NDArray[np.float32], dict[str, float | tuple[float, ...]]]:
+        """What `shaders/floor.frag` computes the same from, for any shift.
+
+        Returns
+        -------
+        tuple
+            `(height, width, 4)`: metres along x and z, pixels per metre across the lines of each; `(height, width)`:
+            how much has not faded; and the values of its uniforms.
+        """
+        across, along = self._lines
+        lines = np.stack([across.metres, along.metres, across.slope, along.slope], axis=-1, dtype=np.float32)
+        uniforms: dict[str, float | tuple[float, ...]] = {
+            "ground": tuple(value / 255.0 for value in self._ground),
+            "half_width": _GRID_HALF_WIDTH_M,
+            "shades": (_FLOOR_SHADE, _GRID_SHADE),
+        }
+        return lines, self._seen.astype(np.float32), uniforms
 
 
 class _Lines:
     """Lines a metre apart across one axis of the floor, as wide on the screen as they are, and as faint where thin."""
 
     def __init__(self, metres: FloatArray) -> None:
-        self._metres = metres
+        self.metres = metres
         footprint = np.maximum(np.abs(np.gradient(metres, axis=0)) + np.abs(np.gradient(metres, axis=1)), 1e-6)
-        self._slope = 1.0 / footprint
+        self.slope = 1.0 / footprint
         # Where a pixel is wider than a third of the spacing the lines would run into each other: they fade before.
         self._faint = np.minimum(1.0, 2.0 * _GRID_HALF_WIDTH_M / footprint) * np.clip(1.5 - 3.0 * footprint, 0.0, 1.0)
 
     def at(self, shift: float) -> FloatArray:
         """How much of each pixel they cover."""
-        place = self._metres + shift
+        place = self.metres + shift
         aside = np.abs(place - np.round(place))
-        cover: FloatArray = np.clip(0.5 + (_GRID_HALF_WIDTH_M - aside) * self._slope, 0.0, 1.0) * self._faint
+        cover: FloatArray = np.clip(0.5 + (_GRID_HALF_WIDTH_M - aside) * self.slope, 0.0, 1.0) * self._faint
         return cover
 
 

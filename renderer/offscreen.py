@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.camera import Camera, check_positions, check_size, smooth_path
+from renderer.camera import Camera, camera_path, check_positions, check_size
 from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
 from renderer.context import Context, shared_context
@@ -84,11 +84,14 @@ def render_rgb(
     positions: ArrayLike, figure: Figure, camera: Camera, *, context: Context | None = None, fps: float = 30.0
 ) -> Iterator[Bytes]:
     """Frames of RGB, `(height, width, 3)` each, drawn without the half-size chroma of video; for stills."""
-    shapes = lay_out(check_positions(positions), figure, camera, fps)
+    points = check_positions(positions)
+    shapes = lay_out(points, figure, camera, fps)
+    path = camera_path(points, camera, fps)
+    floor = None if figure.floor_m is None else Floor(figure, camera)
     with _rgb_target(camera.size, context) as (target, painter):
-        for data in shapes.data:
+        for data, shift in zip(shapes.data, path, strict=True):
             with target.ctx:
-                _start_rgb(target, figure, camera)
+                _start_rgb(target, figure, floor, shift)
                 picture = _painted_rgb(target, painter, data, camera.size)
             yield picture
 
@@ -98,7 +101,8 @@ def render_layers(layers: Sequence[tuple[ArrayLike, Figure]], camera: Camera, co
     if not layers:
         raise RendererError("Expected at least one pose to draw, got none.")
     with _rgb_target(camera.size, context) as (target, painter):
-        _start_rgb(target, layers[0][1], camera)
+        first = layers[0][1]
+        _start_rgb(target, first, None if first.floor_m is None else Floor(first, camera), np.zeros(3))
         for pose, figure in layers:
             shapes = lay_out(check_positions(np.asarray(pose)[None], "a pose"), figure, camera)
             picture = _painted_rgb(target, painter, shapes.data[0], camera.size)
@@ -122,11 +126,11 @@ def _release(target: Any) -> None:
     target.release()
 
 
-def _start_rgb(target: Any, figure: Figure, camera: Camera) -> None:
-    if figure.floor_m is None:
+def _start_rgb(target: Any, figure: Figure, floor: Floor | None, shift: NDArray[np.float64]) -> None:
+    if floor is None:
         target.clear(*(value / 255.0 for value in figure.background))
     else:
-        target.color_attachments[0].write(Floor(figure, camera).rgb().tobytes(), alignment=1)
+        target.color_attachments[0].write(floor.rgb(shift).tobytes(), alignment=1)
 
 
 def _painted_rgb(target: Any, painter: Painter, data: NDArray[np.float32], size: tuple[int, int]) -> Bytes:
@@ -179,9 +183,7 @@ class _Backdrop:
         self._figure, self._camera = figure, camera
         self.plain = figure.floor_m is None
         self.moves = not self.plain and camera.track_seconds is not None
-        self._path = np.zeros((len(positions), 3))
-        if self.moves and camera.track_seconds is not None:
-            self._path = smooth_path(positions, camera.track_seconds, fps)
+        self._path = camera_path(positions, camera, fps)
         self._floor = None if self.plain else Floor(figure, camera)
         self._known: dict[int, Bytes] = {}
 

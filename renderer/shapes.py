@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import Camera, project, smooth_path
+from renderer.camera import Camera, camera_path, project
 from renderer.capsules import Figure, kept_capsules, place
 from renderer.colour import to_ycbcr
 from renderer.floor import shadow_capsules
@@ -49,8 +49,7 @@ class Shapes:
 
 def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 30.0) -> Shapes:
     """Capsules on the screen, sorted from the back to the front; `fps` matters to a camera that tracks."""
-    if camera.track_seconds is not None:
-        positions = positions - smooth_path(positions, camera.track_seconds, fps)[:, None]
+    positions = positions - camera_path(positions, camera, fps)[:, None]
     placed = place(figure, positions)
     figure, placed = _without_hidden(figure, placed)
     ends, nearness = project(camera, placed)

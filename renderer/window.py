@@ -15,22 +15,17 @@ frame.
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import Camera, check_positions
+from renderer.camera import Camera
 from renderer.capsules import Figure
 from renderer.errors import RendererError
 from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Size, Typed, key_name
-from renderer.floor import Floor
 from renderer.pacing import OWN_CLOCK_HZ, Pacing, find_pacing, next_flip
-from renderer.painter import SCREEN, Painter
-from renderer.shapes import Shapes, lay_out
-
-RGB = tuple[int, int, int]
+from renderer.screen import RGB, Drawing, Picture, Screen
 
 _TRIAL_SWAPS, _WARM_UP = 40, 10
 _SPIN_S = 0.001
@@ -39,70 +34,6 @@ NO_DISPLAY = (
     "Expected a display to open a window on, found none that works ({reason}). Run it at the machine's own screen, "
     "name the display (DISPLAY or WAYLAND_DISPLAY), or use a virtual one (xvfb-run); `segue serve` needs no display."
 )
-
-
-class Picture:
-    """An RGB picture in the window's memory; made by `Window.picture`."""
-
-    def __init__(self, texture: Any) -> None:
-        self.texture = texture
-        self.size: Size = texture.size
-
-    def release(self) -> None:
-        """Free it."""
-        self.texture.release()
-
-
-class Drawing:
-    """A figure's motion ready to be drawn frame by frame; made by `Window.drawing`."""
-
-    def __init__(self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, fill: bool) -> None:
-        if figure.floor_m is not None and camera.track_seconds is not None:
-            raise RendererError("Expected a camera that stands still for a figure on a floor in a window; give one.")
-        self.positions, self.figure, self.camera, self.fps, self.fill = positions, figure, camera, fps, fill
-        self.frames = len(positions)
-        self.size: Size | None = None
-        self.place = (0, 0, *camera.size)
-        self.shapes: Shapes | None = None
-        self.floor: NDArray[np.uint8] | None = None
-
-    def fit(self, size: Size) -> bool:
-        """Lay the motion out for a window of that size; False where that was done before."""
-        if self.size == size:
-            return False
-        camera = fitted_camera(self.camera, size, self.fill)
-        width, height = camera.size
-        self.place = ((size[0] - width) // 2, (size[1] - height) // 2, width, height)
-        self.shapes = lay_out(self.positions, self.figure, camera, self.fps)
-        self.shapes.data[..., 12:14] += np.array(self.place[:2], dtype=np.float32)
-        self.floor = None if self.figure.floor_m is None else Floor(self.figure, camera).rgb()
-        self.size = size
-        return True
-
-
-def fitted_camera(camera: Camera, size: Size, fill: bool) -> Camera:
-    """The camera with its picture as large as a window allows, or no larger than it was made (`fill` False)."""
-    width, height = camera.size
-    scale = min(size[0] / width, size[1] / height)
-    if not fill:
-        scale = min(scale, 1.0)
-    wide, high = (max(16, int(edge * scale) // 2 * 2) for edge in (width, height))
-    return replace(camera, size=(wide, high), focal_pixels=camera.focal_pixels * min(wide / width, high / height))
-
-
-_COPY_VERTEX = """#version 330
-out vec2 place;
-void main() {
-    place = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-    gl_Position = vec4(place * 2.0 - 1.0, 0.0, 1.0);
-}
-"""
-_COPY_FRAGMENT = """#version 330
-uniform sampler2D picture;
-in vec2 place;
-out vec4 painted;
-void main() { painted = texture(picture, vec2(place.x, 1.0 - place.y)); }
-"""
 
 
 class Window:
@@ -114,10 +45,7 @@ class Window:
         self._glfw, self._handle, self.gl = glfw, handle, gl
         self._monitor, self.full_screen = monitor, full_screen
         self._events: list[Event] = []
-        self._painter = Painter(gl, (SCREEN,))
-        self._copy = gl.program(vertex_shader=_COPY_VERTEX, fragment_shader=_COPY_FRAGMENT)
-        self._copy_array = gl.vertex_array(self._copy, [])
-        self._floor: tuple[Drawing, Picture] | None = None
+        self._screen = Screen(gl)
         self._beat_s = float(glfw.get_time())
         self._listen()
         self.pacing = Pacing(OWN_CLOCK_HZ, 0.0, 0.0, own_clock=False)
@@ -208,8 +136,7 @@ class Window:
 
     def picture(self, rgb: NDArray[np.uint8]) -> Picture:
         """Load an RGB picture `(height, width, 3)`; the first row is the top."""
-        height, width, _ = rgb.shape
-        return Picture(self.gl.texture((width, height), 3, np.ascontiguousarray(rgb).tobytes(), alignment=1))
+        return self._screen.picture(rgb)
 
     def drawing(
         self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, *, fill: bool = True
@@ -218,52 +145,19 @@ class Window:
 
         `fill` makes the picture as large as the window allows; else it has the size that the camera was made for.
         """
-        made = Drawing(check_positions(positions), figure, camera, fps, fill)
-        made.fit(self.size)
-        return made
+        return self._screen.drawing(positions, figure, camera, fps, self.size, fill)
 
     def clear(self, colour: RGB) -> None:
         """Make the whole window one colour."""
-        self.gl.screen.use()
-        self.gl.viewport = (0, 0, *self.size)
-        self.gl.clear(*(value / 255.0 for value in colour))
+        self._screen.clear(colour, self.size)
 
     def paint(self, picture: Picture, background: RGB) -> None:
         """Show a picture in the middle of the window, pixel for pixel."""
-        self.clear(background)
-        width, height = self.size
-        wide, high = picture.size
-        self._copy_to(picture, ((width - wide) // 2, (height - high) // 2, wide, high))
+        self._screen.paint(picture, background, self.size)
 
     def paint_frame(self, drawing: Drawing, frame: int) -> None:
         """Draw one frame of a motion on its figure's background."""
-        drawing.fit(self.size)
-        self.clear(drawing.figure.background)
-        left, top, wide, high = drawing.place
-        self.gl.scissor = (left, self.size[1] - top - high, wide, high)
-        if drawing.floor is not None:
-            self._paint_floor(drawing)
-        assert drawing.shapes is not None, "fit lays it out"
-        self.gl.viewport = (0, 0, *self.size)
-        self._painter.paint(SCREEN, self._painter.load(drawing.shapes.data[frame]), self.size)
-        self.gl.scissor = None
-
-    def _paint_floor(self, drawing: Drawing) -> None:
-        if self._floor is None or self._floor[0] is not drawing or self._floor[1].size != drawing.place[2:]:
-            if self._floor is not None:
-                self._floor[1].release()
-            assert drawing.floor is not None, "asked for only where there is one"
-            self._floor = (drawing, self.picture(drawing.floor))
-        left, top, wide, high = drawing.place
-        self._copy_to(self._floor[1], (left, self.size[1] - top - high, wide, high))
-
-    def _copy_to(self, picture: Picture, place: tuple[int, int, int, int]) -> None:
-        self.gl.disable(self.gl.BLEND)
-        self.gl.viewport = place
-        picture.texture.filter = (self.gl.NEAREST, self.gl.NEAREST)
-        picture.texture.use(0)
-        self._copy_array.render(self.gl.TRIANGLE_STRIP, vertices=4)
-        self.gl.viewport = (0, 0, *self.size)
+        self._screen.paint_frame(drawing, frame, self.size)
 
     # What people do
 
@@ -292,7 +186,7 @@ class Window:
         """Close the window and free what it holds."""
         if self._handle is None:
             return
-        self._painter.release()
+        self._screen.release()
         self.gl.release()
         self._glfw.destroy_window(self._handle)
         self._glfw.terminate()
