@@ -154,7 +154,7 @@ def _slopes_of_probability(point: FloatArray, frames: FloatArray) -> FloatArray:
     """Derivatives of P("different") by log criterion, lapse and log slopes, shape (fits, levels, 2 + slopes)."""
     criterion, lapse, slopes = np.exp(point[:, :1]), point[:, 1:2], np.exp(point[:, 2:])
     delta = slopes @ frames.T
-    above, below = _density((delta - criterion) / ROOT_TWO), _density((delta + criterion) / ROOT_TWO)
+    above, below = density((delta - criterion) / ROOT_TWO), density((delta + criterion) / ROOT_TWO)
     by_criterion = -(1 - lapse) * (above + below) / ROOT_TWO * criterion
     by_lapse = 0.5 - detected(delta, criterion)
     by_delta = (1 - lapse) * (above - below) / ROOT_TWO
@@ -162,7 +162,8 @@ def _slopes_of_probability(point: FloatArray, frames: FloatArray) -> FloatArray:
     return np.concatenate([by_criterion[:, :, None], by_lapse[:, :, None], by_slopes], axis=2)
 
 
-def _density(value: FloatArray) -> FloatArray:
+def density(value: FloatArray) -> FloatArray:
+    """Return the standard normal density."""
     return np.asarray(np.exp(-0.5 * value * value) / np.sqrt(2 * np.pi), dtype=np.float64)
 
 

@@ -104,7 +104,7 @@ def fit_model(
     for one participant, that participant's answers as independent. Where participants differ much in sensitivity the
     curve of the group is flatter than anybody's, and its threshold is that of the group, not the mean of theirs.
     """
-    reason = _why_no_fit(counts)
+    reason = why_no_fit(counts)
     if reason:
         return reason
     present = np.flatnonzero(counts.shown.sum(axis=0) > 0)
@@ -176,7 +176,8 @@ def _spread_of(
     return _Spread(count, level, model.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
 
 
-def _why_no_fit(counts: Counts) -> str:
+def why_no_fit(counts: Counts) -> str:
+    """Return why the differencing model can't be fitted; empty where it can."""
     shown, different = counts.shown.sum(axis=0), counts.different.sum(axis=0)
     if not shown.any():
         return "no answers"
