@@ -2,8 +2,9 @@
 
     logit P(a is favoured over b) = strength a - strength b + order effect where a comes first
 
-Answers come in, strengths with standard errors go out (Davidson & Beaver 1977; Agresti 2013, section 11.6). Every
-answer counts as independent; the tests over participants stand in `preference`.
+Answers come in, strengths with standard errors go out (Davidson & Beaver 1977; Agresti 2013, section 11.6). Where it is
+known who answered, standard errors are those of participants (the sandwich of Liang & Zeger 1986), not of answers. A
+tie counts half for each side.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study.analysis.estimates import Interval, chi_square_probability, normal_quantile
+from study.analysis.estimates import Interval, chi_square_probability, normal_quantile, t_quantile
 from study.analysis.scoring import maximise
+from study.errors import AnalysisError
 
 FloatArray = NDArray[np.float64]
 
@@ -46,6 +48,8 @@ class BradleyTerry:
         What coming first (or playing at home) adds, on the logit scale; None where the order is not known.
     log_likelihood, deviance, degrees_of_freedom, p_value
         Goodness of fit against free shares of every pair and order.
+    participants
+        Whose answers stand behind the standard errors; None where every answer counts as independent.
     note
         What can't be estimated, and why.
     """
@@ -57,6 +61,7 @@ class BradleyTerry:
     deviance: float
     degrees_of_freedom: int
     p_value: float | None
+    participants: int | None = None
     note: str = ""
 
 
@@ -69,6 +74,7 @@ def fit_bradley_terry(
     with_order: bool = True,
     reference: str | None = None,
     confidence: float = 0.95,
+    participants: Sequence[str] | None = None,
 ) -> BradleyTerry | str:
     """Fit strengths; a sentence that says why where they can't be fitted.
 
@@ -82,12 +88,21 @@ def fit_bradley_terry(
         Whether coming first may matter.
     reference
         The method whose strength is 0; the first by name unless given.
+    participants : sequence of str, shape (rows,)
+        Who answered; every answer counts as independent where left out.
+
+    Raises
+    ------
+    AnalysisError
+        When the reference is none of the methods.
     """
     yes, total = np.asarray(first_favoured, float), np.asarray(shown, float)
     methods = sorted({*first, *second})
     if len(methods) < 2 or total.sum() == 0:
         return "fewer than two methods were compared"
-    held = reference or methods[0]
+    held = methods[0] if reference is None else reference
+    if held not in methods:
+        raise AnalysisError(f"expected one of the methods {', '.join(methods)} as reference, found {held!r}")
     others = [method for method in methods if method != held]
     design = np.zeros((len(yes), len(others) + with_order))
     for row, (one, other) in enumerate(zip(first, second, strict=True)):
@@ -98,7 +113,8 @@ def fit_bradley_terry(
         design[:, -1] = 1.0
     if np.linalg.matrix_rank(design[total > 0]) < design.shape[1]:
         return "the methods are not linked by comparisons, or the order never changed: strengths can't be told"
-    return _fitted(design, yes, total, others, held, with_order, confidence)
+    groups = None if participants is None else np.unique(np.asarray(participants), return_inverse=True)[1]
+    return _fitted(design, yes, total, others, held, groups, confidence)
 
 
 def _fitted(
@@ -107,7 +123,7 @@ def _fitted(
     total: FloatArray,
     others: Sequence[str],
     held: str,
-    with_order: bool,
+    groups: NDArray[np.intp] | None,
     confidence: float,
 ) -> BradleyTerry:
     from scipy.special import expit, xlogy
@@ -127,33 +143,56 @@ def _fitted(
     best = maximise(value, scores, np.zeros((1, size)), np.full(size, -WIDEST), np.full(size, WIDEST))
     point = best.point[0]
     _, information = scores(point[None], np.zeros(1, dtype=np.intp))
-    errors = np.sqrt(np.diag(np.linalg.pinv(information[0])))
-    names = [*others, "order"] if with_order else list(others)
-    triples = zip(names, point, errors, strict=True)
-    found = {name: _strength(name, float(at), float(error), confidence) for name, at, error in triples}
-    endless = [name for name, row in found.items() if row.value is None]
-    order = found.pop("order", None) if with_order else None
-    rows = [*found.values(), Strength(held, 0.0, None, Interval(0.0, 0.0, confidence))]
-    rows.sort(key=lambda row: -(row.value if row.value is not None else point[names.index(row.method)]))
-    seen = np.maximum(total, 1e-12)
-    full = float((xlogy(yes, yes / seen) + xlogy(total - yes, 1 - yes / seen)).sum())
+    errors = _errors(information[0], (yes - total * share(point[None])[0])[:, None] * design, groups)
+    people = None if groups is None else int(groups.max()) + 1
+    times = normal_quantile(confidence) if people is None else t_quantile(confidence, max(people - 1, 1))
+    # By place, not by name: a method may well be called "order".
+    found = [
+        _strength(name, float(at), float(error), times, confidence)
+        for name, at, error in zip([*others, "order"], point, errors, strict=False)
+    ]
+    order = found.pop() if size > len(others) else None
+    ranked = [*zip(point, found, strict=False), (0.0, Strength(held, 0.0, None, Interval(0.0, 0.0, confidence)))]
+    ranked.sort(key=lambda pair: -pair[0])
+    endless = [row.method for row in (*found, *([order] if order else [])) if row.value is None]
+    # Rows may hold single answers: the saturated model is one share for every pair and order.
+    cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
+    favoured, seen = np.bincount(cells, yes), np.bincount(cells, total)
+    rate = favoured / np.maximum(seen, 1e-12)
+    full = float((xlogy(favoured, rate) + xlogy(seen - favoured, 1 - rate)).sum())
     deviance = max(2 * (full - float(best.value[0])), 0.0)
-    freedom = int((total > 0).sum()) - size
+    freedom = int((seen > 0).sum()) - size
     return BradleyTerry(
-        strengths=tuple(rows),
+        strengths=tuple(row for _, row in ranked),
         reference=held,
         order=order,
         log_likelihood=float(best.value[0]),
         deviance=deviance,
         degrees_of_freedom=max(freedom, 0),
         p_value=chi_square_probability(deviance, freedom) if freedom > 0 else None,
+        participants=people,
         note=f"always or never favoured, so without a finite strength: {', '.join(endless)}" if endless else "",
     )
 
 
-def _strength(name: str, value: float, error: float, confidence: float) -> Strength:
-    """A strength, or none where it grows without end (its standard error then is huge)."""
+def _errors(information: FloatArray, scores: FloatArray, groups: NDArray[np.intp] | None) -> FloatArray:
+    """Standard errors: of independent answers, or of participants (NaN with one, who has nobody to differ from)."""
+    inverse = np.linalg.pinv(information)
+    if groups is None:
+        return np.asarray(np.sqrt(np.diag(inverse)), dtype=np.float64)
+    people = int(groups.max()) + 1
+    if people < 2:
+        return np.full(len(inverse), np.nan)
+    sums = np.zeros((people, scores.shape[1]))
+    np.add.at(sums, groups, scores)
+    return np.asarray(np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse) * people / (people - 1)), dtype=np.float64)
+
+
+def _strength(name: str, value: float, error: float, times: float, confidence: float) -> Strength:
+    """A strength, or none where it grows without end; without a standard error where nothing tells it."""
     if abs(value) > 0.9 * WIDEST or error > 50:
         return Strength(name, None, None, Interval(None, None, confidence))
-    half = normal_quantile(confidence) * error
-    return Strength(name, float(value), float(error), Interval(float(value - half), float(value + half), confidence))
+    # Participants who answer just alike leave no spread that could be judged by.
+    if not np.isfinite(error) or error < 1e-9:
+        return Strength(name, value, None, Interval(None, None, confidence))
+    return Strength(name, value, error, Interval(value - times * error, value + times * error, confidence))

@@ -7,24 +7,23 @@ intraclass correlation and the design effect say how far the two can differ.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.bradley_terry import fit_bradley_terry
 from study.analysis.group_models import preference_models
-from study.analysis.no_effect import no_preference
+from study.analysis.no_effect import MARGIN, no_preference
+from study.analysis.preference_tests import motions_as_sample, participant_tests
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
-
+_TRUTH = {"true": "1", "false": "0"}
 NEEDED_COLUMNS = ("participant", "chose_a", "method_a", "method_b")
 
 
@@ -93,13 +92,15 @@ def published_test(favouring: int, answers: int, confidence: float = 0.95) -> Pu
 
 
 def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers given in preference tasks, missed ones left out, `chose_a` as 0 or 1.
+    """Return the answers given in preference tasks, missed ones left out, `chose_a` as 0, 1, or one half for a tie.
 
     Raises
     ------
     AnalysisError
-        When a column is missing.
+        When a column is missing, or `chose_a` holds anything else.
     """
+    import pandas as pd
+
     missing = [name for name in NEEDED_COLUMNS if name not in answers.columns]
     if missing:
         raise AnalysisError(
@@ -108,12 +109,24 @@ def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
         )
     chosen = answers[answers["task"] == "preference"] if "task" in answers.columns else answers
     given = chosen[chosen["chose_a"].notna()].copy()
-    given["chose_a"] = given["chose_a"].astype(bool).astype(float)
+    numbers = pd.to_numeric(given["chose_a"].astype(object).astype(str).str.lower().replace(_TRUTH), errors="coerce")
+    strange = ~numbers.isin([0.0, 0.5, 1.0])
+    if strange.any():
+        found = given.loc[strange, "chose_a"].iloc[0]
+        raise AnalysisError(
+            f"expected true, false, or 0.5 for a tie in the column `chose_a`, found {str(found)!r}; recode it"
+        )
+    given["chose_a"] = numbers.astype(float)
     return given
 
 
 def compare(
-    answers: pd.DataFrame, confidence: float = 0.95, alpha: float = 0.05, *, models: bool = True
+    answers: pd.DataFrame,
+    confidence: float = 0.95,
+    alpha: float = 0.05,
+    *,
+    models: bool = True,
+    margin: float = MARGIN,
 ) -> list[dict[str, Any]]:
     """Analyse every pair of methods that was compared.
 
@@ -127,40 +140,53 @@ def compare(
         Level of significance that the sentence in `answer` speaks of.
     models
         Whether to fit mixed models and estimating equations too, which takes longer.
+    margin
+        Of the equivalence test: the difference from an even split that still counts as none (0.1 is 40 to 60%).
 
     Returns
     -------
     list of dict
         One entry a pair of methods, in the order of first appearance: `method_a`, `method_b`, `published` (pooled
-        test), `participants` (one share a participant against one half; Wilcoxon's test; robust chi-square),
-        `clustering`, `motions` (the pooled test a motion pair, p-values adjusted by Holm), `order` (effect of
-        the order of presentation), `no_preference` (equivalence test and Bayes factor), `models` (mixed model, GEE),
-        `answer` (a sentence).
+        test, ties left out), `ties` (answers for neither), `participants` (one share a participant against one half, a
+        tie as half an answer; Wilcoxon's test; robust chi-square), `clustering`, `motions` (the pooled test a motion
+        pair, p-values adjusted by Holm), `motions_as_sample` (tests that hold for other motions too), `order` (effect
+        of the order of presentation), `no_preference` (equivalence test and Bayes factor), `models` (mixed model,
+        GEE), `answer` (a sentence).
     """
     given = preference_answers(answers)
     results = []
     for (method_a, method_b), part in given.groupby(["method_a", "method_b"], sort=False):
-        result = _compare_two(str(method_a), str(method_b), part, confidence, alpha)
+        result = _compare_two(str(method_a), str(method_b), part, confidence, alpha, margin)
         results.append({**result, "models": preference_models(part, confidence) if models else None})
     return results
 
 
-def _compare_two(method_a: str, method_b: str, part: pd.DataFrame, confidence: float, alpha: float) -> dict[str, Any]:
+def _compare_two(
+    method_a: str, method_b: str, part: pd.DataFrame, confidence: float, alpha: float, margin: float
+) -> dict[str, Any]:
     by_participant = part.groupby(part["participant"].astype(str))["chose_a"].agg(["sum", "count"])
     chosen, shown = by_participant["sum"].to_numpy(dtype=np.float64), by_participant["count"].to_numpy(dtype=np.float64)
-    published = published_test(int(chosen.sum()), int(shown.sum()), confidence)
+    published = _without_ties(part, confidence)
     participants = participant_tests(chosen, shown, confidence)
     return {
         "method_a": method_a,
         "method_b": method_b,
         "published": estimates.plain(published),
+        "ties": int((part["chose_a"] == 0.5).sum()),
         "participants": participants,
         "clustering": estimates.plain(estimates.clustering(chosen, shown)),
         "motions": motion_table(part, confidence).to_dict("records"),
+        "motions_as_sample": motions_as_sample(part, confidence),
         "order": order_effect(part, confidence),
-        "no_preference": estimates.plain(no_preference(chosen[shown > 0] / shown[shown > 0])),
+        "no_preference": estimates.plain(no_preference(chosen[shown > 0] / shown[shown > 0], margin)),
         "answer": _in_words(method_a, method_b, published, participants, alpha),
     }
+
+
+def _without_ties(part: pd.DataFrame, confidence: float) -> Published:
+    """The pooled test of the answers that chose; like a sign test, it leaves out those that did not."""
+    clear = part["chose_a"] != 0.5
+    return published_test(int(part.loc[clear, "chose_a"].sum()), int(clear.sum()), confidence)
 
 
 def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any] | None:
@@ -189,8 +215,18 @@ def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
     return {"note": found} if isinstance(found, str) else dict(estimates.plain(found))
 
 
-def confirmatory(comparisons: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
-    """Return the default tests of all comparisons of a sitting, adjusted together by Holm's method."""
+def confirmatory(
+    comparisons: dict[str, list[dict[str, Any]]], family: Sequence[str] | None = None
+) -> list[dict[str, Any]]:
+    """Return the default tests of the confirmatory comparisons of a sitting, adjusted together by Holm's method.
+
+    Parameters
+    ----------
+    comparisons
+        By study, what `compare` gave.
+    family
+        Names of the studies whose tests were declared confirmatory before there was data; all of them where None.
+    """
     rows = [
         {
             "study": study,
@@ -200,96 +236,12 @@ def confirmatory(comparisons: dict[str, list[dict[str, Any]]]) -> list[dict[str,
             "p_value": compared["participants"]["p_value"],
         }
         for study, found in comparisons.items()
+        if family is None or study in family
         for compared in found
     ]
     known = np.array([np.nan if row["p_value"] is None else row["p_value"] for row in rows], dtype=np.float64)
     adjusted = estimates.holm(known)
     return [{**row, "holm_p_value": estimates.finite(p)} for row, p in zip(rows, adjusted, strict=True)]
-
-
-def participant_tests(chosen: FloatArray, shown: FloatArray, confidence: float = 0.95) -> dict[str, Any]:
-    """Test the preference with one number a participant.
-
-    Parameters
-    ----------
-    chosen, shown : ndarray, shape (participants,)
-        How often each favoured the first method, of how many answers.
-    confidence
-        Of the interval.
-
-    Returns
-    -------
-    dict
-        `participants`, `mean_percent`, `standard_error` (percent), `low`, `high` (percent), `t`, `degrees_of_freedom`,
-        `p_value` (Student's t; where all participants agree exactly, the exact sign test), `test` (which of the two),
-        `wilcoxon_p_value`, `robust_chi_square`, `robust_p_value` (pooled difference over its variance between
-        participants, referred to F(1, participants - 1)), `for_a`, `for_b`, `undecided` (participants), `note`.
-    """
-    share = chosen[shown > 0] / shown[shown > 0]
-    test = estimates.mean_test(share, 0.5, confidence)
-    for_a, for_b = int((share > 0.5).sum()), int((share < 0.5).sum())
-    p_value, name = test.p_value, "Student's t over participants"
-    if p_value is None and test.participants > 1:
-        p_value, name = estimates.binomial_probability(for_a, for_a + for_b) or 1.0, "exact sign test"
-    robust = _robust_chi_square(chosen, shown)
-    low, high = test.interval.low, test.interval.high
-    return {
-        "participants": test.participants,
-        "mean_percent": None if test.mean is None else 100 * test.mean,
-        "standard_error": None if test.standard_error is None else 100 * test.standard_error,
-        "low": None if low is None else 100 * max(low, 0.0),
-        "high": None if high is None else 100 * min(high, 1.0),
-        "t": test.statistic,
-        "degrees_of_freedom": test.degrees_of_freedom,
-        "p_value": p_value,
-        "test": name if p_value is not None else "none",
-        "wilcoxon_p_value": _wilcoxon(share),
-        "robust_chi_square": robust,
-        "robust_p_value": None if robust is None else estimates.f_probability(robust, 1, test.participants - 1),
-        "for_a": for_a,
-        "for_b": for_b,
-        "undecided": int((share == 0.5).sum()),
-        "note": test.note,
-    }
-
-
-def _wilcoxon(share: FloatArray) -> float | None:
-    """Wilcoxon's signed-rank test of the shares against one half; None where nobody leans either way."""
-    lean = share[share != 0.5] - 0.5
-    if len(lean) < 2:
-        return None
-    _, place, ties = np.unique(np.round(np.abs(lean), 12), return_inverse=True, return_counts=True)
-    ranks = (np.cumsum(ties) - (ties - 1) / 2)[place]  # tied values share the mean of their ranks
-    positive, mean = float(ranks[lean > 0].sum()), float(ranks.sum()) / 2
-    if len(lean) <= 50:
-        return _exact_signed_rank(ranks, positive)
-    deviation = math.sqrt(float((ranks**2).sum()) / 4)
-    return estimates.chi_square_probability(((positive - mean) / deviation) ** 2, 1)
-
-
-def _exact_signed_rank(ranks: FloatArray, positive: float) -> float:
-    """Two-sided probability over all assignments of signs, ties included (ranks are multiples of one half)."""
-    doubled = np.round(2 * ranks).astype(int)
-    ways = np.zeros(int(doubled.sum()) + 1)
-    ways[0] = 1.0
-    for rank in doubled:
-        shifted = np.zeros_like(ways)
-        shifted[rank:] = ways[: len(ways) - rank]
-        ways = (ways + shifted) / 2
-    distance = np.abs(np.arange(len(ways)) - doubled.sum() / 2)
-    return float(min(1.0, ways[distance >= abs(2 * positive - doubled.sum() / 2) - 1e-9].sum()))
-
-
-def _robust_chi_square(chosen: FloatArray, shown: FloatArray) -> float | None:
-    """Squared pooled difference from an even split over its variance between participants."""
-    count = int((shown > 0).sum())
-    if count < 2:
-        return None
-    pooled = chosen.sum() / shown.sum()
-    variance = float(((chosen - shown * pooled) ** 2).sum()) * count / (count - 1)
-    if variance <= 1e-12:
-        return None
-    return float((chosen.sum() - shown.sum() / 2) ** 2) / variance
 
 
 def motion_table(part: pd.DataFrame, confidence: float = 0.95) -> pd.DataFrame:
@@ -308,7 +260,7 @@ def motion_table(part: pd.DataFrame, confidence: float = 0.95) -> pd.DataFrame:
     column = "motion" if "motion" in part.columns else "pair" if "pair" in part.columns else None
     rows = []
     for motion, answers in part.groupby(part[column].astype(str) if column else np.full(len(part), "all"), sort=False):
-        test = published_test(int(answers["chose_a"].sum()), len(answers), confidence)
+        test = _without_ties(answers, confidence)
         rows.append(
             {
                 "motion": str(motion),
@@ -342,7 +294,7 @@ def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
         return {"first_percent": None, "answers": 0, "p_value": None, "note": "the order of presentation is not known"}
     known = part[part["a_first"].notna()]
     a_first = known["a_first"].astype(bool)
-    chose_first = (known["chose_a"] == a_first.astype(float)).astype(float)
+    chose_first = known["chose_a"].where(a_first, 1 - known["chose_a"])
     shares = chose_first.groupby(known["participant"].astype(str)).mean().to_numpy(dtype=np.float64)
     test = estimates.mean_test(shares, 0.5, confidence)
     first = 100 * float(known.loc[a_first, "chose_a"].mean()) if a_first.any() else None

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp
 
 from study.analysis.bradley_terry import BradleyTerry, fit_bradley_terry
 from study.analysis.no_effect import bayes_factor_null, no_preference
+from study.errors import AnalysisError
 
 
 def test_bayes_factors_printed_in_rouder_et_al_2009() -> None:
@@ -50,3 +52,82 @@ def test_methods_that_never_lose_have_no_finite_strength() -> None:
 def test_unlinked_methods_are_said() -> None:
     assert "not linked" in str(fit_bradley_terry(list("ac"), list("bd"), [5, 5], [10, 10], with_order=False))
     assert "fewer than two" in str(fit_bradley_terry([], [], [], []))
+
+
+def test_a_method_may_be_called_order() -> None:
+    """The term for the order of presentation is told from a method of that name."""
+    rows = [
+        ("order", "chaos", 14),
+        ("chaos", "order", 9),
+        ("order", "void", 16),
+        ("void", "chaos", 7),
+        ("void", "order", 5),
+    ]
+    first, second, favoured = zip(*rows, strict=True)
+    renamed = [[{"order": "x"}.get(name, name) for name in names] for names in (first, second)]
+    shown = [20] * len(rows)
+    found = fit_bradley_terry(first, second, favoured, shown, reference="chaos")
+    expected = fit_bradley_terry(*renamed, favoured, shown, reference="chaos")
+    assert isinstance(found, BradleyTerry)
+    assert isinstance(expected, BradleyTerry)
+    assert [row.method for row in found.strengths] == ["order", "chaos", "void"]
+    for one, other in zip(found.strengths, expected.strengths, strict=True):
+        assert one.value == pytest.approx(other.value)
+    assert found.order is not None
+    assert expected.order is not None
+    assert found.order.value == pytest.approx(expected.order.value)
+    with pytest.raises(AnalysisError, match="one of the methods chaos, order, void as reference, found 'walk'"):
+        fit_bradley_terry(first, second, favoured, shown, reference="walk")
+
+
+def three_methods(rng: np.random.Generator, people: int, spread: float) -> dict[str, list[str] | np.ndarray]:
+    """Answers to all pairs of three methods by people who differ; true strengths 1, 0, -0.5, first place 0.3."""
+    strength = {"a": 1.0, "b": 0.0, "c": -0.5}
+    first, second, who, chance = [], [], [], []
+    for person in range(people):
+        own = {name: value + spread * rng.normal() for name, value in strength.items()}
+        for one, other in (("a", "b"), ("b", "a"), ("a", "c"), ("c", "a"), ("b", "c"), ("c", "b")) * 4:
+            first.append(one)
+            second.append(other)
+            who.append(f"p{person}")
+            chance.append(1 / (1 + np.exp(-(own[one] - own[other] + 0.3))))
+    return {"first": first, "second": second, "who": who, "favoured": (rng.random(len(who)) < chance).astype(float)}
+
+
+def test_strengths_rest_on_participants_where_these_differ() -> None:
+    """The scatter of strengths over studies is that of the participants' standard errors, not of the answers'."""
+    rng = np.random.default_rng(12)
+    values, robust, naive = [], [], []
+    for _ in range(120):
+        data = three_methods(rng, 20, 0.8)
+        common = (data["first"], data["second"], data["favoured"], np.ones(len(data["who"])))
+        found = fit_bradley_terry(*common, reference="b", participants=data["who"])
+        plain = fit_bradley_terry(*common, reference="b")
+        assert isinstance(found, BradleyTerry)
+        assert isinstance(plain, BradleyTerry)
+        assert found.participants == 20
+        one = next(row for row in found.strengths if row.method == "a")
+        values.append(one.value)
+        robust.append(one.standard_error)
+        naive.append(next(row for row in plain.strengths if row.method == "a").standard_error)
+    assert np.mean(robust) == pytest.approx(np.std(values), rel=0.2)
+    assert np.mean(naive) < 0.75 * np.std(values)
+
+
+def test_goodness_of_fit_is_the_same_from_answers_and_from_counts() -> None:
+    data = three_methods(np.random.default_rng(3), 15, 0.0)
+    single = fit_bradley_terry(data["first"], data["second"], data["favoured"], np.ones(len(data["who"])))
+    table = pd.DataFrame(data).groupby(["first", "second"])["favoured"].agg(["sum", "count"]).reset_index()
+    counted = fit_bradley_terry(list(table["first"]), list(table["second"]), table["sum"], table["count"])
+    assert isinstance(single, BradleyTerry)
+    assert isinstance(counted, BradleyTerry)
+    assert single.degrees_of_freedom == counted.degrees_of_freedom == 3
+    assert single.deviance == pytest.approx(counted.deviance, abs=1e-6)
+    assert single.deviance < 15
+
+
+def test_one_participant_has_strengths_without_errors() -> None:
+    found = fit_bradley_terry(list("abab"), list("baba"), [1, 0, 1, 1], [1] * 4, participants=["p"] * 4)
+    assert isinstance(found, BradleyTerry)
+    assert all(row.standard_error is None for row in found.strengths)
+    assert found.strengths[0].value is not None

@@ -11,7 +11,8 @@ import pytest
 from scipy import stats
 
 from study.analysis import estimates
-from study.analysis.preference import compare, participant_tests, published_test
+from study.analysis.preference import compare, confirmatory, published_test, strengths
+from study.analysis.preference_tests import default_p_values, motions_as_sample, participant_tests
 from study.errors import AnalysisError
 
 
@@ -138,3 +139,104 @@ def test_holm_by_hand() -> None:
 def test_missing_columns_are_named() -> None:
     with pytest.raises(AnalysisError, match="found none named method_a, method_b"):
         compare(pd.DataFrame({"participant": ["a"], "chose_a": [True]}))
+
+
+def test_the_default_test_of_many_studies_at_once_is_that_of_each() -> None:
+    """Against scipy; with people who gave no answers, with all alike, with too few."""
+    rng = np.random.default_rng(5)
+    chosen, shown = rng.binomial(8, 0.6, (40, 12)).astype(float), np.full((40, 12), 8.0)
+    shown[:5, 3] = chosen[:5, 3] = 0
+    chosen[5] = 8
+    chosen[6] = 4
+    shown[7, 1:] = chosen[7, 1:] = 0
+    found = default_p_values(chosen, shown)
+    for study in [*range(5), *range(8, 40)]:
+        there = shown[study] > 0
+        expected = stats.ttest_1samp(chosen[study][there] / shown[study][there], 0.5).pvalue
+        assert found[study] == pytest.approx(expected)
+    assert found[5] == pytest.approx(2 * 0.5**12)
+    assert found[6] == 1
+    assert np.isnan(found[7])
+
+
+def test_ties_count_half_and_leave_the_pooled_test(preference_study: Callable[..., pd.DataFrame]) -> None:
+    answers = preference_study(np.random.default_rng(2), participants=10).astype({"chose_a": object})
+    answers.loc[answers.index % 8 == 0, "chose_a"] = 0.5
+    (result,) = compare(answers)
+    clear = answers[answers["chose_a"] != 0.5]
+    assert result["ties"] == 10
+    assert (result["published"]["answers"], result["published"]["favouring"]) == (70, int(clear["chose_a"].sum()))
+    shares = answers.assign(chose_a=answers["chose_a"].astype(float)).groupby("participant")["chose_a"].mean()
+    assert result["participants"]["mean_percent"] == pytest.approx(100 * shares.mean())
+    assert result["order"]["answers"] == 80
+    answers.loc[3, "chose_a"] = "geodesic"
+    with pytest.raises(AnalysisError, match=r"or 0\.5 for a tie .* found 'geodesic'"):
+        compare(answers)
+
+
+def test_motions_that_differ_widen_what_holds_for_other_motions() -> None:
+    """Motions alone decide: over participants that looks certain, over motions it does not."""
+    rng = np.random.default_rng(9)
+    chance = np.tile([0.95, 0.9, 0.85, 0.8, 0.75, 0.2, 0.15, 0.1], (35, 1))
+    chosen = (rng.random((35, 8)) < chance).astype(float)
+    part = pd.DataFrame(
+        {
+            "participant": np.repeat(np.arange(35), 8),
+            "motion": np.tile(np.arange(8), 35),
+            "chose_a": chosen.ravel(),
+        }
+    )
+    found = motions_as_sample(part)
+    people = participant_tests(chosen.sum(axis=1), np.full(35, 8.0))
+    assert people["p_value"] < 0.001
+    expected = stats.ttest_1samp(chosen.mean(axis=0), 0.5)
+    assert found["by_motion"]["p_value"] == pytest.approx(expected.pvalue)
+    assert found["both"]["p_value"] > 0.1
+    assert found["both"]["degrees_of_freedom"] == 7
+    assert found["both"]["percent"] == pytest.approx(people["mean_percent"])
+
+
+def test_what_holds_for_other_people_and_motions_keeps_its_level() -> None:
+    """Missing answers, people and motions that both differ: errors near the nominal 5%."""
+    rng = np.random.default_rng(10)
+    wrong = []
+    for _ in range(400):
+        lean = 0.6 * rng.normal(size=(35, 1)) + 0.5 * rng.normal(size=(1, 8))
+        chosen = (rng.random((35, 8)) < 1 / (1 + np.exp(-lean))).astype(float)
+        part = pd.DataFrame(
+            {"participant": np.repeat(np.arange(35), 8), "motion": np.tile(np.arange(8), 35), "chose_a": chosen.ravel()}
+        )
+        wrong.append(motions_as_sample(part[rng.random(280) > 0.05])["both"]["p_value"] < 0.05)
+    assert 0.015 <= np.mean(wrong) <= 0.08
+
+
+def test_one_motion_can_stand_for_no_other(preference_study: Callable[..., pd.DataFrame]) -> None:
+    answers = preference_study(np.random.default_rng(2), participants=9)
+    (result,) = compare(answers[answers["motion"] == "motion 0"])
+    assert result["motions_as_sample"]["both"] is None
+    assert "fewer than two motions" in result["motions_as_sample"]["note"]
+    (alone,) = compare(answers[answers["participant"] == "p00"])
+    assert alone["motions_as_sample"]["both"] is None
+    assert "one participant" in alone["motions_as_sample"]["note"]
+
+
+def test_only_the_declared_family_is_adjusted(preference_study: Callable[..., pd.DataFrame]) -> None:
+    rng = np.random.default_rng(3)
+    found = {name: compare(preference_study(rng, share=0.6), models=False) for name in ("main", "second", "extra")}
+    everything, declared = confirmatory(found), confirmatory(found, ["main", "second"])
+    assert [row["study"] for row in declared] == ["main", "second"]
+    assert [row["p_value"] for row in declared] == [row["p_value"] for row in everything[:2]]
+    smallest = min(row["p_value"] for row in declared)
+    assert min(row["holm_p_value"] for row in declared) == pytest.approx(2 * smallest)
+
+
+def test_strengths_rest_on_who_answered(preference_study: Callable[..., pd.DataFrame]) -> None:
+    rng = np.random.default_rng(4)
+    parts = [
+        preference_study(rng, participants=12, share=share).assign(method_a=one, method_b=other)
+        for one, other, share in (("a", "b", 0.7), ("b", "c", 0.6), ("a", "c", 0.8))
+    ]
+    found = strengths(pd.concat(parts))
+    assert found is not None
+    assert found["participants"] == 12
+    assert [row["method"] for row in found["strengths"]] == ["a", "b", "c"]

@@ -1,0 +1,151 @@
+"""Tests that use the order of values alone, ties included: values in, statistics and p-values out.
+
+For one difference a participant: Wilcoxon's signed ranks, exact. For several values a participant: Friedman's test in
+the form of Iman & Davenport 1980. For groups, one or two factors: the ANOVA-type statistic of Brunner, Dette & Munk
+1997, which needs no common variance and no normal distribution, so that it suits points on a scale.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from study.analysis import estimates
+
+FloatArray = NDArray[np.float64]
+
+LARGEST_EXACT = 50
+
+
+def signed_rank(differences: ArrayLike) -> float | None:
+    """Wilcoxon's signed-rank test against zero, two-sided; None where fewer than two differ from zero.
+
+    Parameters
+    ----------
+    differences : array_like, shape (participants,)
+        One a participant. Zeros are left out, as Wilcoxon does.
+
+    Notes
+    -----
+    Exact to 50 participants, over all assignments of signs to the ranks that there are; normal beyond.
+    """
+    lean = np.asarray(differences, dtype=np.float64)
+    lean = lean[np.isfinite(lean) & (np.abs(lean) > 1e-12)]
+    if len(lean) < 2:
+        return None
+    from scipy.stats import rankdata
+
+    ranks = rankdata(np.round(np.abs(lean), 12))
+    positive, mean = float(ranks[lean > 0].sum()), float(ranks.sum()) / 2
+    if len(lean) <= LARGEST_EXACT:
+        return _exact_signed_rank(ranks, positive)
+    deviation = math.sqrt(float((ranks**2).sum()) / 4)
+    return estimates.chi_square_probability(((positive - mean) / deviation) ** 2, 1)
+
+
+def _exact_signed_rank(ranks: FloatArray, positive: float) -> float:
+    """Two-sided probability over all assignments of signs, ties included (ranks are multiples of one half)."""
+    doubled = np.round(2 * ranks).astype(int)
+    ways = np.zeros(int(doubled.sum()) + 1)
+    ways[0] = 1.0
+    for rank in doubled:
+        shifted = np.zeros_like(ways)
+        shifted[rank:] = ways[: len(ways) - rank]
+        ways = (ways + shifted) / 2
+    distance = np.abs(np.arange(len(ways)) - doubled.sum() / 2)
+    return float(min(1.0, ways[distance >= abs(2 * positive - doubled.sum() / 2) - 1e-9].sum()))
+
+
+def friedman(values: ArrayLike) -> dict[str, Any] | None:
+    """Friedman's test of several values a participant; None where every participant gives all of them alike.
+
+    Parameters
+    ----------
+    values : array_like, shape (participants, levels)
+        No value missing.
+
+    Returns
+    -------
+    dict
+        `chi_square`, `f`, `degrees_of_freedom`, `error_degrees_of_freedom`, `p_value` (of F: Iman & Davenport 1980;
+        the chi-square is too careful with few participants).
+    """
+    from scipy.stats import rankdata
+
+    table = np.asarray(values, dtype=np.float64)
+    people, levels = table.shape
+    if people < 2 or levels < 2:
+        return None
+    ranks = rankdata(table, axis=1)
+    between = people * float(((ranks.mean(axis=0) - (levels + 1) / 2) ** 2).sum())
+    total = float(((ranks - (levels + 1) / 2) ** 2).sum())
+    if total <= 0:
+        return None
+    chi_square = people * (levels - 1) * between / total
+    left = people * (levels - 1) - chi_square
+    degrees = (levels - 1, (levels - 1) * (people - 1))
+    # Where all rank alike, nothing is left over: then the chance of just that is known.
+    alike = left <= 1e-9
+    f = math.inf if alike else (people - 1) * chi_square / left
+    p_value = math.factorial(levels) ** (1 - people) if alike else estimates.f_probability(f, *degrees)
+    return {
+        "chi_square": chi_square,
+        "f": estimates.finite(f),
+        "degrees_of_freedom": degrees[0],
+        "error_degrees_of_freedom": degrees[1],
+        "p_value": float(p_value),
+    }
+
+
+def anova_type(values: ArrayLike, cells: ArrayLike, contrasts: Mapping[str, FloatArray]) -> list[dict[str, Any]] | str:
+    """Test contrasts between groups on ranks; a sentence that says why where that can't be.
+
+    Parameters
+    ----------
+    values : array_like, shape (answers,)
+        All independent of each other.
+    cells : array_like of int, shape (answers,)
+        Group of each, 0 to groups - 1.
+    contrasts
+        For each effect a matrix, shape (rows, groups), whose rows sum to zero.
+
+    Returns
+    -------
+    list of dict
+        One entry an effect: `source`, `f`, `degrees_of_freedom`, `error_degrees_of_freedom`, `p_value`.
+    """
+    from scipy.stats import rankdata
+
+    y, group = np.asarray(values, dtype=np.float64), np.asarray(cells, dtype=np.intp)
+    sizes = np.bincount(group)
+    if (sizes < 2).any():
+        return "a group with fewer than two answers: ranks can't be compared"
+    ranks = rankdata(y)
+    means = np.bincount(group, ranks) / sizes
+    spread = np.bincount(group, (ranks - means[group]) ** 2) / (sizes - 1) / sizes
+    if spread.sum() <= 1e-12:
+        return "the answers of each group are all alike: there is no spread to judge by"
+    return [_one_contrast(name, matrix, means, spread, sizes) for name, matrix in contrasts.items()]
+
+
+def _one_contrast(
+    name: str, matrix: FloatArray, means: FloatArray, spread: FloatArray, sizes: NDArray[np.int64]
+) -> dict[str, Any]:
+    projection = matrix.T @ np.linalg.pinv(matrix @ matrix.T) @ matrix
+    weighted = projection * spread
+    scale = float(np.trace(weighted))
+    own = np.diag(projection) * spread
+    degrees = scale**2 / float(np.trace(weighted @ weighted))
+    error_degrees = float(own.sum()) ** 2 / float((own**2 / (sizes - 1)).sum())
+    f = float(means @ projection @ means) / scale
+    return {
+        "source": name,
+        "f": f,
+        "degrees_of_freedom": degrees,
+        "error_degrees_of_freedom": error_degrees,
+        "p_value": estimates.f_probability(f, degrees, error_degrees),
+    }
