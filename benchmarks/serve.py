@@ -1,23 +1,33 @@
-"""How long an answer takes when many browsers answer at once: `python benchmarks/serve.py [--clients 200]`.
+"""How long an answer takes when many browsers answer at once: `python benchmarks/serve.py [--browsers 200]`.
 
-A server runs in a process of its own, on a study without films; the clients are connections of this process. Two
-loads are measured: `spread`, where every client answers once within each second, and `burst`, where all of them
-answer at the same instant, again and again. An answer's round trip ends when the server says that it is on disk. At
-the end every acknowledged answer is looked for in the database.
+A server runs in a process of its own, on a study without films; this process is the browsers, each a connection that
+stays open. Two loads: in a `burst` all of them answer at the same instant; in a `spread` each answers once at some time
+within a second, as people do. Every answer carries the times of all frames of two films, as a browser's does. A round
+trip runs from the send of an answer to the word that it is on disk.
+
+Round by round the same requests go to a peer that does nothing (the same HTTP server, a fixed reply), which shows how
+much is HTTP, this process and the machine. The browsers only send bytes made beforehand and keep those that come; what
+they cost is printed too. At the end the server is killed with SIGKILL, and every acknowledged answer is looked for in
+the database, where it has to be once; the exit status is 1 if one is not. Processor times come from /proc (Linux).
 """
 
 from __future__ import annotations
 
 import argparse
-import asyncio
+import contextlib
 import json
 import os
 import random
+import re
+import select
+import socket
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
-import urllib.request
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -49,116 +59,274 @@ order = "both"
 question = "Same?"
 """
 
+FRAMES = 130
+"""Of a film: those of the 2004 protocols last about 4.3 s at 30 frames a second."""
 
-class Client:
-    """One browser's connection."""
+LENGTH = re.compile(rb"content-length: (\d+)", re.IGNORECASE)
+Key = tuple[str, int, str, int, str | None]
+
+
+class Browser:
+    """One browser: a connection that stays open, the page that it shows, the request that it sends next."""
 
     def __init__(self, port: int, number: int) -> None:
-        self.port, self.page, self.cookie = port, f"page-of-client-{number}", ""
-        self.view: dict[str, Any] = {}
-        self.times: list[float] = []
-        self.acknowledged = 0
+        self.name, self.cookie = f"browser-{number:03d}", ""
+        self.socket = socket.create_connection(("127.0.0.1", port))
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.request, self.reply = b"", bytearray()
+        self.key: Key | None = None
+        self.acknowledged: list[Key] = []
 
-    async def open(self) -> None:
-        """Connect, begin, and read on to the first trial."""
-        self.reader, self.writer = await asyncio.open_connection("127.0.0.1", self.port)
-        self.view = await self.post("/api/begin", {"page": self.page})
-        while self.view["kind"] != "trial":
-            self.view = await self.post("/api/done", {"step": self.view["step"]})
-
-    async def post(self, path: str, body: object) -> dict[str, Any]:
-        """One message and its answer."""
-        content = json.dumps(body).encode()
+    def make(self, path: str, body: object) -> bytes:
+        """The bytes of a message, with the headers that a browser sends."""
+        content = json.dumps(body, separators=(",", ":")).encode()
         head = (
-            f"POST {path} HTTP/1.1\r\nhost: 127.0.0.1:{self.port}\r\ncontent-type: application/json\r\n"
-            f"x-segue-page: {self.page}\r\ncookie: {self.cookie}\r\ncontent-length: {len(content)}\r\n\r\n"
+            f"POST {path} HTTP/1.1\r\nhost: 127.0.0.1\r\ncontent-type: application/json\r\naccept: */*\r\n"
+            "user-agent: Mozilla/5.0 (X11; Linux x86_64) AppleWebKit/537.36 (KHTML, like Gecko) Chrome/140\r\n"
+            "accept-encoding: gzip, deflate, br, zstd\r\naccept-language: en\r\nsec-fetch-site: same-origin\r\n"
+            f"x-segue-page: page-of-{self.name}\r\ncookie: {self.cookie}\r\ncontent-length: {len(content)}\r\n\r\n"
         )
-        self.writer.write(head.encode() + content)
-        answer = (await self.reader.readuntil(b"\r\n\r\n")).decode()
-        headers = dict(line.split(": ", 1) for line in answer.split("\r\n")[1:] if ": " in line)
-        if "set-cookie" in headers:
-            self.cookie = headers["set-cookie"].split(";")[0]
-        result: dict[str, Any] = json.loads(await self.reader.readexactly(int(headers["content-length"])))
-        assert answer.startswith("HTTP/1.1 200"), result
-        return result
+        return head.encode() + content
 
-    async def answer(self) -> None:
-        """Answer the trial that is due, and keep the time until it was acknowledged."""
-        view = self.view
-        times = [33.3 * i for i in range(40)]
-        shown = [
-            {"place": film["place"], "method": "requestVideoFrameCallback", "frames_presented": film["frames"],
-             "longest_gap_frames": 1.0, "shown_well": True, "times_ms": times, "frames": list(range(40))}
-            for film in view["films"]
-        ]  # fmt: skip
+    def send(self) -> None:
+        """The request is gone when this returns: it is far smaller than a socket's buffer."""
+        self.reply.clear()
+        assert self.socket.send(self.request) == len(self.request), "the socket's buffer was full"
+
+    def receive(self) -> bool:
+        """Take what came; whether the reply is whole."""
+        part = self.socket.recv(65536)
+        assert part, "the server closed the connection"
+        self.reply += part
+        end = self.reply.find(b"\r\n\r\n")
+        if end < 0:
+            return False
+        length = LENGTH.search(self.reply, 0, end)
+        assert length, bytes(self.reply)
+        return len(self.reply) >= end + 4 + int(length[1])
+
+    def read(self) -> Any:
+        """The message in the reply."""
+        head, _, content = bytes(self.reply).partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 200"), bytes(self.reply)
+        for line in head.decode().split("\r\n"):
+            if line.lower().startswith("set-cookie: "):
+                self.cookie = line.split(": ", 1)[1].split(";")[0]
+        return json.loads(content)
+
+    def ask(self, path: str, body: object) -> Any:
+        """A message whose reply is waited for."""
+        self.request = self.make(path, body)
+        self.send()
+        while not self.receive():
+            pass
+        return self.read()
+
+    def begin(self) -> None:
+        """Open the page, and make the answer to the first trial ready."""
+        link = {"participant": self.name}
+        self.prepare(self.ask("/api/begin", {"page": f"page-of-{self.name}", "parameters": link}))
+
+    def prepare(self, view: dict[str, Any]) -> None:
+        """Read on to the next trial, and make the request that will answer it."""
+        while view["kind"] != "trial":
+            assert view["kind"] != "done", "the study has too few trials for so many rounds"
+            view = self.ask("/api/done", {"step": view["step"]})
         value = random.choice(view["question"]["options"])["value"]
-        message = {"trial": view["trial"], "attempt": 1, "value": value, "response_s": 0.5, "shown": shown}
-        start = time.perf_counter()
-        self.view = await self.post("/api/answer", message)
-        self.times.append(1000 * (time.perf_counter() - start))
-        assert self.view["counted"] is True
-        self.acknowledged += 1
+        self.key = (self.name, view["trial"], view["question"]["item"], view["attempt"], value)
+        self.request = self.make("/api/answer", answer_to(view, value))
+
+    def check(self) -> None:
+        """After an answer: it was counted; get the next one ready."""
+        view = self.read()
+        assert view["counted"] is True, view
+        assert self.key is not None
+        self.acknowledged.append(self.key)
+        self.prepare(view)
 
 
-def percentiles(label: str, clients: list[Client]) -> dict[str, float]:
-    times = sorted(one for client in clients for one in client.times)
-    for client in clients:
-        client.times = []
-    found = {f"p{share}": times[min(len(times) - 1, len(times) * share // 100)] for share in (50, 95, 99)}
-    found["worst"] = times[-1]
-    print(f"{label:7s} {len(times)} answers: " + ", ".join(f"{k} {v:.1f} ms" for k, v in found.items()))
-    return found
+def answer_to(view: dict[str, Any], value: str) -> dict[str, Any]:
+    """What the page's trial.js sends."""
+    start = random.uniform(1e4, 1e6)
+    times = [round(start + 1000 * i / 30 + random.random(), 3) for i in range(FRAMES)]
+    shown = [
+        {"place": film["place"], "method": "requestVideoFrameCallback", "frames_presented": film["frames"],
+         "longest_gap_frames": 1.003, "shown_well": True, "times_ms": times, "frames": list(range(FRAMES))}
+        for film in view["films"]
+    ]  # fmt: skip
+    return {
+        "trial": view["trial"],
+        "attempt": view["attempt"],
+        "item": view["question"]["item"],
+        "value": value,
+        "response_s": 0.512,
+        "shown_well": True,
+        "shown": shown,
+        "timing": {"last_frame_ms": times[-1], "answer_ms": times[-1] + 512, "time_origin_ms": 1.7e12},
+    }
 
 
-async def load(port: int, count: int, rounds: int) -> int:
-    clients = [Client(port, number) for number in range(count)]
-    for client in clients:
-        await client.open()
+def exchange(browsers: Sequence[Browser], delays_s: Sequence[float]) -> list[float]:
+    """Every browser sends its request at its time; the round trips in milliseconds."""
+    waiting = sorted(zip(delays_s, range(len(browsers)), strict=True), reverse=True)
+    by_file = {browser.socket.fileno(): index for index, browser in enumerate(browsers)}
+    sent = [0.0] * len(browsers)
+    trips: list[float] = []
+    poll = select.epoll()
+    for file in by_file:
+        poll.register(file, select.EPOLLIN)
+    begin = time.perf_counter()
+    while len(trips) < len(browsers):
+        while waiting and waiting[-1][0] <= time.perf_counter() - begin:
+            index = waiting.pop()[1]
+            sent[index] = time.perf_counter()
+            browsers[index].send()
+        rest = waiting[-1][0] - (time.perf_counter() - begin) if waiting else 10.0
+        ready = poll.poll(max(rest, 0.0))
+        assert ready or waiting, f"{len(browsers) - len(trips)} answers got no reply for ten seconds"
+        for file, _ in ready:
+            index = by_file[file]
+            if browsers[index].receive():
+                trips.append(1000 * (time.perf_counter() - sent[index]))
+    poll.close()
+    return trips
 
-    async def within_a_second(client: Client) -> None:
-        await asyncio.sleep(random.random())
-        await client.answer()
 
-    for _ in range(rounds):
-        await asyncio.gather(*(within_a_second(client) for client in clients))
-    percentiles("spread", clients)
-    for _ in range(rounds):
-        await asyncio.gather(*(client.answer() for client in clients))
-        await asyncio.sleep(0.2)
-    percentiles("burst", clients)
-    return sum(client.acknowledged for client in clients)
+@dataclass
+class Measured:
+    """One load on one server: the round trips of each round, and processor seconds."""
+
+    rounds: list[list[float]] = field(default_factory=list)
+    server_s: float = 0.0
+    browsers_s: float = 0.0
+
+    def line(self) -> str:
+        """The row of the table."""
+        trips = sorted(trip for one in self.rounds for trip in one)
+        p50, p95, p99 = (trips[min(len(trips) - 1, len(trips) * share // 100)] for share in (50, 95, 99))
+        usual = statistics.median(sorted(one)[len(one) * 99 // 100] for one in self.rounds)
+        costs = (1000 * self.server_s / len(trips), 1000 * self.browsers_s / len(trips))
+        cells = (p50, p95, p99, trips[-1], usual)
+        return (
+            f"{len(trips):7d}" + "".join(f"{cell:9.1f}" for cell in cells) + "".join(f"{cost:9.2f}" for cost in costs)
+        )
 
 
-def main() -> None:
-    from serving import free_port, unfilmed
+HEAD = f"{'':19s}answers" + "".join(
+    f"{name:>9s}" for name in ("p50", "p95", "p99", "worst", "usual99", "server", "browsers")
+)
 
+
+def measure(into: Measured, browsers: Sequence[Browser], process: subprocess.Popen[bytes], within_s: float) -> None:
+    """One round."""
+    delays = [random.uniform(0, within_s) for _ in browsers]
+    server_s, browsers_s = processor_s(process.pid), time.process_time()
+    into.rounds.append(exchange(browsers, delays))
+    into.browsers_s += time.process_time() - browsers_s
+    into.server_s += processor_s(process.pid) - server_s
+
+
+def processor_s(pid: int) -> float:
+    """Processor seconds that a process took, in all its threads."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@contextlib.contextmanager
+def started(command: Sequence[str], port: int) -> Iterator[subprocess.Popen[bytes]]:
+    """A server in a process of its own; killed at the end, not asked to stop."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path[:2])}
+    process = subprocess.Popen([sys.executable, *command], env=environment)
+    try:
+        while True:
+            assert process.poll() is None, "the server ended at once"
+            with contextlib.suppress(OSError):
+                socket.create_connection(("127.0.0.1", port), timeout=1).close()
+                break
+            time.sleep(0.05)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def do_nothing(port: int, reply: bytes) -> None:
+    """The peer: the same HTTP server as ours, configured alike; reads a request and sends a fixed reply."""
+    import uvicorn
+
+    from study.apps.server.running import configuration, listen
+
+    headers = [(b"content-length", str(len(reply)).encode()), (b"content-type", b"application/json")]
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        if scope["type"] != "http":
+            return
+        while (await receive()).get("more_body"):
+            pass
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        await send({"type": "http.response.body", "body": reply})
+
+    uvicorn.Server(configuration(app)).run(sockets=[listen("127.0.0.1", port)])
+
+
+def load(folder: Path, count: int, rounds: int) -> list[Key]:
+    """All rounds, printed; what was acknowledged. The server is killed at the end."""
+    from serving import free_port
+
+    ports = free_port(), free_port()
+    commands = (
+        [str(ROOT / "tests" / "apps" / "server_child.py"), str(folder), str(ports[0])],
+        [__file__, "--do-nothing", str(ports[1])],
+    )
+    found = {(pattern, name): Measured() for pattern in ("burst", "spread") for name in ("segue", "does nothing")}
+    with started(commands[0], ports[0]) as segue, started(commands[1], ports[1]) as peer:
+        browsers = [Browser(ports[0], number) for number in range(count)]
+        others = [Browser(ports[1], number) for number in range(count)]
+        for browser in browsers:
+            browser.begin()
+        for _ in range(rounds):
+            for pattern, within_s in (("burst", 0.0), ("spread", 1.0)):
+                for browser, other in zip(browsers, others, strict=True):
+                    other.request = browser.request
+                measure(found[pattern, "segue"], browsers, segue, within_s)
+                measure(found[pattern, "does nothing"], others, peer, within_s)
+                for browser in browsers:
+                    browser.check()
+    print(f"round trips in ms; the last two columns are processor ms an answer\n{HEAD}")
+    for (pattern, name), measured in found.items():
+        print(f"{pattern:7s}{name:12s}{measured.line()}")
+    return [key for browser in browsers for key in browser.acknowledged]
+
+
+def lost(folder: Path, acknowledged: Sequence[Key]) -> int:
+    """How many of the acknowledged answers are not in the database, or are there twice."""
     from study.experiment.responses import answers_frame, open_responses
 
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--clients", type=int, default=200)
+    columns = ["participant", "trial", "item", "attempt", "answer"]
+    with open_responses(folder) as responses:
+        table = answers_frame(responses, all_attempts=True)[columns]
+    stored = [tuple(row) for row in table.itertuples(index=False)]
+    missing = len(set(acknowledged) - set(stored))
+    double = len(stored) - len(set(stored))
+    print(f"{len(acknowledged)} acknowledged, {len(stored)} stored after SIGKILL, {missing} lost, {double} twice")
+    return missing + double
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--browsers", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--do-nothing", type=int, metavar="PORT", help="be the peer at this port")
     options = parser.parse_args()
+    if options.do_nothing:
+        do_nothing(options.do_nothing, b'{"kind":"nothing","text":"%s"}' % (b"x" * 1000))
+        return 0
+    from serving import unfilmed
+
     with tempfile.TemporaryDirectory() as name:
-        folder, port = Path(name), free_port()
-        unfilmed(folder, PROTOCOL)
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path[:2])}
-        command = [sys.executable, str(ROOT / "tests" / "apps" / "server_child.py"), str(folder), str(port)]
-        child = subprocess.Popen(command, env=environment)
-        try:
-            while True:
-                try:
-                    urllib.request.urlopen(f"http://127.0.0.1:{port}/api/study", timeout=1).close()
-                    break
-                except OSError:
-                    time.sleep(0.05)
-            acknowledged = asyncio.run(load(port, options.clients, options.rounds))
-        finally:
-            child.terminate()
-            child.wait()
-        with open_responses(folder) as responses:
-            stored = len(answers_frame(responses, all_attempts=True))
-        print(f"{acknowledged} acknowledged, {stored} stored, {acknowledged - stored} lost")
+        unfilmed(Path(name), PROTOCOL)
+        return int(lost(Path(name), load(Path(name), options.browsers, options.rounds)) > 0)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import uvicorn
+from starlette.types import ASGIApp
 
 from study.apps.server.hosting import Host, Settings
-from study.apps.server.limits import Limits
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.protocol import Protocol
@@ -44,7 +44,7 @@ def run(
         uvicorn.Server(configuration(app, behind_proxy=behind_proxy)).run(sockets=[listening])
 
 
-def configuration(app: Limits, *, behind_proxy: bool = False) -> uvicorn.Config:
+def configuration(app: ASGIApp, *, behind_proxy: bool = False) -> uvicorn.Config:
     """How uvicorn runs: quiet, with connections that outlive a trial, ending within seconds."""
     return uvicorn.Config(
         app,
