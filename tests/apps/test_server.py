@@ -327,7 +327,7 @@ def test_the_token_is_all_that_lets_in(serve):
     person, thief = serving.person(), serving.person()
     person.begin()
     for token in ("", "1", "x" * 43, "' OR 1=1 --"):
-        thief.client.cookies.set("segue", token)
+        thief.client.cookies.set(serving.host.cookie, token)
         assert thief.post("/api/alive", {}).status_code == 401
 
 

@@ -90,6 +90,8 @@ class Host:
     def __init__(self, protocol: Protocol, manifest: Manifest, responses: Responses, settings: Settings) -> None:
         self.protocol, self.manifest, self.responses, self.settings = protocol, manifest, responses, settings
         self.writer = Writer(responses.engine)
+        self.cookie = f"segue-{protocol.sha256[:8]}"
+        """Its name: browsers keep one for all ports of a machine, where two studies may be served."""
         self.films = {
             record.id: {"frames": record.frames, "bytes": int(manifest.videos.get(record.id, {}).get("bytes", 0))}
             for record in manifest.records

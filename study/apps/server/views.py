@@ -22,7 +22,7 @@ Films = Mapping[str, Mapping[str, int]]
 def film_name(participant: Participant, step: Step) -> str:
     """The name of a film in one showing: unguessable, and different for every place, trial and attempt."""
     place = f"{step.kind}/{step.study}/{step.trial}/{step.attempt}/{step.stimulus}"
-    return hmac.new(participant.secret.encode(), place.encode(), "sha256").hexdigest()[:40]
+    return hmac.digest(participant.secret.encode(), place.encode(), "sha256").hex()[:40]
 
 
 def step_key(session: Session) -> str:
@@ -86,15 +86,16 @@ def view(session: Session, participant: Participant, films: Films) -> dict[str, 
 def _trial(session: Session, participant: Participant, films: Films) -> dict[str, Any]:
     step = sitting.current(session)
     near = _near(session)
-    own = [other for other in near if (other.trial, other.attempt) == (step.trial, step.attempt)]
+    own: list[Step] = []
+    ahead: list[Step] = []
+    for other in near:
+        (own if (other.trial, other.attempt) == (step.trial, step.attempt) else ahead).append(other)
     question = next(other for other in own if other.kind == "answer")
     return {
         **_asking(session, question),
         "films": [_film(other, participant, films) for other in own if other.kind in ("first", "second")],
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
-        "ahead": [
-            _film(other, participant, films) for other in near if other not in own and other.kind in ("first", "second")
-        ],
+        "ahead": [_film(other, participant, films) for other in ahead if other.kind in ("first", "second")],
     }
 
 

@@ -1,16 +1,16 @@
-"""Writer: one thread that commits what many participants send in groups, each write acknowledged after its commit.
+"""Writer: commits what many participants send in groups, each write acknowledged after its commit.
 
-Rows come in; the caller goes on once they are on disk. When many answers arrive at one time, one transaction holds them
-all, so the disk is waited for once. Rows that fail take no others with them.
+Rows come in; the caller goes on once they are on disk. One group is committed at a time, in a thread of its own, so the
+event loop never waits for the disk; what comes meanwhile is the next group. When two hundred answers arrive together,
+the disk is waited for once or twice. Rows that fail take no others with them.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import queue
-import threading
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import sqlalchemy as sa
@@ -23,73 +23,67 @@ LARGEST_GROUP = 256
 @dataclass(frozen=True)
 class _Job:
     rows: Sequence[Row]
-    loop: asyncio.AbstractEventLoop
-    future: asyncio.Future[None]
+    done: asyncio.Future[None]
 
 
 class Writer:
-    """Commits writes in the order in which they come; `close` waits for the last one."""
+    """Commits writes in the order in which they come; `close` waits for the last one. Belongs to one event loop."""
 
     def __init__(self, engine: sa.Engine) -> None:
         self._engine = engine
-        self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name="writer", daemon=True)
-        self._thread.start()
+        self._waiting: list[_Job] = []
+        self._busy = False
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="writer")
 
     async def put(self, rows: Sequence[Row]) -> None:
         """Insert rows; returns when they are committed, raises what went wrong."""
         loop = asyncio.get_running_loop()
-        future: asyncio.Future[None] = loop.create_future()
-        self._jobs.put(_Job(rows, loop, future))
-        await future
+        job = _Job(rows, loop.create_future())
+        self._waiting.append(job)
+        if not self._busy:
+            # Not at once: requests that arrived at the same moment are read first, and join the group.
+            self._busy = True
+            loop.call_soon(self._start, loop)
+        await job.done
 
     def close(self) -> None:
         """Finish what was put, then end."""
-        self._jobs.put(None)
-        self._thread.join()
+        self._thread.shutdown()
+        for job in self._waiting:
+            _commit(self._engine, [job])
 
-    def _run(self) -> None:
-        while (job := self._jobs.get()) is not None:
-            group = [job]
-            last = False
-            while len(group) < LARGEST_GROUP and not last:
-                try:
-                    following = self._jobs.get_nowait()
-                except queue.Empty:
-                    break
-                last = following is None
-                if following is not None:
-                    group.append(following)
-            self._commit(group)
-            if last:
-                return
+    def _start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Hand the next group to the thread."""
+        group, self._waiting = self._waiting[:LARGEST_GROUP], self._waiting[LARGEST_GROUP:]
+        self._busy = bool(group)
+        if not group:
+            return
 
-    def _commit(self, group: list[_Job]) -> None:
-        try:
-            with self._engine.begin() as connection:
-                insert_rows(connection, [row for job in group for row in job.rows])
-        except Exception as error:  # whatever it was, the page has to be told, and the thread has to go on
-            if len(group) > 1:
-                # One of them failed, and the whole group was rolled back: each on its own now.
-                for job in group:
-                    self._commit([job])
+        def committed(outcome: Future[list[Exception | None]]) -> None:
+            # The loop may be closed, the coroutines gone: the write stands all the same.
+            with contextlib.suppress(RuntimeError):
+                loop.call_soon_threadsafe(self._settle, loop, group, outcome.result())
+
+        self._thread.submit(_commit, self._engine, group).add_done_callback(committed)
+
+    def _settle(self, loop: asyncio.AbstractEventLoop, group: list[_Job], outcome: list[Exception | None]) -> None:
+        """The next group goes to the disk while the pages of this one are told."""
+        self._start(loop)
+        for job, error in zip(group, outcome, strict=True):
+            if job.done.done():
+                continue
+            if error is None:
+                job.done.set_result(None)
             else:
-                _settle(group[0], error=error)
-            return
-        for job in group:
-            _settle(job)
+                job.done.set_exception(error)
 
 
-def _settle(job: _Job, error: Exception | None = None) -> None:
-    """Tell the coroutine that waits; it may be gone, or its loop may be closed, and the write stands all the same."""
-
-    def tell() -> None:
-        if job.future.done():
-            return
-        if error is None:
-            job.future.set_result(None)
-        else:
-            job.future.set_exception(error)
-
-    with contextlib.suppress(RuntimeError):
-        job.loop.call_soon_threadsafe(tell)
+def _commit(engine: sa.Engine, group: list[_Job]) -> list[Exception | None]:
+    """Commit a group in one transaction; what went wrong with each job."""
+    try:
+        with engine.begin() as connection:
+            insert_rows(connection, [row for job in group for row in job.rows])
+    except Exception as error:  # whatever it was, the page has to be told
+        # One of them failed, and the whole group was rolled back: each on its own now.
+        return [error] if len(group) == 1 else [_commit(engine, [job])[0] for job in group]
+    return [None] * len(group)
