@@ -26,6 +26,7 @@ from renderer.errors import RendererError
 from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Size, Typed, key_name
 from renderer.pacing import OWN_CLOCK_HZ, Pacing, find_pacing, next_flip
 from renderer.screen import RGB, Drawing, Picture, Screen
+from renderer.server_times import server_times
 
 _TRIAL_SWAPS, _WARM_UP = 40, 10
 _SPIN_S = 0.001
@@ -47,6 +48,8 @@ class Window:
         self._events: list[Event] = []
         self._screen = Screen(gl)
         self._beat_s = float(glfw.get_time())
+        self._server = server_times(glfw)
+        self._zero_s = time.monotonic() - self.now()  # glfw counts the same clock there, from another zero
         self._listen()
         self.pacing = Pacing(OWN_CLOCK_HZ, 0.0, 0.0, own_clock=False)
         self.pacing = find_pacing(self._trial_swaps(), reported_hz)
@@ -87,6 +90,7 @@ class Window:
             "swap_ms": round(self.pacing.swap_s * 1000, 3),
             "own_clock": self.pacing.own_clock,
             "timing_measured": self.pacing.measured,
+            "key_times": "arrival" if self._server is None else "X server",
             "gl_renderer": self.gl.info["GL_RENDERER"],
             "gl_version": self.gl.info["GL_VERSION"],
             "glfw": _text(self._glfw.get_version_string()),
@@ -163,19 +167,25 @@ class Window:
 
     def poll(self) -> tuple[Event, ...]:
         """What happened since the last call."""
-        self._glfw.poll_events()
+        self._receive()
         return self._taken()
 
     def wait(self, timeout_s: float | None = None) -> tuple[Event, ...]:
         """Sleep until something happens, or until the time is over; an event is timed as soon as it arrives."""
         if not self._events:
-            if timeout_s is None:
+            if self._server is not None:
+                self._server.wait(timeout_s if timeout_s is None else max(0.0, timeout_s))
+            elif timeout_s is None:
                 self._glfw.wait_events()
             elif timeout_s > 0:
                 self._glfw.wait_events_timeout(timeout_s)
-            else:
-                self._glfw.poll_events()
+            self._receive()
         return self._taken()
+
+    def _receive(self) -> None:
+        if self._server is not None:
+            self._server.read()
+        self._glfw.poll_events()
 
     def cursor(self, visible: bool) -> None:
         """Show or hide the mouse pointer."""
@@ -205,12 +215,16 @@ class Window:
 
         def key(_: Any, token: int, scancode: int, action: int, modifiers: int) -> None:
             at = glfw.get_time()
+            if self._server is not None and action != glfw.RELEASE:
+                at = self._server.key(scancode, at + self._zero_s) - self._zero_s
             if action == glfw.PRESS and not modifiers & (glfw.MOD_CONTROL | glfw.MOD_ALT | glfw.MOD_SUPER):
                 add(Key(key_name(token, glfw.get_key_name(token, scancode)), at))
 
         def button(_: Any, which: int, action: int, __: int) -> None:
             at = glfw.get_time()
             if which == glfw.MOUSE_BUTTON_LEFT and action == glfw.PRESS:
+                if self._server is not None:
+                    at = self._server.button(1, at + self._zero_s) - self._zero_s
                 x, y = glfw.get_cursor_pos(handle)
                 wide = max(1, glfw.get_window_size(handle)[0])
                 ratio = self.size[0] / wide

@@ -111,6 +111,7 @@ def _sit(
 ) -> tuple[Outcome, dict[str, Any]]:
     """Open the window and walk the session."""
     from renderer.window import open_window
+    from study.apps.player.calm import take_precedence
     from study.apps.player.loop import Outcome, play
     from study.apps.player.store import ResponsesStore
     from study.experiment.session import open_session
@@ -124,6 +125,7 @@ def _sit(
     if answers:
         say(f"{plan.participant} goes on after {len(answers)} answers.")
     look, size = page_look(stimuli, place.font), place.window_size
+    take_precedence()
     with open_window(
         protocol.title, full_screen=size is None, size=size or (1280, 800), monitor=place.monitor
     ) as window:

@@ -196,6 +196,20 @@ def test_flips_follow_the_own_clock_and_its_beat(virtual_display: str) -> None:
     assert 89 / 60 - 0.02 < float(span) < 89 / 60 + 0.5  # never faster; a busy machine may miss some
 
 
+def test_a_key_has_the_time_at_which_the_server_took_it_however_late_it_is_looked_at(virtual_display: str) -> None:
+    out = in_a_window(
+        "subprocess.run(['xdotool', 'mousemove', '50', '50'], check=True); w.poll(); found = []\n"
+        "for _ in range(8):\n"
+        "    before = w.now()\n"
+        "    subprocess.run(['xdotool', 'key', 's', 'click', '1'], check=True)\n"
+        "    after = w.now(); time.sleep(0.1); late = w.poll()\n"
+        "    found += [before < e.time_s < after + 0.001 for e in late if isinstance(e, Key | Click)]\n"
+        "print(w.describe()['key_times'], len(found), all(found))",
+        virtual_display,
+    )
+    assert out.strip() == "X server 16 True"
+
+
 def test_full_screen_takes_the_display_and_keys_arrive_with_their_times(virtual_display: str) -> None:
     out = in_a_window(
         "# FULL SCREEN\n"

@@ -10,14 +10,13 @@ sleeps until something happens, so a key is timed when it arrives, not at the ne
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from renderer.events import Focus, Resized
 from study.apps.player import screens
+from study.apps.player.calm import calm, settled
 from study.apps.player.desk import Desk, Stopped
 from study.apps.player.display import Display
 from study.apps.player.pages import Look, draw_page
@@ -67,7 +66,8 @@ def play(
     say
         Told in a few words of every answer that was stored.
     """
-    return _Player(window, session, stimulus, store, look, fill, say).run()
+    with settled():
+        return _Player(window, session, stimulus, store, look, fill, say).run()
 
 
 class _Player(Desk):
@@ -196,7 +196,7 @@ class _Player(Desk):
         flips: list[float] = []
         wrong: list[str] = []
         window.cursor(False)
-        with _calm():
+        with calm():
             while True:
                 onset_s = flips[0] if flips else window.next_flip_s()
                 frame = frame_at(window.next_flip_s(), onset_s, fps, period_s) if flips else 0
@@ -264,7 +264,8 @@ class _Player(Desk):
         page = screens.answer_page(self.protocol, step, sitting.progress(self.session))
         zero_s = self.showings[-1].last_frame_s
         deadline_s = None if step.duration_s is None else zero_s + step.duration_s
-        button, at = self.ask(page, deadline_s)
+        with calm():
+            button, at = self.ask(page, deadline_s)
         shown_well = not self.faults and all(showing.shown_well for showing in self.showings)
         before = self.session
         if button is None:
@@ -306,15 +307,3 @@ class _Player(Desk):
                 )
             )
         return rows
-
-
-@contextmanager
-def _calm() -> Iterator[None]:
-    """No garbage collection meanwhile: it can take longer than a frame."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
