@@ -5,10 +5,16 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+# Tests are imported by path, without packages: this makes `postgres_server` importable.
+sys.path.append(str(Path(__file__).parent))
+
+from postgres_server import PostgresServer, find_binaries
 
 MOCAP = Path(os.environ.get("SEGUE_MOCAP", Path(__file__).parents[1].parent / "shared" / "motions"))
 
@@ -52,3 +58,32 @@ def virtual_display() -> Iterator[str]:
     finally:
         server.terminate()
         server.wait()
+
+
+@pytest.fixture(scope="session")
+def postgres_server() -> Iterator[PostgresServer]:
+    """A PostgreSQL server of our own, started where a first test asks for it (one for each process of the tests)."""
+    binaries = find_binaries()
+    if binaries is None:
+        unavailable("PostgreSQL", "install its server (Debian, Ubuntu: apt install postgresql)")
+    try:
+        import psycopg  # noqa: F401
+    except ImportError:
+        unavailable("psycopg", "install it: pip install 'segue[postgres]'")
+    server = PostgresServer(binaries)
+    yield server
+    server.remove()
+
+
+@pytest.fixture
+def postgres_url(postgres_server: PostgresServer) -> str:
+    """The URL of an empty PostgreSQL database."""
+    return postgres_server.empty_database()
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """An empty database of each kind: what `open_responses` and `--database` take."""
+    if request.param == "sqlite":
+        return str(tmp_path / "responses.sqlite")
+    return str(request.getfixturevalue("postgres_url"))

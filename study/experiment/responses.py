@@ -1,8 +1,8 @@
 """Responses: every answer in a database, on disk before the next trial shows.
 
 A database path or URL comes in; sessions, answers and a table for the analysis go out. Tables are typed and
-versioned; answers and events are only ever appended. SQLite runs with a write-ahead log and `synchronous=FULL`, so
-that an answer that was acknowledged survives a killed program and a power cut alike.
+versioned; all records are only ever appended. A commit waits for the disk (`databases`), so that an answer that was
+acknowledged survives a killed program and a power cut alike.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ import sqlalchemy as sa
 from pydantic_core import to_json
 
 from study.errors import SessionError
+from study.experiment.databases import alone, cannot_open, open_engine, shown
 from study.experiment.plan import Plan, Trial, plan_from_json
 from study.experiment.protocol import Protocol
-from study.experiment.rendering import ANSWERS, write_whole
+from study.experiment.rendering import write_whole
+from study.experiment.response_migrations import migrate
 from study.experiment.response_tables import (
     answers,
     events,
     form_values,
-    migrate,
     presentations,
     sessions,
     withdrawals,
@@ -35,6 +36,9 @@ from study.experiment.session import Answer, right_answer
 
 if TYPE_CHECKING:
     import pandas as pd
+
+LARGEST_SEED = 2**63 - 1
+"""What the databases' integers hold."""
 
 Clock = Callable[[], datetime]
 
@@ -117,42 +121,25 @@ def open_responses(url_or_path: str | Path) -> Responses:
     Parameters
     ----------
     url_or_path
-        A file for SQLite, a results folder (its `responses.sqlite`), or a database URL that SQLAlchemy knows.
+        A file for SQLite, a results folder (its `responses.sqlite`), or a URL (`databases.open_engine`).
 
     Raises
     ------
     SessionError
-        For a database that can't be opened, or was written by a newer Segue.
+        For a database that can't be opened or does not write to disk, was written by a newer Segue, or by another
+        program.
     """
-    text = str(url_or_path)
-    if "://" not in text:
-        path = Path(text)
-        path = path / ANSWERS if path.is_dir() or not path.suffix else path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        text = f"sqlite:///{path}"
-    engine = sa.create_engine(text)
-    if engine.dialect.name == "sqlite":
-        sa.event.listen(engine, "connect", _set_up_sqlite)
-    place = engine.url.render_as_string(hide_password=True)
+    engine = open_engine(url_or_path)
+    place = shown(engine.url)
     try:
         migrate(engine, place)
-    except sa.exc.DatabaseError as error:
+    except sa.exc.DBAPIError as error:
         engine.dispose()
-        raise SessionError(
-            f"{place}: expected a database of responses, found one that can't be opened ({error.orig}); "
-            "check the path, or keep that file and name another."
-        ) from error
+        raise cannot_open(place, error) from error
     except BaseException:
         engine.dispose()
         raise
     return Responses(engine, place)
-
-
-def _set_up_sqlite(connection: Any, _: object) -> None:
-    cursor = connection.cursor()
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=10000"):
-        cursor.execute(f"PRAGMA {pragma}")
-    cursor.close()
 
 
 def begin_session(
@@ -174,7 +161,9 @@ def begin_session(
         Where the database holds another protocol's sessions (another hash), where the participant's plan, or whether
         the participant is simulated, differs from what is stored.
     """
-    with responses.engine.begin() as connection:
+    if plan.seed > LARGEST_SEED:
+        raise SessionError(f"Expected a seed below 2 to the power of 63, found {plan.seed}; choose another one.")
+    with alone(responses.engine) as connection:
         _refuse_other_protocol(connection, responses.place, protocol)
         found = connection.execute(sa.select(sessions).where(sessions.c.participant == plan.participant)).one_or_none()
         if found is not None:
@@ -182,9 +171,10 @@ def begin_session(
             _refuse_other_plan(record, plan, simulated)
             connection.execute(sa.insert(events).values(session_id=record.id, kind="resumed", at=clock()))
             return record
-        key = connection.execute(
-            sa.insert(sessions)
-            .values(
+        key = _fresh_id(connection)
+        connection.execute(
+            sa.insert(sessions).values(
+                id=key,
                 participant=plan.participant,
                 simulated=simulated,
                 protocol_name=protocol.name,
@@ -196,21 +186,17 @@ def begin_session(
                 library_synthetic=library_synthetic,
                 truth_json=None if truth is None else json.dumps(truth, sort_keys=True),
                 started_at=clock(),
-                **_fresh_id(connection),
                 **_versions(),
             )
-            .returning(sessions.c.id)
-        ).scalar_one()
+        )
         connection.execute(sa.insert(events).values(session_id=key, kind="started", at=clock()))
     return SessionRecord(key, plan.participant, simulated, plan, protocol.sha256, truth)
 
 
-def _fresh_id(connection: sa.Connection) -> dict[str, int]:
-    """SQLite would give the number of the latest session to the next one when that session is withdrawn."""
-    if connection.dialect.name != "sqlite":
-        return {}
+def _fresh_id(connection: sa.Connection) -> int:
+    """The next number: the same in every database, and never that of a session which was withdrawn."""
     latest = [sa.func.coalesce(sa.func.max(column), 0) for column in (sessions.c.id, withdrawals.c.session_id)]
-    return {"id": 1 + max(connection.execute(sa.select(one)).scalar_one() for one in latest)}
+    return 1 + int(max(connection.execute(sa.select(one)).scalar_one() for one in latest))
 
 
 def _versions() -> dict[str, str]:
@@ -370,7 +356,7 @@ def record_form(
 ) -> None:
     """Store what was filled into the form (`session.filled`), once; sent twice it is stored once."""
     rows = [{"session_id": record.id, "name": name, "value": value, "at": clock()} for name, value in values.items()]
-    with responses.engine.begin() as connection:
+    with alone(responses.engine) as connection:
         if rows and not stored_form(responses, record.id, connection):
             connection.execute(sa.insert(form_values), rows)
         connection.execute(sa.insert(events).values(session_id=record.id, kind="form", at=clock()))

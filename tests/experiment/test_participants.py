@@ -122,8 +122,9 @@ def test_a_database_of_version_2_is_brought_up_to_date(tmp_path, toy_protocol, t
         record = begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01"))
         record_answer(responses, record, Answer(1, "", 1, "same", 1.0))
     with sqlite3.connect(path) as raw:
+        for (trigger,) in raw.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
+            raw.execute(f"DROP TRIGGER {trigger}")
         for table in ("presentations", "form_values", "participants", "withdrawals"):
-            raw.execute("DROP TRIGGER IF EXISTS answers_no_delete")
             raw.execute(f"DROP TABLE {table}")
         for column in ("role", "expected"):
             raw.execute(f"ALTER TABLE answers DROP COLUMN {column}")

@@ -1,0 +1,168 @@
+"""Databases: where responses are kept. A path or a URL comes in, a SQLAlchemy engine that commits to disk goes out.
+
+SQLite is the default, PostgreSQL goes by URL. Every connection is set up so that a commit waits for the disk, whatever
+the server's or the file's own settings say, and a server that would lose commits in a power cut is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+
+from study.errors import SessionError
+from study.experiment.rendering import ANSWERS
+
+BUSY_SECONDS = 10
+"""How long a connection waits for another one's lock before it gives up."""
+
+ALONE_KEY = 0x5E60E
+"""The number of the PostgreSQL advisory lock behind `alone`; any that other programs do not use would do."""
+
+AWAY = (sa.exc.OperationalError, sa.exc.InterfaceError, sa.exc.TimeoutError)
+"""What SQLAlchemy raises while a database can't be reached or is locked: the same may succeed later."""
+
+_POSTGRESQL = ("postgres", "postgresql", "postgresql+psycopg")
+_SQLITE = ("sqlite", "sqlite+pysqlite")
+
+
+def open_engine(url_or_path: str | Path) -> sa.Engine:
+    """An engine for a database; nothing is connected yet.
+
+    Parameters
+    ----------
+    url_or_path
+        A file for SQLite, a results folder (its `responses.sqlite`), `sqlite:///FILE`, or
+        `postgresql+psycopg://USER:PASSWORD@HOST/DATABASE`.
+
+    Raises
+    ------
+    SessionError
+        For other kinds of databases, and where psycopg is not installed.
+    """
+    url = _address(url_or_path)
+    if url.get_backend_name() == "sqlite":
+        engine = sa.create_engine(url)
+        sa.event.listen(engine, "connect", _set_up_sqlite)
+        return engine
+    # Without a limit a connection to a machine that went away waits for a quarter of an hour.
+    patience = {"connect_timeout": BUSY_SECONDS, "tcp_user_timeout": 2000 * BUSY_SECONDS, "application_name": "segue"}
+    arguments = {name: value for name, value in patience.items() if name not in url.query}
+    try:
+        # Before each use a connection is tried: one that a restart of the server cut is made anew.
+        engine = sa.create_engine(url, connect_args=arguments, pool_pre_ping=True)
+    except ImportError as error:
+        raise SessionError(
+            f"{shown(url)}: expected the Python package psycopg, which connects to PostgreSQL, found none that works "
+            f"({error}); install it: pip install 'segue[postgres]', or pip install 'psycopg[binary]'."
+        ) from error
+    sa.event.listen(engine, "connect", _set_up_postgresql)
+    return engine
+
+
+def _address(url_or_path: str | Path) -> sa.URL:
+    text = str(url_or_path)
+    if "://" not in text:
+        path = Path(text)
+        path = path / ANSWERS if path.is_dir() or not path.suffix else path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SessionError(
+                f"{path}: expected a folder to write to, found {error.strerror}; name another."
+            ) from error
+        return sa.URL.create("sqlite", database=str(path))
+    try:
+        url = sa.make_url(text)
+    except (sa.exc.ArgumentError, ValueError):
+        # Its own message may hold the password.
+        raise SessionError(
+            "Expected a database URL such as postgresql+psycopg://USER:PASSWORD@HOST/DATABASE, found one that can't be "
+            "taken apart; in a password write @ as %40, : as %3A, / as %2F and % as %25."
+        ) from None
+    if url.drivername in _POSTGRESQL:
+        return url.set(drivername="postgresql+psycopg")
+    if url.drivername in _SQLITE:
+        return url
+    raise SessionError(
+        f"{shown(url)}: expected a file, sqlite:///FILE or postgresql+psycopg://USER:PASSWORD@HOST/DATABASE, found "
+        f"{url.drivername}, which Segue does not know; use one of these."
+    )
+
+
+def shown(url: sa.URL) -> str:
+    """A URL as it may be printed: without the password, wherever it stands."""
+    hidden = {name: "***" for name in url.query if "password" in name}
+    return url.update_query_dict(hidden).render_as_string(hide_password=True)
+
+
+def _set_up_sqlite(connection: Any, _: object) -> None:
+    cursor = connection.cursor()
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", f"busy_timeout={1000 * BUSY_SECONDS}"):
+        cursor.execute(f"PRAGMA {pragma}")
+    cursor.close()
+
+
+_SETTINGS = "SELECT current_setting('synchronous_commit'), current_setting('fsync'), current_setting('server_encoding')"
+
+
+def _set_up_postgresql(connection: Any, _: object) -> None:
+    cursor = connection.cursor()
+    synchronous, fsync, encoding = cursor.execute(_SETTINGS).fetchone()
+    problem = ""
+    if fsync == "off":
+        problem = "a server that writes to disk, found fsync = off, which may lose answers; set fsync = on there"
+    elif encoding != "UTF8":
+        problem = f"a database in UTF8, found {encoding}; make one with CREATE DATABASE ... ENCODING 'UTF8'"
+    if problem:
+        place = f"{connection.info.dbname} at {connection.info.host}, port {connection.info.port}"
+        connection.close()
+        raise SessionError(f"{place}: expected {problem}.")
+    if synchronous == "off":  # all other values wait for this server's disk at least
+        cursor.execute("SET synchronous_commit = on")
+    cursor.execute(f"SET lock_timeout = '{BUSY_SECONDS}s'")
+    # What rests on a lock reads what others committed before it was given.
+    cursor.execute("SET default_transaction_isolation = 'read committed'")
+    cursor.close()
+    connection.commit()
+
+
+@contextmanager
+def alone(engine: sa.Engine) -> Iterator[sa.Connection]:
+    """A transaction that no other one of this kind runs beside, in any process: what it read stays true to its end.
+
+    For what reads before it writes: the first tables, a new session, a place in a group. Answers need no lock, since a
+    unique constraint keeps them apart.
+    """
+    with engine.begin() as connection:
+        if engine.dialect.name == "sqlite":
+            connection.exec_driver_sql("BEGIN IMMEDIATE")
+        else:
+            connection.execute(sa.select(sa.func.pg_advisory_xact_lock(ALONE_KEY)))
+        yield connection
+
+
+def cannot_open(place: str, error: sa.exc.DBAPIError) -> SessionError:
+    """Why a database could not be opened, and what to do about it."""
+    found = " ".join(str(error.orig).split())
+    # libpq tells of a refused connection in words alone, in the server's language: an unknown one is passed on.
+    known = (advice for words, advice in _ADVICE if words in found)
+    advice = next(known, "check the path or URL, or keep that database and name another")
+    return SessionError(
+        f"{place}: expected a database of responses, found one that can't be opened ({found}); {advice}."
+    )
+
+
+_ADVICE = (
+    ("authentication failed", "check the user and the password in the URL, in PGPASSWORD or in ~/.pgpass"),
+    ("no password supplied", "give the password in the URL, in PGPASSWORD or in ~/.pgpass"),
+    ("no pg_hba.conf entry", "let this machine in: add it to the server's pg_hba.conf"),
+    ("permission denied", "make the user of the URL the owner of the database: ALTER DATABASE ... OWNER TO ..."),
+    ("does not exist", "make it first: CREATE DATABASE ... OWNER ..., or check the URL"),
+    ("resolve host", "check the host's name in the URL"),
+    ("connection failed", "check that the server runs, and the host and the port in the URL"),
+    ("connection timeout", "check that the server runs, and the host and the port in the URL"),
+)
