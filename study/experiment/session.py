@@ -127,11 +127,16 @@ class Step:
 
 @dataclass(frozen=True)
 class Session:
-    """Where a sitting stands. Use `open_session`, `current`, `advanced`, `answered` and `missed`."""
+    """Where a sitting stands. Use `open_session`, `current`, `advanced`, `answered` and `missed`.
+
+    `trials_left` has for each step how many trials have steps from there on: an answer then costs the same however
+    long the plan is.
+    """
 
     plan: Plan
     protocol: Protocol
     steps: tuple[Step, ...]
+    trials_left: tuple[int, ...]
     position: int = 0
 
 
@@ -150,7 +155,8 @@ def open_session(
             f"Expected the protocol under which the plan was drawn (sha256 {plan.protocol_sha256[:12]}), found "
             f"{protocol.name!r} with {protocol.sha256[:12]}; use the protocol.toml of the results folder."
         )
-    return Session(plan, protocol, _steps(protocol, plan, tuple(answers), passed))
+    steps = _steps(protocol, plan, tuple(answers), passed)
+    return Session(plan, protocol, steps, _trials_left(steps))
 
 
 def current(session: Session) -> Step:
@@ -160,9 +166,8 @@ def current(session: Session) -> Step:
 
 def progress(session: Session) -> tuple[int, int]:
     """Trials finished and trials in all, as the plan counts them (repeats of faulty ones not counted)."""
-    ahead = {step.trial for step in session.steps[session.position :] if step.trial}
     total = len(session.plan.trials)
-    return total - len(ahead), total
+    return total - session.trials_left[session.position], total
 
 
 def advanced(session: Session) -> Session:
@@ -262,19 +267,34 @@ def _asked(session: Session) -> Step:
 
 def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     """Move on; where the trial was shown badly, add it once more to the end of its study. Practice gets feedback."""
-    here, following = session.steps[session.position], session.steps[session.position + 1 :]
-    trial_goes_on = bool(following) and following[0].kind == "answer" and following[0].trial == answer.trial
+    here = current(session)
     session = replace(session, position=session.position + 1)
+    following = current(session)
+    trial_goes_on = following.kind == "answer" and following.trial == answer.trial
     trial = session.plan.trial(answer.trial)
     if trial.role == "practice" and not trial_goes_on:
         feedback = Step("feedback", here.study, _feedback(session.protocol, trial, answer), role=trial.role)
-        steps = (*session.steps[: session.position], feedback, *following)
-        session = replace(session, steps=steps)
+        session = _with_steps(session, session.position, [feedback])
     if not _comes_again(trial, answer.attempt, answer.shown_well) or trial_goes_on:
         return session, answer
     end = max(i for i, step in enumerate(session.steps) if step.study == trial.study) + 1
     repeat = _trial_steps(session.protocol, trial, answer.attempt + 1, frozenset())
-    return replace(session, steps=(*session.steps[:end], *repeat, *session.steps[end:])), answer
+    return _with_steps(session, end, repeat), answer
+
+
+def _with_steps(session: Session, at: int, added: Sequence[Step]) -> Session:
+    steps = (*session.steps[:at], *added, *session.steps[at:])
+    return replace(session, steps=steps, trials_left=_trials_left(steps))
+
+
+def _trials_left(steps: Sequence[Step]) -> tuple[int, ...]:
+    left: list[int] = []
+    ahead: set[int] = set()
+    for step in reversed(steps):
+        if step.trial:
+            ahead.add(step.trial)
+        left.append(len(ahead))
+    return tuple(reversed(left))
 
 
 def _comes_again(trial: Trial, attempt: int, shown_well: bool) -> bool:
