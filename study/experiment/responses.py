@@ -400,8 +400,11 @@ def has_event(responses: Responses, record: SessionRecord, kind: str) -> bool:
         return bool(connection.execute(query).scalar_one())
 
 
+_TRIAL_COLUMNS = tuple(column.name for column in answers.c if column.name in Trial.__dataclass_fields__)
+
+
 def _trial_values(trial: Trial) -> dict[str, Any]:
-    return {column.name: getattr(trial, column.name) for column in answers.c if hasattr(trial, column.name)}
+    return {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
 
 
 def _answer_values(plan: Plan, answer: Answer) -> dict[str, Any]:
