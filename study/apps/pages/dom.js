@@ -13,11 +13,18 @@ export function element(tag, attributes = {}, ...children) {
 
 const main = () => document.getElementById("main");
 
+let shownAt = 0;
+const DOUBLE_CLICK_MS = 500;
+
+// The second click of a double click was meant for the page before, whose button stood at the same place.
+export const secondClick = (event) => event.detail > 1 && event.timeStamp - shownAt < DOUBLE_CLICK_MS;
+
 // Puts a page on the screen and moves the focus to its heading, so that a screen reader reads it.
 export function show(children, { trial = false, focus = true } = {}) {
   const place = main();
   place.className = trial ? "trial" : "";
   place.replaceChildren(...children);
+  shownAt = performance.now();
   if (focus) (place.querySelector("[data-focus]") ?? place).focus({ preventScroll: true });
 }
 
@@ -45,7 +52,7 @@ export function ask(children, buttons, { enter = true } = {}) {
     };
     const row = element("div", { class: "buttons" });
     for (const { label, value, quiet } of buttons) {
-      row.append(element("button", { type: "button", class: quiet ? "quiet" : null, onclick: () => finish(value) }, label));
+      row.append(element("button", { type: "button", class: quiet ? "quiet" : null, onclick: (event) => secondClick(event) || finish(value) }, label));
     }
     show([...children, row]);
     // Enter and space go on from anywhere on the page, as one expects; a focused button takes them itself.

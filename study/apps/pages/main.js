@@ -1,11 +1,12 @@
 // The participant's page: shows what the server says comes next, hands back what was done, and starts again from the
 // server's word whenever anything is unclear. It decides nothing about the study.
 
+import { watchAttention } from "./attention.js";
 import { ask, heading, sleep, status, top } from "./dom.js";
-import { hasFrameCallback, refreshRate } from "./film.js";
+import { hasFrameCallback, refreshRate } from "./playing.js";
 import * as screens from "./screens.js";
 import { Refused, begin, hasKept, keepAlive, send, sendKept, study as getStudy } from "./server.js";
-import { trial, watchFocus } from "./trial.js";
+import { trial } from "./trial.js";
 
 const WITH_PROGRESS = ["trial", "feedback"];
 const LAST = ["done", "declined", "full", "taken", "elsewhere"];
@@ -96,11 +97,16 @@ async function start() {
     screens.notice(study.texts.no_film);
     return;
   }
-  watchFocus();
+  watchAttention();
   window.addEventListener("beforeunload", (event) => {
     if (hasKept()) event.preventDefault();
   });
   await run(study);
 }
+
+// A page that the back button brings back as it was left shows what may have long been answered.
+window.addEventListener("pageshow", (event) => {
+  if (event.persisted) window.location.reload();
+});
 
 start();

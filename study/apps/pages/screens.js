@@ -1,7 +1,8 @@
 // Pages that are read or filled in. Each resolves with the message that goes back to the server.
 
 import { ask, element, heading, paragraph, show, status, top } from "./dom.js";
-import { load, play, release } from "./film.js";
+import { load, release } from "./film.js";
+import { play } from "./playing.js";
 import { matchBackground, stage } from "./trial.js";
 
 function texts(view, study) {

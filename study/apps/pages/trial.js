@@ -1,39 +1,12 @@
 // A trial: films, gap, question, as the server's view says. Resolves with the message that is the answer.
 
-import { ask, element, heading, show, sleep, status } from "./dom.js";
-import { FilmFault, forget, load, loadAhead, play, release } from "./film.js";
+import { attend, faults, filmsOn, visible } from "./attention.js";
+import { ask, element, heading, secondClick, show, sleep, status } from "./dom.js";
+import { FilmFault, forget, load, loadAhead, release } from "./film.js";
+import { play } from "./playing.js";
 import { tell } from "./server.js";
 
 const MOST_RESTARTS = 3;
-
-// Whether anybody looks: a trial that was hidden or left for a while is shown, but flagged.
-const watch = { hidden: false };
-
-export function watchFocus() {
-  document.addEventListener("visibilitychange", () => {
-    watch.hidden ||= document.hidden;
-    tell(document.hidden ? "focus-lost" : "focus-back", { how: "visibility", at_ms: performance.now() });
-  });
-  window.addEventListener("blur", () => tell("focus-lost", { how: "blur", at_ms: performance.now() }));
-  window.addEventListener("focus", () => tell("focus-back", { how: "focus", at_ms: performance.now() }));
-  let timer = 0;
-  window.addEventListener("resize", () => {
-    clearTimeout(timer);
-    timer = setTimeout(() => tell("resized", { width: window.innerWidth, height: window.innerHeight }), 500);
-  });
-}
-
-function visible() {
-  if (!document.hidden) return Promise.resolve();
-  return new Promise((resolve) => {
-    const look = () => {
-      if (document.hidden) return;
-      document.removeEventListener("visibilitychange", look);
-      resolve();
-    };
-    document.addEventListener("visibilitychange", look);
-  });
-}
 
 export function stage(study) {
   const [width, height] = study.size;
@@ -77,11 +50,14 @@ async function loadAll(view, study, onFault) {
   return { place, videos };
 }
 
-async function showFilms(view, study, pauseOver, onFault) {
+async function showFilms(view, study, { first, pauseOver, onFault }) {
   const { place, videos } = await loadAll(view, study, onFault);
+  const scale = place.clientWidth / study.size[0]; // of the film's own size
   matchBackground(place, videos[0]);
   await pauseOver;
   await visible();
+  if (first) attend();
+  filmsOn(true);
   const shown = [];
   let last = performance.now();
   try {
@@ -94,10 +70,11 @@ async function showFilms(view, study, pauseOver, onFault) {
       shown.push({ place: film.place, ...how });
     }
   } finally {
+    filmsOn(false);
     videos.forEach(release);
     place.remove();
   }
-  return { shown, last };
+  return { shown, last, scale };
 }
 
 export function options(question, study, chosen) {
@@ -110,7 +87,7 @@ export function options(question, study, chosen) {
       class: question.scale ? "answer point" : "answer",
       "data-value": option.value,
       "aria-keyshortcuts": option.key || null,
-      onclick: (event) => chosen(option.value, event.timeStamp),
+      onclick: (event) => secondClick(event) || chosen(option.value, event.timeStamp),
     });
     button.append(...words);
     row.append(button);
@@ -118,8 +95,9 @@ export function options(question, study, chosen) {
   return row;
 }
 
-// Asks; resolves with the value (null where the window closed first) and the time of the key or button.
-function question(asked, study) {
+// Asks; resolves with the value (null where the window closed first) and the time of the key or button. The window is
+// open for its time from `from` on, which is also where the answer's time begins (null: from when it is asked).
+function question(asked, study, from) {
   return new Promise((resolve) => {
     const controller = new AbortController();
     const keys = new Map(asked.options.filter((option) => option.key).map((option) => [option.key, option.value]));
@@ -132,15 +110,18 @@ function question(asked, study) {
         button.disabled = true;
         button.setAttribute("aria-pressed", String(button.dataset.value === value));
       }
-      resolve({ value, at });
+      resolve({ value, at, began });
     };
     const row = options(asked, study, finish);
     const ends = asked.low || asked.high ? element("div", { class: "ends" }, element("span", {}, asked.low), element("span", {}, asked.high)) : null;
     show([heading(asked.text, { class: "question" }), element("div", { class: "scale" }, row, ends)], { trial: true });
+    const asks = performance.now();
+    const began = from ?? asks;
     document.addEventListener(
       "keydown",
       (event) => {
-        if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+        // A key that is held down, or was pressed before the question stood there, answers nothing.
+        if (event.repeat || event.timeStamp < asks || event.ctrlKey || event.altKey || event.metaKey) return;
         const value = keys.get(event.key.toLowerCase());
         if (value === undefined) return;
         event.preventDefault();
@@ -148,7 +129,8 @@ function question(asked, study) {
       },
       { signal: controller.signal },
     );
-    if (asked.window_s !== null) timer = setTimeout(() => finish(null, performance.now()), asked.window_s * 1000);
+    const left = asked.window_s === null ? null : began + asked.window_s * 1000 - asks;
+    if (left !== null) timer = setTimeout(() => finish(null, performance.now()), left);
   });
 }
 
@@ -161,46 +143,43 @@ async function filmFault(study) {
   ]);
 }
 
-// `earlier` is how the films of this trial were shown, where this view asks a further question about them.
-export async function trial(view, study, pauseOver, earlier) {
-  const base = { trial: view.trial, attempt: view.attempt, item: view.question.item };
+// Shows the films until they were shown, or given up: null then.
+async function shownFilms(view, study, pauseOver) {
   const onFault = (film, why, attempt) => tell("fault", { what: why, trial: view.trial, place: film.place, try: attempt });
-  watch.hidden = document.hidden;
-  let films = earlier;
-  for (let restarts = 0; view.films.length > 0; ) {
+  for (let restarts = 0; ; restarts += 1) {
     try {
-      films = await showFilms(view, study, pauseOver, onFault);
-      break;
+      return await showFilms(view, study, { first: restarts === 0, pauseOver, onFault });
     } catch (error) {
       if (!(error instanceof FilmFault)) throw error;
       forget(view.films);
-      tell("fault", { what: error.why, trial: view.trial, hidden: document.hidden ? 1 : 0 });
-      restarts += 1;
-      // A closed lid stops films: they start again when somebody looks.
-      if (watch.hidden && restarts < MOST_RESTARTS) {
-        await visible();
-        watch.hidden = false;
-        continue;
-      }
-      if ((await filmFault(study)) === "skip") {
-        return { message: { ...base, value: null, response_s: null, shown_well: false, shown: [] }, films: null };
-      }
-      watch.hidden = document.hidden;
+      const why = faults().join(", ");
+      tell("fault", { what: error.why, trial: view.trial, hidden: document.hidden ? 1 : 0, page: why });
+      // A hidden tab or a closed lid stops films: they start again when somebody looks, and the trial stays flagged.
+      if (why && restarts < MOST_RESTARTS) await visible();
+      else if ((await filmFault(study)) === "skip") return null;
     }
   }
+}
+
+// `earlier` is how the films of this trial were shown, where this view asks a further question about them.
+export async function trial(view, study, pauseOver, earlier) {
+  const base = { trial: view.trial, attempt: view.attempt, item: view.question.item };
+  const withFilms = view.films.length > 0;
+  const films = withFilms ? await shownFilms(view, study, pauseOver) : earlier;
+  if (films === null && withFilms) {
+    return { message: { ...base, value: null, response_s: null, shown_well: false, shown: [] }, films };
+  }
   loadAhead(view.ahead);
-  const asked = performance.now();
-  const { value, at } = await question(view.question, study);
-  const well = !watch.hidden && (films?.shown ?? []).every((one) => one.shown_well);
   // The last film's last frame is when the participant has seen everything; a further question begins with itself.
-  const from = view.films.length > 0 ? films.last : asked;
+  const { value, at, began } = await question(view.question, study, withFilms ? films.last : null);
+  const why = faults().join(", ");
   const message = {
     ...base,
     value,
-    response_s: value === null ? null : Math.max(0, (at - from) / 1000),
-    shown_well: well,
-    shown: view.films.length > 0 ? films.shown : [],
-    timing: { last_frame_ms: from, answer_ms: at, time_origin_ms: performance.timeOrigin },
+    response_s: value === null ? null : Math.max(0, (at - began) / 1000),
+    shown_well: why === "" && (films?.shown ?? []).every((one) => one.shown_well),
+    shown: withFilms ? films.shown : [],
+    timing: { last_frame_ms: began, answer_ms: at, time_origin_ms: performance.timeOrigin, faults: why, scale: films?.scale ?? null },
   };
   return { message, films };
 }

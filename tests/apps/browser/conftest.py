@@ -1,20 +1,24 @@
-"""A study of tiny films, a server, and a real Chromium; where all parts are required, a missing one fails."""
+"""A study of tiny films, a server, and real browsers; where all parts are required, a missing one fails."""
 
 from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from bidi import Firefox, FirefoxTab, firefox
 from devtools import Browser, Tab, chromium
 from serving import PROTOCOL, Site, prepared
+from webdriver import WebKitTab, webkit
 
 from study.experiment.rendering import render
 
 EXECUTABLES = ("chromium", "chromium-browser", "google-chrome")
+MINI_BROWSERS = "/usr/lib/*/webkit2gtk-4.1/MiniBrowser", "/usr/lib/*/webkitgtk-6.0/MiniBrowser"
 
 
 def missing(part: str, how: str) -> None:
@@ -31,6 +35,47 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         missing("Chromium", "on Debian, apt-get install chromium")
     with chromium(str(executable), tmp_path_factory.mktemp("profile")) as started:
         yield started
+
+
+def packaged(name: str) -> bool:
+    """Whether this system's distribution has a package; where it has none, nobody can be asked to install it."""
+    if shutil.which("apt-cache") is None:
+        return True
+    policy = subprocess.run(["apt-cache", "policy", name], capture_output=True, text=True, check=True).stdout
+    return "Candidate: (none)" not in policy and "Candidate:" in policy
+
+
+@pytest.fixture(scope="session")
+def gecko(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
+    executable = shutil.which("firefox-esr")
+    if executable is None and not packaged("firefox-esr"):
+        pytest.skip("this distribution has no package firefox-esr")
+    if executable is None:
+        missing("Firefox", "on Debian, apt-get install firefox-esr libavcodec-extra")
+    with firefox(str(executable), tmp_path_factory.mktemp("profile")) as started:
+        yield started
+
+
+@pytest.fixture
+def firefox_tab(gecko: Firefox) -> Iterator[FirefoxTab]:
+    """A tab of Firefox; at the end no page may have thrown anything."""
+    tab = gecko.tab()
+    yield tab
+    complaints = list(gecko.complaints)
+    gecko.complaints.clear()
+    tab.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def webkit_tab(virtual_display: str) -> Iterator[WebKitTab]:
+    """WebKitGTK, where it is: so large a part is required nowhere."""
+    driver = shutil.which("WebKitWebDriver")
+    browsers = [found for pattern in MINI_BROWSERS for found in sorted(Path("/").glob(pattern[1:]))]
+    if driver is None or not browsers:
+        pytest.skip("WebKitGTK is missing: on Debian, apt-get install webkit2gtk-driver gstreamer1.0-libav")
+    with webkit(driver, browsers[0], virtual_display) as tab:
+        yield tab
 
 
 @pytest.fixture(scope="session")

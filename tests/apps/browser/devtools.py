@@ -12,6 +12,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+from driving import Driven, ended, until
 from websockets.sync.client import ClientConnection, connect
 
 FLAGS = (
@@ -26,7 +27,11 @@ FLAGS = (
 KEYS = {"Enter": 13, " ": 32, "Tab": 9}
 
 
-class Tab:
+def _code(key: str) -> int:
+    return KEYS.get(key, ord(key.upper()[0]))
+
+
+class Tab(Driven):
     """One tab; calls wait for their answers."""
 
     def __init__(self, browser: Browser, target: str, context: str) -> None:
@@ -65,54 +70,29 @@ class Tab:
         self.call("Page.reload")
 
     def run(self, script: str) -> Any:
-        """The value of an expression in the page; promises are waited for."""
         answer = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def text(self) -> str:
-        return self.run("document.body ? document.body.innerText : ''") or ""
+    def click_at(self, x: float, y: float, times: int = 1) -> None:
+        for count in range(1, times + 1):
+            for kind in ("mousePressed", "mouseReleased"):
+                self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=count)
 
-    def wait(self, script: str, timeout: float = 30, every: float = 0.05) -> Any:
-        """Wait until an expression is true."""
-        end = time.monotonic() + timeout
-        while time.monotonic() < end:
-            try:
-                if value := self.run(script):
-                    return value
-            except AssertionError:
-                pass  # between two documents
-            time.sleep(every)
-        raise AssertionError(f"waited {timeout} s in vain for {script}; the page says: {self.text()!r}")
+    def key(self, key: str) -> None:
+        self.key_down(key)
+        self.key_up(key)
 
-    def wait_text(self, text: str, timeout: float = 30) -> None:
-        self.wait(f"document.body && document.body.innerText.includes({json.dumps(text)})", timeout)
-
-    def click(self, text: str) -> None:
-        """A real click, at the middle of the button or link with a text, as soon as it is there."""
-        end = time.monotonic() + 30
-        while not self.try_click(text):
-            assert time.monotonic() < end, f"no {text!r} to click; the page says: {self.text()!r}"
-            time.sleep(0.05)
-
-    def try_click(self, text: str) -> bool:
-        """The same, where it is there now."""
-        where = self.run(
-            "(() => { const b = [...document.querySelectorAll('button, a')].find("
-            f"(b) => !b.disabled && b.innerText.includes({json.dumps(text)}));"
-            "if (!b) return null; const r = b.getBoundingClientRect();"
-            "return [r.x + r.width / 2, r.y + r.height / 2]; })()"
-        )
-        for kind in ("mousePressed", "mouseReleased") if where else ():
-            self.call("Input.dispatchMouseEvent", type=kind, x=where[0], y=where[1], button="left", clickCount=1)
-        return bool(where)
-
-    def key(self, key: str, timestamp: float | None = None) -> None:
-        more = {} if timestamp is None else {"timestamp": timestamp}
+    def key_down(self, key: str, *, repeated: bool = False) -> None:
+        """Press a key; `repeated` is what a keyboard sends of a key that is held down."""
         text = "\r" if key == "Enter" else key if len(key) == 1 else ""
-        code = KEYS.get(key, ord(key.upper()[0]))
-        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, text=text, windowsVirtualKeyCode=code, **more)
-        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=code)
+        self.call(
+            "Input.dispatchKeyEvent", type="keyDown", key=key, text=text, windowsVirtualKeyCode=_code(key),
+            autoRepeat=repeated,
+        )  # fmt: skip
+
+    def key_up(self, key: str) -> None:
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=_code(key))
 
     def picture(self, path: Path) -> None:
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
@@ -183,19 +163,10 @@ def chromium(executable: str, profile: Path) -> Iterator[Browser]:
     )  # fmt: skip
     try:
         file = profile / "DevToolsActivePort"
-        end = time.monotonic() + 60
-        while not (file.is_file() and file.read_text().count("\n")):
-            assert process.poll() is None, "Chromium ended at once"
-            assert time.monotonic() < end, "Chromium did not start within a minute"
-            time.sleep(0.05)
+        until(lambda: file.is_file() and file.read_text().count("\n"), process, "Chromium")
         port, path = file.read_text().split("\n")[:2]
         browser = Browser(process, int(port), path)
         yield browser
         browser.open_things.close()
     finally:
-        process.terminate()
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        ended(process)

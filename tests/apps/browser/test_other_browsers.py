@@ -1,0 +1,68 @@
+"""Firefox and WebKit walk through whole sessions of every task, as Chromium does in test_sessions.py."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import sqlalchemy as sa
+from serving import QUESTIONS
+from walking import answers, go_on, happened
+
+from study.experiment.response_tables import presentations
+
+pytestmark = pytest.mark.gl
+
+
+def walk(site, tab, keys=True):
+    """A whole session; returns how its films were shown."""
+    tab.open(site.address)
+    go_on(tab, keys)
+    table = answers(site)
+    assert len(table) == QUESTIONS
+    assert set(table["task"]) == {"same-different", "preference", "rating"}
+    assert not table["missed"].any()
+    assert ((table["response_s"] > 0) & (table["response_s"] < 3)).all()
+    assert happened(site, "finished") == [{}]
+    assert happened(site, "fault") == []
+    with site.responses.engine.connect() as connection:
+        return connection.execute(sa.select(presentations)).mappings().all()
+
+
+def check_frames(shown, fps=30):
+    """Every frame is accounted for, and the frames stand as far apart in time as they do in the film."""
+    assert {row["method"] for row in shown} == {"requestVideoFrameCallback"}
+    for row in shown:
+        detail = json.loads(row["detail_json"])
+        assert row["frames_presented"] == row["frames_expected"] or not row["shown_well"]
+        assert detail["frames"] == sorted(set(detail["frames"]))
+        assert detail["times_ms"] == sorted(detail["times_ms"])
+        span = (detail["times_ms"][-1] - detail["times_ms"][1]) / 1000
+        assert span == pytest.approx((detail["frames"][-1] - detail["frames"][1]) / fps, abs=0.1)
+
+
+@pytest.mark.parametrize("keys", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["keys", "buttons"])
+def test_firefox_walks_through_every_task(make_site, firefox_tab, keys):
+    site = make_site()
+    check_frames(walk(site, firefox_tab, keys))
+    assert "Firefox" in happened(site, "display")[0]["user_agent"]
+
+
+def test_without_frame_callbacks_the_record_says_so(make_site, firefox_tab):
+    """An older browser: sessions go on, and nothing claims that frames were measured."""
+    site = make_site()
+    firefox_tab.before_each_page("delete HTMLVideoElement.prototype.requestVideoFrameCallback;")
+    shown = walk(site, firefox_tab)
+    assert happened(site, "display")[0]["frame_callback"] is False
+    assert {row["method"] for row in shown} == {"ended"}
+    for row in shown:
+        assert (row["frames_presented"], row["longest_gap_frames"]) == (None, None)
+        assert json.loads(row["detail_json"])["times_ms"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("keys", [True, False], ids=["keys", "buttons"])
+def test_webkit_walks_through_every_task(make_site, webkit_tab, keys):
+    site = make_site()
+    check_frames(walk(site, webkit_tab, keys))
+    assert "AppleWebKit" in happened(site, "display")[0]["user_agent"]

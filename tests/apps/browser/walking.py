@@ -1,0 +1,93 @@
+"""Walking through a session as a participant does, in any driven browser, and looking up what was recorded."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import sqlalchemy as sa
+
+from study.experiment.response_tables import events
+from study.experiment.responses import answers_frame
+
+ROLES = ("trial", "practice", "check")
+END = "That was all"
+QUESTION = "document.querySelectorAll('button.answer:not(:disabled)').length > 0"
+
+# What is on the screen, as one word that changes with every step.
+LOOK = """(() => {
+  const main = document.getElementById('main');
+  if (!main) return '';
+  if (document.querySelector('button.answer:not(:disabled)')) return 'question';
+  if (document.getElementById('field-age')) return 'form';
+  const texts = [...document.querySelectorAll('main button, main a.button')].map((b) => b.innerText);
+  if (main.innerText.includes('That was all')) return 'end';
+  return texts.length ? texts.join('|') : 'films';
+})()"""
+
+
+def press(tab, keys=True):
+    """Answer the question that is asked, by key or by button, and wait until it is gone; False where it was gone."""
+    asked = tab.run(
+        "(() => { const b = document.querySelector('button.answer:not(:disabled)'); if (!b) return null;"
+        " b.dataset.mark = 'x'; return [b.innerText.split('\\n')[0], b.getAttribute('aria-keyshortcuts')]; })()"
+    )
+    if asked is None:
+        return False
+    if keys:
+        tab.key(asked[1])
+    elif not tab.try_click(asked[0]):
+        return False
+    tab.wait("!document.querySelector('button.answer[data-mark]:not(:disabled)')", every=0.02)
+    return True
+
+
+def read_on(tab, keys=True):
+    """Pass a page that is read or filled in, whichever is there."""
+    seen = tab.run(LOOK)
+    if seen == "form":
+        tab.run("(() => { const age = document.getElementById('field-age'); if (age) age.value = '33'; })()")
+    if seen.startswith("I agree"):
+        tab.try_click("I agree")
+    elif seen.startswith("Continue") and keys:
+        tab.key("Enter")
+    elif seen.startswith("Continue") or seen == "form":
+        tab.try_click("Continue")
+    elif seen.startswith("Try again"):
+        tab.try_click("Try again")
+    time.sleep(0.03)
+
+
+def go_on(tab, keys=True, on_step=lambda: None, at_most=150):
+    """Walk to the end, whatever comes."""
+    end = time.monotonic() + at_most
+    while END not in tab.text():
+        assert time.monotonic() < end, f"not at the end after {at_most} s: {tab.text()!r}"
+        on_step()
+        if tab.run(LOOK) == "question":
+            press(tab, keys)
+        else:
+            read_on(tab, keys)
+
+
+def to_question(tab, number=1):
+    """Walk until a question is asked; or until the second, third, ... one is."""
+    end = time.monotonic() + 60
+    while number:
+        assert time.monotonic() < end, tab.text()
+        if tab.run(LOOK) != "question":
+            read_on(tab)
+        elif number > 1:
+            number -= press(tab)
+        else:
+            return
+
+
+def answers(site):
+    return answers_frame(site.responses, roles=ROLES)
+
+
+def happened(site, kind):
+    with site.responses.engine.connect() as connection:
+        rows = connection.execute(sa.select(events.c.detail_json).where(events.c.kind == kind)).scalars().all()
+    return [json.loads(row) if row else {} for row in rows]
