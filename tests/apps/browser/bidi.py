@@ -115,8 +115,9 @@ def firefox(executable: str, profile: Path) -> Iterator[Firefox]:
     """Start Firefox without a window, on a fresh profile; end it afterwards."""
     lines = [f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in PREFERENCES.items()]
     (profile / "user.js").write_text("".join(lines))
+    flags = ("--headless", "--no-remote", "--remote-debugging-port=0", "--profile", str(profile))
     process = subprocess.Popen(
-        [executable, "--headless", "--no-remote", "--remote-debugging-port=0", "--profile", str(profile), "about:blank"],
+        [executable, *flags, "about:blank"],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ, "HOME": str(profile)},
     )  # fmt: skip
     try:

@@ -1,4 +1,4 @@
-"""What every driven browser can do, whatever it is spoken to: wait, read, click, press keys. One class per browser adds how."""
+"""What every driven browser can do: wait, read, click, press keys. One class per browser adds how it is spoken to."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Driven(ABC):
 
     @abstractmethod
     def run(self, script: str) -> Any:
-        """The value of an expression in the page; promises are waited for. What the page throws is an AssertionError."""
+        """The value of an expression in the page; promises are waited for, and what it throws is an AssertionError."""
 
     @abstractmethod
     def click_at(self, x: float, y: float, times: int = 1) -> None:
