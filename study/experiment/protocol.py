@@ -19,8 +19,9 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from study.errors import ProtocolError
+from study.experiment.languages import with_words
 from study.experiment.protocol_errors import KeyMismatchError, explain, full_location, line_of
-from study.experiment.protocol_parts import Consent, FormField, Keys, Slug, Texts
+from study.experiment.protocol_parts import Consent, FormField, Keys, Slug, Texts, known_slots
 from study.experiment.protocol_parts import Part as _Part
 
 Method = Literal[
@@ -218,8 +219,12 @@ class StudySpec(_Part):
         "way, `by-group` rotates by the participant's group (2003).",
     )
     repeats: int = Field(default=1, ge=1, le=1000, description="How often the whole set is shown.")
-    question: str = Field(default="", description="What the participant is asked after each pair or stimulus.")
-    instructions: str = Field(default="", description="What the participant reads before the study.")
+    question: str = Field(
+        default="{standard}", description="What the participant is asked after each pair or stimulus."
+    )
+    instructions: str = Field(
+        default="", description="What the participant reads before the study; `{standard}` is the built-in text."
+    )
     example: bool = Field(default=True, description="Whether the instructions can show one stimulus as an example.")
     practice: int = Field(
         default=0, ge=0, le=100, description="Trials with feedback before the study; they count for nothing. [trials]"
@@ -236,6 +241,8 @@ class StudySpec(_Part):
     @model_validator(mode="after")
     def _fits_task(self) -> Self:
         _check_task(self)
+        for key in ("question", "instructions"):
+            known_slots(getattr(self, key), key)
         return self
 
     @property
@@ -292,7 +299,8 @@ class Protocol(_Part):
     timing: Timing = Field(default=Timing(), description="Times of a trial.")
     points: Points = Field(default=Points(), description="How transition points are chosen.")
     language: Annotated[str, Field(pattern=r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$")] = Field(
-        default="en", description="Language of the texts, such as en, de or pt-BR; for screen readers."
+        default="en",
+        description="Language of the built-in words (en, de, fr, ja) and, for screen readers, of all texts.",
     )
     touch: bool = Field(default=True, description="Whether tablets and telephones may take part.")
     consent: Consent = Field(default=Consent(), description="What participants agree to.")
@@ -495,7 +503,7 @@ def parse_protocol(text: str, path: Path | None = None) -> Protocol:
     except tomllib.TOMLDecodeError as error:
         raise ProtocolError(f"{where}: expected TOML, found a mistake: {error}. Mend that line.") from error
     try:
-        protocol = Protocol.model_validate(data)
+        protocol = Protocol.model_validate(with_words(data))
     except ValidationError as error:
         lines = []
         for detail in error.errors():

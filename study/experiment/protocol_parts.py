@@ -1,11 +1,13 @@
 """The parts of a protocol that participants meet: consent, form, keys and texts, all of which can be translated.
 
-Pydantic models only; `protocol.Protocol` holds them. What is left out has an English default, so that a protocol in
-another language replaces every word that a participant reads.
+Pydantic models only; `protocol.Protocol` holds them. What is left out has the words of the protocol's language
+(`languages`), or else the English ones here; a protocol can replace every word that a participant reads.
 """
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -22,10 +24,31 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
+SLOTS = ("standard", "minutes", "trials", "studies", "practice", "answer_s", "contact")
+"""What may stand in braces in the longer texts: the built-in text, minutes and trials of the sitting, its studies,
+practice trials of the study, seconds to answer, and the protocol's contact."""
+
+
+def known_slots(text: str, *location: int | str) -> None:
+    """Refuse words in braces that mean nothing, and say which do."""
+    strange = next((slot for slot in re.findall(r"\{(\w*)\}", text) if slot not in SLOTS), None)
+    if strange is not None:
+        near = get_close_matches(strange, SLOTS, n=1)
+        hint = f"did you mean {{{near[0]}}}?" if near else "leave the braces out"
+        known = ", ".join(f"{{{slot}}}" for slot in SLOTS)
+        raise KeyMismatchError(f"expected {known} in braces, found {{{strange}}}; {hint}", *location)
+
+
 class Consent(Part):
     """What a participant agrees to before anything else; without text nobody is asked."""
 
-    text: str = Field(default="", description="What is asked of participants, what is stored, whom to ask.")
+    text: str = Field(
+        default="",
+        description="What is asked of participants, what is stored, whom to ask; `{standard}` is the built-in text.",
+    )
+    contact: str = Field(
+        default="", description="Who runs the study, where, how to be reached, who approved it; `{contact}` in texts."
+    )
     agree: str = Field(default="I agree and take part", min_length=1, description="Button that agrees.")
     decline: str = Field(default="I do not take part", min_length=1, description="Button that declines.")
     declined: str = Field(
@@ -33,12 +56,20 @@ class Consent(Part):
         description="Read after declining.",
     )
 
+    @model_validator(mode="after")
+    def _slots(self) -> Self:
+        known_slots(self.text, "text")
+        return self
+
 
 class FormField(Part):
     """One question of the form about the participant."""
 
     name: Slug = Field(description="What tables call it; unique in the form.")
-    label: str = Field(min_length=1, description="What the participant reads.")
+    label: str = Field(
+        min_length=1,
+        description="What the participant reads; age, gender, vision and animation can be left to their name.",
+    )
     kind: Literal["text", "number", "choice"] = Field(default="text", description="What is filled in.")
     choices: Annotated[tuple[str, ...], Field(strict=False)] = Field(
         default=(), description="What can be chosen; for `choice` only."
@@ -78,9 +109,9 @@ class Keys(Part):
 class Texts(Part):
     """What participants read besides questions and instructions."""
 
-    welcome: str = Field(default="", description="Read before the first study.")
+    welcome: str = Field(default="", description="Read before the first study; `{standard}` is the built-in text.")
     break_text: str = Field(default="You can rest now. Go on when you are ready.", description="Read at a break.")
-    debrief: str = Field(default="", description="Read at the end.")
+    debrief: str = Field(default="", description="Read at the end; `{standard}` is the built-in text.")
     go_on: str = Field(default="Continue", min_length=1, description="Button that goes on.")
     example: str = Field(default="Show an example", min_length=1, description="Button that plays the example.")
     same: str = Field(default="Same", min_length=1, description="The answer `same`.")
@@ -96,6 +127,10 @@ class Texts(Part):
     practice_noted: str = Field(
         default="Your answer was noted. There is no right or wrong here.",
         description="After an answer in practice where none is right.",
+    )
+    practice_over: str = Field(
+        default="That was the practice. From now on your answers count.",
+        description="Read between practice and study; left out where it is empty.",
     )
     missed: str = Field(default="The time to answer was over.", description="After a missed answer.")
     attention_check: str = Field(
@@ -175,7 +210,28 @@ class Texts(Part):
     back: str = Field(default="Finish", min_length=1, description="Button that leads back to the recruiting site.")
 
     @model_validator(mode="after")
-    def _check_has_answer(self) -> Self:
-        if "{answer}" not in self.attention_check:
-            raise KeyMismatchError("expected {answer} in it, which says what to answer; add it", "attention_check")
+    def _slots(self) -> Self:
+        for key in ("welcome", "debrief"):
+            known_slots(getattr(self, key), key)
+        for key, needed in _NEEDED_SLOTS.items():
+            found = set(re.findall(r"\{(\w*)\}", getattr(self, key)))
+            for slot in needed - found:
+                raise KeyMismatchError(f"expected {{{slot}}} in it, {_MEANINGS[slot]}; add it", key)
+            for slot in found - needed:
+                known = ", ".join(f"{{{each}}}" for each in sorted(needed))
+                raise KeyMismatchError(f"expected {known} in braces, found {{{slot}}}; change or remove it", key)
         return self
+
+
+_NEEDED_SLOTS = {
+    "attention_check": {"answer"},
+    "practice_wrong": {"answer"},
+    "progress": {"done", "total"},
+    "press": {"key"},
+}
+_MEANINGS = {
+    "answer": "which says what to answer",
+    "done": "the number of trials done",
+    "total": "the number of all trials",
+    "key": "which key it is",
+}

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from study.errors import SessionError
+from study.experiment import wording
 from study.experiment.plan import Plan, Trial, legal_answers
 from study.experiment.protocol import Protocol, StudySpec
 from study.experiment.protocol_parts import FormField
@@ -338,16 +339,16 @@ def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Co
     if strays := sorted({answer.trial for answer in answers} - known):
         raise SessionError(f"Expected answers to the plan's trials 1 to {len(plan.trials)}, found trials {strays}.")
     steps: list[Step] = []
-    if protocol.consent.text and "consent" not in passed:
-        steps.append(Step("consent", text=protocol.consent.text.strip()))
+    if "consent" not in passed and (text := wording.consent_text(protocol, plan)):
+        steps.append(Step("consent", text=text))
     if protocol.form and "form" not in passed:
         steps.append(Step("form", text=protocol.texts.form.strip()))
-    if not answers and protocol.texts.welcome:
-        steps.append(Step("instructions", text=protocol.texts.welcome.strip()))
+    if not answers and (text := wording.welcome_text(protocol, plan)):
+        steps.append(Step("instructions", text=text))
     for name in dict.fromkeys(trial.study for trial in plan.trials):
         steps += _study_steps(protocol, plan, protocol.study(name), answers)
-    if protocol.texts.debrief:
-        steps.append(Step("debrief", text=protocol.texts.debrief.strip()))
+    if text := wording.debrief_text(protocol, plan):
+        steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
 
 
@@ -368,9 +369,9 @@ def _study_steps(protocol: Protocol, plan: Plan, study: StudySpec, answers: Sequ
         if break_after and count % break_after == 0 and not last and attempt == 1 and trial.role != "practice":
             steps.append(Step("break", study.name, protocol.texts.break_text.strip()))
     steps += again
-    if steps and study.instructions:
+    if steps and (text := wording.instructions_text(protocol, study, plan)):
         example = next(trial.first for trial in plan.trials if trial.study == study.name) if study.example else ""
-        steps.insert(0, Step("instructions", study.name, study.instructions.strip(), stimulus=example))
+        steps.insert(0, Step("instructions", study.name, text, stimulus=example))
     return steps
 
 
@@ -397,7 +398,9 @@ def _trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset
     legal = legal_answers(study)
     # A rating is a questionnaire: it has no answer window (2003 section 4.2).
     window_s = None if study.task == "rating" else timing.answer_s
-    ask = replace(base, kind="answer", stimulus="", text=study.question, duration_s=window_s, legal=legal)
+    ask = replace(
+        base, kind="answer", stimulus="", text=wording.question_text(protocol, study), duration_s=window_s, legal=legal
+    )
     if trial.role == "check":
         words = protocol.texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected))
         steps.append(replace(ask, text=words))

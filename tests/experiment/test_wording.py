@@ -1,0 +1,198 @@
+"""What participants read: built-in texts in every language, slots, the form by name, what is still to be written."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import pytest
+
+from study.errors import ProtocolError
+from study.experiment.languages import built_in_questions, has_words, languages, words
+from study.experiment.plan import draw_plan
+from study.experiment.proofreading import to_do
+from study.experiment.protocol import parse_protocol
+from study.experiment.protocol_parts import Consent, Texts
+from study.experiment.session import current, open_session
+from study.experiment.wording import all_texts, duration_s, minutes
+
+LANGUAGES = languages()
+FORM = 'form = [{ name = "age", required = true }, { name = "gender" }, { name = "vision" }, { name = "animation" }]\n'
+STANDARD = {
+    'welcome = "Welcome."': 'welcome = "{standard}"',
+    'debrief = "Thank you."': 'debrief = "{standard}"',
+    'instructions = "Some pairs are the same."': 'instructions = "{standard}"',
+}
+
+
+def changed(protocol, *, top="", consent='text = "{standard}"\ncontact = "Ann, ann@example.org"'):
+    """A toy protocol with built-in texts."""
+    text = protocol.text
+    for old, new in STANDARD.items():
+        assert old in text
+        text = text.replace(old, new)
+    return parse_protocol(top + FORM + text + f"\n[consent]\n{consent}\n")
+
+
+def first_plan(protocol, toy_stimuli):
+    return draw_plan(protocol, toy_stimuli.pairs, "p01")
+
+
+def slots(text):
+    return set(re.findall(r"\{(\w*)\}", text))
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_language_has_every_word_with_the_same_slots(language):
+    """English defaults are the measure: no word may be missing, none may stand there that nobody reads."""
+    own, english = words(language), words("en")
+    assert set(own["standard"]) == set(english["standard"])
+    for name, text in own["standard"].items():
+        assert slots(text) == slots(english["standard"][name]), name
+    assert set(own["form"]) == set(english["form"]) == set(built_in_questions())
+    for name, question in own["form"].items():
+        assert question.keys() == english["form"][name].keys()
+        assert len(question.get("choices", ())) == len(english["form"][name].get("choices", ()))
+    if language == "en":
+        return
+    for part, model in (("consent", Consent), ("texts", Texts)):
+        wanted = {key: field.default for key, field in model.model_fields.items() if field.default}
+        assert set(own[part]) == set(wanted)
+        for key, text in wanted.items():
+            assert slots(own[part][key]) == slots(text), key
+            assert own[part][key] != text, key
+
+
+def test_german_french_and_japanese_are_there():
+    assert set(LANGUAGES) == {"en", "de", "fr", "ja"}
+    assert has_words("de-AT")
+    assert not has_words("pt-BR")
+
+
+@pytest.mark.parametrize("language", [name for name in LANGUAGES if name != "en"])
+def test_a_protocol_in_another_language_shows_no_built_in_english(language, toy_protocol, toy_stimuli):
+    top = f'language = "{language}"\n'
+    protocol = changed(toy_protocol, top=top)
+    plan = first_plan(protocol, toy_stimuli)
+    english = changed(toy_protocol)
+    known = {read.text for read in all_texts(english, plan)} - {read.text for read in all_texts(toy_protocol, plan)}
+    read = {read.text for read in all_texts(protocol, plan)}
+    assert not known & read
+    step = current(open_session(protocol, plan))
+    assert step.kind == "consent"
+    assert "Ann, ann@example.org" in step.text
+    assert not slots(step.text)
+
+
+def test_slots_are_the_numbers_of_the_study(toy_protocol, toy_stimuli):
+    protocol = changed(toy_protocol)
+    plan = first_plan(protocol, toy_stimuli)
+    read = {each.where: each.text for each in all_texts(protocol, plan)}
+    assert "You will see 8 pairs" in read["texts.welcome"]
+    assert "There are 2 parts." in read["texts.welcome"]
+    assert "you have 5\nseconds" in read["jnd: instructions"]
+    assert f"about {minutes(duration_s(protocol, plan))} minutes" in read["consent.text"].replace("\n", " ")
+    assert "| female | male |" in read["form: gender"]
+
+
+def test_an_empty_contact_leaves_no_hole(toy_protocol, toy_stimuli):
+    protocol = changed(toy_protocol, consent='text = "{standard}"')
+    text = current(open_session(protocol, first_plan(protocol, toy_stimuli))).text
+    assert "\n\n\n" not in text
+    assert "{" not in text
+
+
+def test_the_protocols_own_words_stand_beside_the_built_in_ones(toy_protocol, toy_stimuli):
+    consent = 'text = "{standard}\\n\\nApproved as 12/34."\nagree = "Yes"'
+    protocol = changed(toy_protocol, top='language = "de"\n', consent=consent)
+    text = current(open_session(protocol, first_plan(protocol, toy_stimuli))).text
+    assert text.startswith("Wir laden Sie ein")
+    assert text.endswith("Approved as 12/34.")
+    assert (protocol.consent.agree, protocol.consent.decline) == ("Yes", "Ich nehme nicht teil")
+
+
+def test_questions_of_the_form_go_by_name_and_can_be_changed(toy_protocol):
+    protocol = changed(toy_protocol)
+    age, gender, vision, animation = protocol.form
+    assert (age.kind, age.least, age.required, gender.required) == ("number", 18, True, False)
+    assert all(field.choices for field in (gender, vision, animation))
+    younger = parse_protocol('form = [{ name = "age", least = 16 }]\n' + toy_protocol.text)
+    assert younger.form[0].least == 16
+    own = parse_protocol('form = [{ name = "age", label = "Alter" }]\n' + toy_protocol.text)
+    assert (own.form[0].kind, own.form[0].least) == ("text", None)
+    with pytest.raises(ProtocolError, match=r"form\[0\].label: expected this key, found none"):
+        parse_protocol('form = [{ name = "height" }]\n' + toy_protocol.text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('welcome = "Welcome."', 'welcome = "About {minute} minutes."', r"found {minute}; did you mean {minutes}\?"),
+        ('welcome = "Welcome."', 'progress = "{done} done"', r"texts.progress: expected {total} in it"),
+        ('welcome = "Welcome."', 'press = "{key} {taste}"', r"texts.press: expected {key} in braces, found {taste}"),
+    ],
+)
+def test_strange_slots_are_refused(toy_protocol, old, new, why):
+    with pytest.raises(ProtocolError, match=why):
+        parse_protocol(toy_protocol.text.replace(old, new))
+
+
+@pytest.mark.parametrize("text", ["language = 3\n", 'language = "de"\ntexts = 3\n', 'form = [3]\nconsent = "x"\n'])
+def test_malformed_parts_are_refused_and_not_filled(toy_protocol, text):
+    with pytest.raises(ProtocolError):
+        parse_protocol(text + toy_protocol.text)
+
+
+def test_what_is_still_to_be_written_is_said(toy_protocol):
+    assert to_do(changed(toy_protocol)) == []
+    (empty,) = to_do(toy_protocol)
+    assert empty.startswith("consent.text is empty")
+    (contact,) = to_do(changed(toy_protocol, consent='text = "{standard}"\ncontact = "FILL IN: who runs it"'))
+    assert contact == "consent.contact says 'FILL IN: who runs it': write it before participants read it."
+    (nobody,) = to_do(changed(toy_protocol, consent='text = "{standard}"'))
+    assert nobody.startswith("consent.contact is empty")
+
+
+def test_a_language_without_words_names_what_is_still_english(toy_protocol):
+    (left,) = to_do(changed(toy_protocol, top='language = "pt-BR"\n'))
+    assert "texts.go_on" in left
+    assert "consent.agree" in left
+    assert "studies.jnd.instructions" in left
+    own = "\n".join(f'{key} = "x"' for key in ("agree", "decline", "declined"))
+    (fewer,) = to_do(changed(toy_protocol, top='language = "pt-BR"\n', consent=f'text = "x"\n{own}'))
+    assert "consent.agree" not in fewer
+
+
+@pytest.mark.parametrize(
+    ("instructions", "said"),
+    [
+        ("You have five seconds.", False),
+        ("You have eight seconds.", True),
+        ("You have 5 seconds.", False),
+        ("You have 7.5 seconds.", True),
+        ("Sie haben acht Sekunden.", True),
+        ("{answer_s} 秒, 9秒", True),
+        ("Some seconds later.", False),
+    ],
+)
+def test_instructions_that_speak_of_another_answer_window_are_noticed(toy_protocol, instructions, said):
+    text = toy_protocol.text.replace("Some pairs are the same.", instructions)
+    notes = [note for note in to_do(parse_protocol(text)) if "seconds, but" in note]
+    assert bool(notes) == said
+
+
+def test_a_sitting_lasts_as_long_as_its_parts(toy_protocol, toy_stimuli):
+    """Eight pairs of 0.3 + 0.3 + 1 s films, a gap of one second, two to answer, one of pause; then reading."""
+    plan = first_plan(toy_protocol, toy_stimuli)
+    letters = sum(len(text) for text in ("Welcome.", "Thank you.", "Some pairs are the same."))
+    instructions = sum(len(study.instructions) for study in toy_protocol.studies)
+    letters += instructions - len("Some pairs are the same.")
+    assert duration_s(toy_protocol, plan) == pytest.approx(8 * (2 * 1.6 + 1 + 2 + 1) + letters / 15)
+    assert [minutes(s) for s in (1, 60, 61, 599, 601, 960)] == [1, 1, 2, 10, 15, 20]
+
+
+def test_the_language_files_are_toml_that_a_person_can_read(repository):
+    for path in (repository / "study" / "experiment" / "words").glob("*.toml"):
+        text = path.read_text(encoding="utf-8")
+        assert tomllib.loads(text) == words(path.stem)
+        assert text.startswith("#")
