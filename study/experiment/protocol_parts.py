@@ -139,6 +139,7 @@ class Texts(Part):
     )
     form: str = Field(default="A few questions about you", description="Heading of the form.")
     skip: str = Field(default="Skip", min_length=1, description="Button that leaves a question of the form empty.")
+    previous: str = Field(default="Back", min_length=1, description="Button that leads to the question before.")
     not_taken: str = Field(default="Please check this.", description="After something that the form does not take.")
     space_key: str = Field(default="Space", description="Name of the space bar, on buttons of the window.")
     enter_key: str = Field(default="Enter", description="Name of the Enter key, on buttons of the window.")
