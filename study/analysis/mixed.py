@@ -12,13 +12,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study.analysis.estimates import Interval, t_probability, t_quantile
+from study.analysis.random_effects import (
+    LARGEST_EFFECT,
+    NO_SPREAD,
+    Effect,
+    caution,
+    covariance_of,
+    effects_of,
+    quadrature,
+)
 from study.analysis.sigmoids import SIGMOIDS
 from study.errors import AnalysisError
 
@@ -28,20 +35,6 @@ LINKS = {"probit": SIGMOIDS["normal"], "logit": SIGMOIDS["logistic"]}
 
 NODES = 9
 MODE_STEPS = 12
-NO_SPREAD = 1e-3
-LARGEST_EFFECT = 12.0
-LARGEST_ERROR = 4.0
-
-
-@dataclass(frozen=True)
-class Effect:
-    """A fixed effect: estimate, standard error, Student's interval and test with participants less one."""
-
-    name: str
-    value: float
-    standard_error: float | None
-    interval: Interval
-    p_value: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +132,7 @@ def fit_mixed(
     from scipy.optimize import minimize
 
     effects, random_size = problem.fixed.shape[2], problem.random.shape[2]
-    grid, log_weights = _quadrature(nodes, random_size)
+    grid, log_weights = quadrature(nodes, random_size)
     memory: dict[str, FloatArray] = {"mode": np.zeros((people, random_size))}
 
     def loss(point: FloatArray) -> tuple[float, FloatArray]:
@@ -149,11 +142,11 @@ def fit_mixed(
     start = np.concatenate([_pooled(problem), _start_spread(random_size)])
     limits = [(-LARGEST_EFFECT, LARGEST_EFFECT)] * effects + [(-8.0, 8.0)] * (len(start) - effects)
     found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=limits, options={"maxiter": 300, "ftol": 1e-11})
-    covariance = _covariance(found.x, loss, effects)
+    covariance = covariance_of(found.x, loss, effects)
     root = _factor(found.x[effects:], random_size)
     spread = np.sqrt((root**2).sum(axis=1))
     return MixedFit(
-        effects=_effects(found.x[:effects], covariance, names, people, confidence),
+        effects=effects_of(found.x[:effects], covariance, names, people, confidence),
         spread=tuple(float(value) for value in spread),
         correlation=_correlation(root, spread),
         covariance=covariance,
@@ -163,7 +156,7 @@ def fit_mixed(
         link=link,
         guess=guess,
         lapse=lapse,
-        note=_caution(found.x[:effects], covariance, spread, bool(found.success)),
+        note=caution(found.x[:effects], covariance, spread, bool(found.success)),
     )
 
 
@@ -215,14 +208,6 @@ def _why_no_fit(problem: _Problem, people: int) -> str:
     if np.linalg.matrix_rank(rows) < rows.shape[1]:
         return "the effects can't be told from each other in these answers (cells are missing)"
     return ""
-
-
-def _quadrature(nodes: int, size: int) -> tuple[FloatArray, FloatArray]:
-    """Points of the standard normal in `size` dimensions, and logs of weight times exp(|z|^2 / 2)."""
-    points, weights = np.polynomial.hermite_e.hermegauss(nodes)
-    grid = np.array(list(product(points, repeat=size)))
-    logs = np.log(np.array(list(product(weights, repeat=size)))).sum(axis=1)
-    return grid, logs + 0.5 * (grid**2).sum(axis=1)
 
 
 def _start_spread(size: int) -> FloatArray:
@@ -303,60 +288,10 @@ def _pooled(problem: _Problem) -> FloatArray:
     return point
 
 
-def _covariance(point: FloatArray, loss: Any, effects: int) -> FloatArray:
-    """Covariance of the fixed effects: inverse of the differences of the gradient, spread that is at zero left out."""
-    step = 1e-4
-    rows = []
-    for place in range(len(point)):
-        moved = np.zeros(len(point))
-        moved[place] = step
-        rows.append((loss(point + moved)[1] - loss(point - moved)[1]) / (2 * step))
-    matrix = (np.array(rows) + np.array(rows).T) / 2
-    keep = np.flatnonzero((np.arange(len(point)) < effects) | (np.diag(matrix) > 1e-3))
-    try:
-        inverse = np.linalg.inv(matrix[np.ix_(keep, keep)])
-    except np.linalg.LinAlgError:
-        return np.full((effects, effects), np.nan)
-    return np.asarray(inverse[:effects, :effects], dtype=np.float64)
-
-
-def _effects(
-    values: FloatArray, covariance: FloatArray, names: Sequence[str], people: int, confidence: float
-) -> tuple[Effect, ...]:
-    found = []
-    times = t_quantile(confidence, people - 1)
-    for place, value in enumerate(values):
-        name = names[place] if place < len(names) else f"effect {place + 1}"
-        variance = covariance[place, place]
-        # An error as large as that says nothing: the answers nearly separate, or the spread can't be told.
-        if not np.isfinite(variance) or not 0 < variance < LARGEST_ERROR**2 or abs(value) >= LARGEST_EFFECT - 1e-6:
-            found.append(Effect(name, float(value), None, Interval(None, None, confidence), None))
-            continue
-        error = math.sqrt(variance)
-        interval = Interval(float(value - times * error), float(value + times * error), confidence)
-        found.append(Effect(name, float(value), error, interval, t_probability(float(value) / error, people - 1)))
-    return tuple(found)
-
-
 def _correlation(root: FloatArray, spread: FloatArray) -> float | None:
     if len(root) < 2 or (spread < NO_SPREAD).any():
         return None
     return float(root[0] @ root[1] / (spread[0] * spread[1]))
-
-
-def _caution(values: FloatArray, covariance: FloatArray, spread: FloatArray, settled: bool) -> str:
-    notes = []
-    if (np.abs(values) >= LARGEST_EFFECT - 1e-6).any():
-        notes.append("an effect grows without end: the answers separate perfectly, and it can't be estimated")
-    elif not np.isfinite(covariance).all() or (np.diag(covariance) <= 0).any():
-        notes.append("the likelihood is flat: standard errors can't be given")
-    elif (np.diag(covariance) > LARGEST_ERROR**2).any():
-        notes.append("the answers nearly separate: an effect is large, and how large can't be told")
-    if (spread < NO_SPREAD).any():
-        notes.append("a spread between participants is estimated as none; it may only not have been seen")
-    if not settled:
-        notes.append("the search for the maximum did not come to rest")
-    return "; ".join(notes)
 
 
 def marginal_share(fit: MixedFit, row: ArrayLike, random_row: ArrayLike = (1.0,), nodes: int = 41) -> float:

@@ -14,6 +14,27 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+def rated(answers: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers given in rating tasks with the columns `rating` (a number) and `item` (empty where none).
+
+    Raises
+    ------
+    AnalysisError
+        When an answer is not a number.
+    """
+    import pandas as pd
+
+    part = answers[answers["task"] == "rating"] if "task" in answers.columns else answers
+    part = part[part["answer"].notna()].copy()
+    part["rating"] = pd.to_numeric(part["answer"], errors="coerce").astype(float)
+    strange = ~np.isfinite(part["rating"])
+    if strange.any():
+        found = part.loc[strange, "answer"].iloc[0]
+        raise AnalysisError(f"expected ratings as numbers, found {str(found)!r}; recode the column `answer`")
+    part["item"] = part["item"].fillna("").astype(str) if "item" in part.columns else ""
+    return part
+
+
 def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[str, Any]]:
     """Return one entry a question and method: how it was rated.
 
@@ -31,16 +52,10 @@ def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[s
     """
     import pandas as pd
 
-    part = answers[answers["task"] == "rating"] if "task" in answers.columns else answers
-    part = part[part["answer"].notna()]
-    rating = pd.to_numeric(part["answer"], errors="coerce")
-    if rating.isna().any():
-        strange = part.loc[rating.isna(), "answer"].iloc[0]
-        raise AnalysisError(f"expected ratings as numbers, found {str(strange)!r}; recode the column `answer`")
+    part = rated(answers)
     method = part["method_a"].astype(str) if "method_a" in part.columns else pd.Series("all", index=part.index)
     rows = []
-    item = part["item"].fillna("").astype(str) if "item" in part.columns else pd.Series("", index=part.index)
-    for (question, name), values in rating.groupby([item, method], sort=True):
+    for (question, name), values in part["rating"].groupby([part["item"], method], sort=True):
         means = values.groupby(part.loc[values.index, "participant"].astype(str)).mean().to_numpy(dtype=np.float64)
         test = estimates.mean_test(means, 0.0, confidence)
         rows.append(

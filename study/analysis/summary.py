@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from study.analysis import estimates
-from study.analysis.anova import rating_anova
 from study.analysis.exclusions import Rules, exclude
 from study.analysis.jnd import analyse_jnd
 from study.analysis.preference import compare, confirmatory, strengths
 from study.analysis.quality import quality
+from study.analysis.rating_comparisons import rating_anova
 from study.analysis.ratings import rating_table
 from study.errors import AnalysisError
 

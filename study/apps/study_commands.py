@@ -95,7 +95,7 @@ def analyse_results(folder: Path) -> dict[str, Any]:
 
 def headlines(analysis: dict[str, Any]) -> list[str]:
     """The answers of an analysis in sentences."""
-    from study.analysis.anova import anova_sentences
+    from study.analysis.rating_comparisons import anova_sentences
 
     sentences = [study["answer"] for study in analysis["jnd"].values()]
     sentences += [compared["answer"] for study in analysis["preference"].values() for compared in study]

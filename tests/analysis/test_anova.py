@@ -7,7 +7,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.anova import anova_sentences, rating_anova, two_way
+from study.analysis.anova import Squares, two_way
+from study.analysis.effect_sizes import effect_size
+from study.analysis.rating_comparisons import anova_sentences, rating_anova
 from study.errors import AnalysisError
 
 NAMES = ("cost", "order")
@@ -54,6 +56,23 @@ def test_an_unbalanced_design_compares_with_and_without_each_effect() -> None:
         value, variance = np.dot(contrast, means), np.sum(np.square(contrast) / counts)
         assert rows[name]["f"] == pytest.approx(value**2 / variance / (within / left))
         assert rows[name]["error_degrees_of_freedom"] == left
+
+
+@pytest.mark.parametrize(("squares", "typ"), [("II", 2), ("III", 3)])
+def test_both_types_of_squares_against_statsmodels(squares: Squares, typ: int) -> None:
+    smf, anova_lm = (
+        pytest.importorskip("statsmodels.formula.api"),
+        pytest.importorskip("statsmodels.stats.anova").anova_lm,
+    )
+    rng = np.random.default_rng(6)
+    a, b = rng.integers(0, 3, 70), rng.integers(0, 2, 70)
+    data = pd.DataFrame({"y": 0.4 * a * b + rng.normal(size=70), "a": a, "b": b})
+    expected = anova_lm(smf.ols("y ~ C(a, Sum) * C(b, Sum)", data).fit(), typ=typ)
+    rows = two_way(data["y"], data["a"], data["b"], ("a", "b"), squares=squares)
+    for row, name in zip(rows, ["C(a, Sum)", "C(b, Sum)", "C(a, Sum):C(b, Sum)", "Residual"], strict=True):
+        assert row["sum_of_squares"] == pytest.approx(expected.loc[name, "sum_sq"])
+        assert row["degrees_of_freedom"] == expected.loc[name, "df"]
+    assert rows[0]["p_value"] == pytest.approx(expected.loc["C(a, Sum)", "PR(>F)"])
 
 
 def test_three_levels_have_two_degrees_of_freedom() -> None:
@@ -124,7 +143,8 @@ def test_known_effects_are_found_as_often_as_they_should_be() -> None:
     found = {0.0: 0, 0.73: 0}
     for better in found:
         for _ in range(60):
-            row = rating_anova(rating_answers(rng, better=better))[0]["anova"][0]
+            answers = rating_answers(rng, better=better)
+            row = rating_anova(answers[answers["item"] == "natural"], models=False)[0]["anova"][0]
             found[better] += row["p_value"] < 0.05
     assert found[0.0] <= 8
     assert found[0.73] >= 30
@@ -138,3 +158,78 @@ def test_a_group_that_is_not_there_is_said() -> None:
     assert "two levels of order" in question["note"]
     assert not math.isnan(question["difference"]["mean"])
     assert rating_anova(answers[answers["method_a"] == "cut-lee2002"]) == []
+
+
+def test_the_interval_of_an_effect_size_is_where_the_noncentral_f_puts_it() -> None:
+    found = effect_size(6.39, 1, 48)
+    assert found.partial_eta_squared == pytest.approx(6.39 / (6.39 + 48))
+    assert found.partial_omega_squared == pytest.approx((6.39 - 1) / (6.39 + 48 + 1))
+    assert found.interval.confidence == 0.9
+    for end, probability in ((found.interval.low, 0.95), (found.interval.high, 0.05)):
+        assert end is not None
+        assert stats.ncf.cdf(6.39, 1, 48, 50 * end / (1 - end)) == pytest.approx(probability, abs=1e-6)
+    none = effect_size(0.5, 2, 30)
+    assert none.partial_omega_squared == 0
+    assert none.interval.low == 0
+
+
+def test_the_interval_of_an_effect_size_covers_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(7)
+    a, b = np.repeat([0, 0, 1, 1], 13), np.repeat([0, 1, 0, 1], 13)
+    truth = 0.35**2 / (0.35**2 + 1)  # 0.7 between the levels, in units of the error
+    inside = []
+    for _ in range(600):
+        row = two_way(0.7 * a + rng.normal(size=52), a, b, NAMES)[0]
+        inside.append(row["effect_low"] <= truth <= row["effect_high"])
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.035)
+
+
+def test_unbalanced_ratings_are_given_by_both_types() -> None:
+    answers = rating_answers(np.random.default_rng(8))
+    assert rating_anova(answers)[0]["type_ii"] is None
+    uneven = answers[answers["participant"] != "p00"]
+    question = rating_anova(uneven)[0]
+    assert question["balanced"] is False
+    assert question["type_ii"][2] == question["anova"][2]
+    assert question["type_ii"][0]["sum_of_squares"] != pytest.approx(question["anova"][0]["sum_of_squares"], rel=1e-6)
+
+
+def test_tests_over_participants_agree_where_they_ask_the_same() -> None:
+    """Two methods, two groups: the mixed design's F of the methods is the square of a t; ranks and points agree."""
+    question = rating_anova(rating_answers(np.random.default_rng(3), participants=40, better=1.0))[0]
+    effects = {row["source"]: row for row in question["mixed_design"]["effects"]}
+    assert list(effects) == ["order", "method", "method x order"]
+    assert effects["method"]["f"] == pytest.approx(question["difference"]["t"] ** 2, rel=0.05)
+    assert effects["method"]["error_degrees_of_freedom"] == 38
+    assert question["ranks"]["participants"]["test"] == "Wilcoxon's signed ranks"
+    between = {row["source"]: row for row in question["ranks"]["between"]}
+    ordinal = question["ordinal"]["effects"][0]
+    assert ordinal["name"] == "cut-wang2003 over cut-lee2002"
+    assert ordinal["odds_ratio"] > 2
+    for p_value in (
+        effects["method"]["p_value"],
+        question["ranks"]["participants"]["p_value"],
+        between["method"]["p_value"],
+        ordinal["p_value"],
+        question["ordinal"]["p_value"],
+    ):
+        assert p_value < 0.01
+    assert [effect["name"] for effect in question["ordinal"]["effects"]] == [ordinal["name"], "shown second"]
+
+
+def test_motions_within_participants_are_a_factor_where_everybody_saw_them() -> None:
+    rng = np.random.default_rng(9)
+    rows = [
+        {"participant": f"p{p}", "task": "rating", "trial": t, "method_a": m, "motion": n, "answer": rng.integers(0, 5)}
+        for p in range(12)
+        for t, (m, n) in enumerate(rng.permutation([(m, n) for m in "abc" for n in "xyz"]))
+    ]
+    (question,) = rating_anova(pd.DataFrame(rows), models=False)
+    assert question["mixed_design"]["factors"] == ["method", "motion"]
+    effects = {row["source"]: row for row in question["mixed_design"]["effects"]}
+    assert effects["method x motion"]["degrees_of_freedom"] == 4
+    assert 0.25 <= effects["method x motion"]["epsilon"] < 1
+    assert question["ranks"]["participants"]["degrees_of_freedom"] == 2
+    (fewer,) = rating_anova(pd.DataFrame(rows[:-1]), models=False)
+    assert fewer["mixed_design"]["factors"] == ["method"]
+    assert fewer["mixed_design"]["participants"] == 12
