@@ -6,10 +6,11 @@ the server's or the file's own settings say, and a server that would lose commit
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import sqlalchemy as sa
 
@@ -22,8 +23,13 @@ BUSY_SECONDS = 10
 ALONE_KEY = 0x5E60E
 """The number of the PostgreSQL advisory lock behind `alone`; any that other programs do not use would do."""
 
+PATIENCE_SECONDS = 60.0
+"""How long `patiently` waits for a database that went away: a server that is started again is back by then."""
+
 AWAY = (sa.exc.OperationalError, sa.exc.InterfaceError, sa.exc.TimeoutError)
 """What SQLAlchemy raises while a database can't be reached or is locked: the same may succeed later."""
+
+Made = TypeVar("Made")
 
 _POSTGRESQL = ("postgres", "postgresql", "postgresql+psycopg")
 _SQLITE = ("sqlite", "sqlite+pysqlite")
@@ -145,9 +151,49 @@ def alone(engine: sa.Engine) -> Iterator[sa.Connection]:
         yield connection
 
 
+def patiently(
+    work: Callable[[], Made],
+    place: str,
+    *,
+    patience_s: float = PATIENCE_SECONDS,
+    wait: Callable[[float], object] = time.sleep,
+    clock: Callable[[], float] = time.monotonic,
+) -> Made:
+    """Do what writes to a database, again and again while the database is away.
+
+    Parameters
+    ----------
+    work
+        What may be done twice and counts once: a commit may stand though the word of it was lost.
+
+    Raises
+    ------
+    SessionError
+        Where the database does not come back in time.
+    """
+    end, pause_s = clock() + patience_s, 0.1
+    while True:
+        try:
+            return work()
+        except AWAY as error:
+            if clock() > end:
+                raise SessionError(
+                    f"{place}: expected a database that can be written to, found that for {patience_s:g} s it could "
+                    f"not be ({in_words(error)}). Nothing that was stored is lost: when it is back, the same command "
+                    "goes on from there."
+                ) from error
+        wait(pause_s)
+        pause_s = min(2 * pause_s, 2.0)
+
+
+def in_words(error: BaseException) -> str:
+    """What a database said, on one line, without the statement that it was about."""
+    return " ".join(str(getattr(error, "orig", error)).split())
+
+
 def cannot_open(place: str, error: sa.exc.DBAPIError) -> SessionError:
     """Why a database could not be opened, and what to do about it."""
-    found = " ".join(str(error.orig).split())
+    found = in_words(error)
     # libpq tells of a refused connection in words alone, in the server's language: an unknown one is passed on.
     known = (advice for words, advice in _ADVICE if words in found)
     advice = next(known, "check the path or URL, or keep that database and name another")

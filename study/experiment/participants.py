@@ -10,13 +10,16 @@ import hashlib
 import hmac
 import json
 import secrets
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from typing import Any
+from typing import Any, Literal
 
 import sqlalchemy as sa
 
+from study.experiment.databases import alone
+from study.experiment.plan import Plan
+from study.experiment.protocol import Protocol
 from study.experiment.response_tables import (
     answers,
     events,
@@ -26,7 +29,7 @@ from study.experiment.response_tables import (
     sessions,
     withdrawals,
 )
-from study.experiment.responses import Clock, Responses
+from study.experiment.responses import Clock, Responses, begin_session
 
 DROPPED_AFTER = timedelta(hours=1)
 """A session that is not finished and was not heard of for so long counts as dropped out."""
@@ -70,39 +73,90 @@ def _code(secret: str) -> str:
     return "-".join("".join(letters[i : i + 4]) for i in range(0, 16, 4))
 
 
-def enrol(
+@dataclass(frozen=True)
+class Newcomer:
+    """Who asks to take part: a name, a new token, and what the link said.
+
+    `identifying` are those of the `parameters` that name one person, who takes part once.
+    """
+
+    name: str
+    token: str
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    identifying: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Places:
+    """For how many there is room: groups to fill evenly, and the most participants in all, None for as many as come."""
+
+    groups: int = 1
+    most_participants: int | None = None
+    dropped_after: timedelta = DROPPED_AFTER
+
+
+def admit(
     responses: Responses,
-    session_id: int,
+    protocol: Protocol,
+    newcomer: Newcomer,
+    places: Places,
+    draw: Callable[[int], Plan],
     *,
-    token: str,
-    group: int = 0,
-    parameters: Mapping[str, str] | None = None,
-    identifying: Mapping[str, str] | None = None,
+    library: str = "",
+    library_synthetic: bool = False,
     clock: Clock = _utc_now,
-) -> Participant:
-    """Store a participant's tokens (as hashes), group and parameters.
+) -> Participant | Literal["full", "taken"]:
+    """Begin a newcomer's session in the group that has the fewest, or say why not: no place left, or the name is known.
+
+    All in one transaction that no other arrival runs beside, so that several programs fill the same groups evenly and
+    never beyond the cap.
 
     Parameters
     ----------
-    identifying
-        The parameters that name one person, who is then enrolled once.
+    draw
+        The newcomer's plan in a group.
     """
-    given = dict(parameters or {})
+    with alone(responses.engine) as connection:
+        filled = _filled(connection, places, clock())
+        if places.most_participants is not None and sum(filled) >= places.most_participants:
+            return "full"
+        known = sa.select(sessions.c.id).where(sessions.c.participant == newcomer.name)
+        if connection.execute(known).first() is not None or _has_parameters(connection, newcomer.identifying):
+            return "taken"
+        group = filled.index(min(filled))
+        record = begin_session(
+            responses,
+            protocol,
+            draw(group),
+            library=library,
+            library_synthetic=library_synthetic,
+            clock=clock,
+            within=connection,
+        )
+        return _enrol(connection, record.id, newcomer, group, clock())
+
+
+def _has_parameters(connection: sa.Connection, identifying: Mapping[str, str]) -> bool:
+    key = participants.c.parameters_sha256 == _parameters_key(identifying)
+    return bool(identifying) and connection.execute(sa.select(participants.c.session_id).where(key)).first() is not None
+
+
+def _enrol(connection: sa.Connection, session_id: int, newcomer: Newcomer, group: int, now: datetime) -> Participant:
+    """Store a participant's tokens (as hashes), group and parameters."""
     secret = secrets.token_hex(32)
     row = {
         "session_id": session_id,
-        "token_sha256": hashed(token),
+        "token_sha256": hashed(newcomer.token),
         "withdrawal_sha256": hashed(_code(secret)),
         "secret": secret,
         "group_number": group,
-        "parameters_json": json.dumps(given, sort_keys=True),
-        "parameters_sha256": None if identifying is None else _parameters_key(identifying),
-        "began_at": clock(),
-        "seen_at": clock(),
+        "parameters_json": json.dumps(dict(newcomer.parameters), sort_keys=True),
+        "parameters_sha256": _parameters_key(newcomer.identifying) if newcomer.identifying else None,
+        "began_at": now,
+        "seen_at": now,
     }
-    with responses.engine.begin() as connection:
-        connection.execute(sa.insert(participants).values(row))
-    return Participant(session_id, secret, group, given)
+    connection.execute(sa.insert(participants).values(row))
+    return Participant(session_id, secret, group, newcomer.parameters)
 
 
 def _parameters_key(parameters: Mapping[str, str]) -> str:
@@ -147,24 +201,26 @@ def finished_sessions() -> sa.Select[tuple[int]]:
     return sa.select(events.c.session_id).where(events.c.kind == "finished")
 
 
-def filled_groups(
-    responses: Responses, groups: int, *, dropped_after: timedelta = DROPPED_AFTER, clock: Clock = _utc_now
-) -> list[int]:
+def filled_groups(responses: Responses, places: Places, *, clock: Clock = _utc_now) -> list[int]:
     """How many participants each group has, finished or at it; drop-outs and those who declined are given back."""
+    with responses.engine.connect() as connection:
+        return _filled(connection, places, clock())
+
+
+def _filled(connection: sa.Connection, places: Places, now: datetime) -> list[int]:
     left = sa.select(events.c.session_id).where(events.c.kind.in_(("declined", "left")))
     query = (
         sa.select(participants.c.group_number, sa.func.count())
         .where(
             sa.or_(
                 participants.c.session_id.in_(finished_sessions()),
-                sa.and_(participants.c.seen_at > clock() - dropped_after, participants.c.session_id.not_in(left)),
+                sa.and_(participants.c.seen_at > now - places.dropped_after, participants.c.session_id.not_in(left)),
             )
         )
         .group_by(participants.c.group_number)
     )
-    with responses.engine.connect() as connection:
-        counts = {row[0]: row[1] for row in connection.execute(query)}
-    return [counts.get(group, 0) for group in range(groups)]
+    counts = {row[0]: row[1] for row in connection.execute(query)}
+    return [counts.get(group, 0) for group in range(places.groups)]
 
 
 def overview(responses: Responses) -> list[dict[str, Any]]:

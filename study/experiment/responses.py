@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -152,8 +153,14 @@ def begin_session(
     library_synthetic: bool = False,
     truth: Mapping[str, Any] | None = None,
     clock: Clock = _utc_now,
+    within: sa.Connection | None = None,
 ) -> SessionRecord:
     """Start a participant's session, or take up the one that there is.
+
+    Parameters
+    ----------
+    within
+        The caller's own transaction (`databases.alone`) where this is a part of it.
 
     Raises
     ------
@@ -163,7 +170,7 @@ def begin_session(
     """
     if plan.seed > LARGEST_SEED:
         raise SessionError(f"Expected a seed below 2 to the power of 63, found {plan.seed}; choose another one.")
-    with alone(responses.engine) as connection:
+    with alone(responses.engine) if within is None else nullcontext(within) as connection:
         _refuse_other_protocol(connection, responses.place, protocol)
         found = connection.execute(sa.select(sessions).where(sessions.c.participant == plan.participant)).one_or_none()
         if found is not None:

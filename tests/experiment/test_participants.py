@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import sqlite3
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
 
 from study.experiment import participants as people
 from study.experiment.plan import draw_plan
-from study.experiment.response_tables import answers, presentations, sessions, withdrawals
+from study.experiment.response_tables import answers, metadata, presentations, sessions, withdrawals
 from study.experiment.responses import (
     Presentation,
     begin_session,
@@ -19,6 +20,7 @@ from study.experiment.responses import (
     record_answer,
     record_event,
     record_form,
+    session_by_id,
     stored_answers,
     stored_form,
 )
@@ -28,17 +30,21 @@ NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 @pytest.fixture
-def responses(tmp_path):
-    with open_responses(tmp_path) as opened:
+def responses(database):
+    with open_responses(database) as opened:
         yield opened
 
 
 @pytest.fixture
 def enrol(responses, toy_protocol, toy_stimuli):
-    def enrol(name, group=0, at=NOW, **more):
-        record = begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group))
-        people.enrol(responses, record.id, token=f"token {name}", group=group, clock=lambda: at, **more)
-        return record
+    """`enrol(name)`: a participant who arrived, in the group that has the fewest."""
+
+    def enrol(name, groups=1, at=NOW, **more):
+        newcomer = people.Newcomer(name, f"token {name}", **more)
+        places = people.Places(groups, dropped_after=timedelta(days=1))
+        draw = lambda group: draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group)  # noqa: E731
+        found = people.admit(responses, toy_protocol, newcomer, places, draw, clock=lambda: at)
+        return session_by_id(responses, found.session_id)
 
     return enrol
 
@@ -47,7 +53,16 @@ def code_of(responses, name):
     return people.find_by_token(responses, f"token {name}").withdrawal_code
 
 
-def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol, tmp_path):
+def everything(responses):
+    """All that a database gives away: for SQLite the bytes of its file, for PostgreSQL the rows of all tables."""
+    if responses.engine.dialect.name == "sqlite":
+        responses.close()
+        return Path(responses.engine.url.database).read_bytes()
+    with responses.engine.connect() as connection:
+        return repr([connection.execute(sa.select(table)).all() for table in metadata.sorted_tables]).encode()
+
+
+def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol):
     record = enrol("p1", parameters={"PROLIFIC_PID": "abc"}, identifying={"PROLIFIC_PID": "abc"})
     found = people.find_by_token(responses, "token p1")
     assert (found.session_id, found.group, found.parameters) == (record.id, 0, {"PROLIFIC_PID": "abc"})
@@ -56,8 +71,7 @@ def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol
     people.give_token(responses, found, "another")
     assert people.find_by_token(responses, "token p1") is None
     assert people.find_by_token(responses, "another") == found
-    responses.close()
-    assert b"token p1" not in (tmp_path / "responses.sqlite").read_bytes()
+    assert b"token p1" not in everything(responses)
 
 
 def test_tokens_and_codes_do_not_repeat():
@@ -70,22 +84,37 @@ def test_tokens_and_codes_do_not_repeat():
 
 def test_groups_count_who_is_there_and_give_back_who_is_gone(responses, enrol):
     finished, gone, here, declined = (
-        enrol("a", 0),
-        enrol("b", 1),
-        enrol("c", 2, NOW + timedelta(hours=5)),
-        enrol("d", 3),
+        enrol("a", 4),
+        enrol("b", 4),
+        enrol("c", 4, NOW + timedelta(hours=5)),
+        enrol("d", 4),
     )
     record_event(responses, finished, "finished")
     record_event(responses, declined, "declined")
     later = lambda: NOW + timedelta(hours=5, minutes=1)  # noqa: E731
-    assert people.filled_groups(responses, 4, clock=lambda: NOW) == [1, 1, 1, 0]
-    assert people.filled_groups(responses, 4, clock=later) == [1, 0, 1, 0]
+    assert people.filled_groups(responses, people.Places(4), clock=lambda: NOW) == [1, 1, 1, 0]
+    assert people.filled_groups(responses, people.Places(4), clock=later) == [1, 0, 1, 0]
     people.seen(responses, [gone.id], clock=later)
-    assert people.filled_groups(responses, 4, clock=later) == [1, 1, 1, 0]
+    assert people.filled_groups(responses, people.Places(4), clock=later) == [1, 1, 1, 0]
     assert here.id
 
 
-def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol, tmp_path):
+def test_a_newcomer_is_turned_away_where_there_is_no_place_or_the_name_is_known(responses, toy_protocol, toy_stimuli):
+    def arrive(name, token, places, **identifying):
+        draw = lambda group: draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group)  # noqa: E731
+        newcomer = people.Newcomer(name, token, identifying, identifying)
+        return people.admit(responses, toy_protocol, newcomer, places, draw)
+
+    roomy, narrow = people.Places(2), people.Places(2, most_participants=1)
+    assert arrive("p1", "t1", narrow, PROLIFIC_PID="x").group == 0
+    assert arrive("p2", "t2", narrow) == "full"
+    assert arrive("p1", "t2", roomy) == "taken"
+    assert arrive("p2", "t2", roomy, PROLIFIC_PID="x") == "taken"
+    assert arrive("p2", "t2", roomy, PROLIFIC_PID="y").group == 1
+    assert people.filled_groups(responses, roomy) == [1, 1]
+
+
+def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol):
     stays, leaves = enrol("stays"), enrol("leaves")
     for record in (stays, leaves):
         shown = Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True, {"mark": f"mark of {record.participant}"})
@@ -99,8 +128,7 @@ def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol, tmp_
         assert connection.execute(sa.select(withdrawals)).all() == [(leaves.id, 1, NOW)]
     assert stored_form(responses, stays.id) == {"remark": "words of stays"}
     assert len(stored_answers(responses, stays.id)) == 1
-    responses.close()
-    whole = (tmp_path / "responses.sqlite").read_bytes()
+    whole = everything(responses)
     assert b"words of stays" in whole
     assert b"words of leaves" not in whole
     assert b"mark of leaves" not in whole

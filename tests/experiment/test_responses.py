@@ -89,10 +89,10 @@ def full(responses, toy_protocol, plan):
     """A database with a row in every table, and one session withdrawn."""
     gone = begin_session(responses, toy_protocol, replace(plan, participant="gone"))
     people.erase(responses, gone.id)
-    record = begin_session(responses, toy_protocol, plan)
+    people.admit(responses, toy_protocol, people.Newcomer("p01", "token"), people.Places(), lambda _: plan)
+    record = find_session(responses, "p01")
     record_answer(responses, record, answer(1), [Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True)])
     record_form(responses, record, {"age": "33"})
-    people.enrol(responses, record.id, token="token")
     return responses
 
 

@@ -7,6 +7,7 @@ memory is only its answers taken up again, so a restart of the server loses noth
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 import secrets
 import time
@@ -16,12 +17,15 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import sqlalchemy as sa
+
 from study.apps.server import views
 from study.apps.server.messages import Answered, Begin, Done, Happened, Shown
 from study.apps.server.writer import Writer
 from study.errors import SessionError
 from study.experiment import participants as people
 from study.experiment import session as flow
+from study.experiment.databases import AWAY, in_words
 from study.experiment.participants import Participant
 from study.experiment.plan import draw_plan, groups_of
 from study.experiment.protocol import Protocol
@@ -31,9 +35,7 @@ from study.experiment.responses import (
     Responses,
     SessionRecord,
     answer_rows,
-    begin_session,
     event_row,
-    find_session,
     has_event,
     record_form,
     session_by_id,
@@ -49,6 +51,8 @@ MOST_EVENTS = 2000
 """Events that are stored of one session; a page that goes wrong can't fill the disk."""
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
+
+log = logging.getLogger("segue.serve")
 
 
 @dataclass(frozen=True)
@@ -96,9 +100,11 @@ class Host:
             record.id: {"frames": record.frames, "bytes": int(manifest.videos.get(record.id, {}).get("bytes", 0))}
             for record in manifest.records
         }
-        self.groups = settings.groups or groups_of(protocol, manifest.pairs)
+        groups = settings.groups or groups_of(protocol, manifest.pairs)
+        self.places = people.Places(groups, settings.most_participants, settings.dropped_after)
         self.sittings: dict[str, Sitting] = {}
         self.recent: set[int] = set()
+        # Arrivals at this server stand in line here, not as threads that wait for the database's lock.
         self._starting = asyncio.Lock()
 
     def close(self) -> None:
@@ -146,7 +152,7 @@ class Host:
                 trial, attempt = sitting.shown_trial
                 await self.note(sitting, "interrupted", {"trial": trial, "attempt": attempt})
             await self.note(sitting, "display", message.display.model_dump(mode="json"))
-            return await self._view(sitting), token
+            return {**await self._view(sitting), "session": views.session_name(sitting.participant)}, token
 
     def _is_another(self, sitting: Sitting, parameters: Mapping[str, str]) -> bool:
         """Whether the link names another person than the cookie, as on a computer that several use."""
@@ -167,31 +173,24 @@ class Host:
             sitting = await self.sitting(token)
             assert sitting is not None  # its token was stored just now
             return sitting, token
-        filled = await asyncio.to_thread(
-            people.filled_groups, self.responses, self.groups, dropped_after=self.settings.dropped_after
-        )
-        if self.settings.most_participants is not None and sum(filled) >= self.settings.most_participants:
-            return {"kind": "full"}, ""
         name = parameters.get("participant", "")
         name = name if NAME.fullmatch(name) else f"web-{secrets.token_hex(5)}"
-        if await asyncio.to_thread(find_session, self.responses, name) is not None:
-            return {"kind": "taken"}, ""
-        await asyncio.to_thread(self._enrol, name, filled.index(min(filled)), token, parameters, who)
+        found = await asyncio.to_thread(self._arrive, people.Newcomer(name, token, parameters, who))
+        if isinstance(found, str):
+            return {"kind": found}, ""
         sitting = await self.sitting(token)
         assert sitting is not None  # it was stored just now
         return sitting, token
 
-    def _enrol(self, name: str, group: int, token: str, parameters: dict[str, str], who: dict[str, str]) -> None:
-        plan = draw_plan(self.protocol, self.manifest.pairs, name, group=group)
-        record = begin_session(
+    def _arrive(self, newcomer: people.Newcomer) -> Participant | str:
+        return people.admit(
             self.responses,
             self.protocol,
-            plan,
+            newcomer,
+            self.places,
+            lambda group: draw_plan(self.protocol, self.manifest.pairs, newcomer.name, group=group),
             library=self.manifest.library,
             library_synthetic=self.manifest.synthetic,
-        )
-        people.enrol(
-            self.responses, record.id, token=token, group=group, parameters=parameters, identifying=who or None
         )
 
     def _forget(self, session_id: int) -> None:
@@ -251,7 +250,7 @@ class Host:
         async with sitting.lock:
             key = (message.trial, message.item, message.attempt)
             if key in sitting.answers:
-                return {**await self._view(sitting), "counted": sitting.answers[key].value == message.value}
+                return {**await self._view(sitting), "counted": self._is_stored(sitting, key, message)}
             state = self._at_question(sitting.state, key)
             if state is None:
                 return {**await self._view(sitting), "counted": False}
@@ -266,12 +265,25 @@ class Host:
                 state, answer = flow.answered(state, message.value, message.response_s, shown_well=well)
             at = datetime.now(UTC)
             shown = [self._presentation(sitting, message, one) for one in message.shown]
-            await self.writer.put(answer_rows(sitting.record, answer, shown, at))
+            try:
+                await self.writer.put(answer_rows(sitting.record, answer, shown, at))
+            except sa.exc.IntegrityError:
+                # It is there: the database was lost before it could say so, or another server stored it.
+                await self._take_up(sitting)
+                return {**await self._view(sitting), "counted": self._is_stored(sitting, key, message)}
             sitting.answers[key] = answer
             sitting.state = views.to_view(state)
             sitting.shown_trial = None
             self.recent.add(sitting.record.id)
             return {**await self._view(sitting), "counted": True}
+
+    def _is_stored(self, sitting: Sitting, key: tuple[int, str, int], message: Answered) -> bool:
+        return key in sitting.answers and sitting.answers[key].value == message.value
+
+    async def _take_up(self, sitting: Sitting) -> None:
+        """What the database has, in place of what is in memory."""
+        fresh = await asyncio.to_thread(self._load, sitting.participant)
+        sitting.state, sitting.answers = fresh.state, fresh.answers
 
     def _at_question(self, state: Session, key: tuple[int, str, int]) -> Session | None:
         """The state at a question, past the films that the page has shown; None where another question is due."""
@@ -353,5 +365,8 @@ class Host:
     async def note_who_is_here(self) -> None:
         """Store who was heard of, so that drop-outs can be told apart."""
         recent, self.recent = self.recent, set()
-        if recent:
+        try:
             await asyncio.to_thread(people.seen, self.responses, recent)
+        except AWAY as error:
+            self.recent |= recent
+            log.warning("Who is here can't be stored now: %s", in_words(error))

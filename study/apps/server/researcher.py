@@ -78,7 +78,7 @@ def _overview(host: Host) -> dict[str, Any]:
         "counts": {state: states.count(state) for state in ("at it", "finished", "dropped out", "declined")},
         "withdrawn": withdrawn,
         "most_participants": host.settings.most_participants,
-        "groups": people.filled_groups(host.responses, host.groups, dropped_after=host.settings.dropped_after),
+        "groups": people.filled_groups(host.responses, host.places),
         "sessions": listed,
         "faults": [{"at": row[0].isoformat(), "participant": row[1], "detail": row[2]} for row in found],
         "tables": list(TABLES),

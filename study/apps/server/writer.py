@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
+from study.experiment.databases import AWAY
 from study.experiment.responses import Row, insert_rows
 
 LARGEST_GROUP = 256
@@ -84,6 +85,8 @@ def _commit(engine: sa.Engine, group: list[_Job]) -> list[Exception | None]:
         with engine.begin() as connection:
             insert_rows(connection, [row for job in group for row in job.rows])
     except Exception as error:  # whatever it was, the page has to be told
-        # One of them failed, and the whole group was rolled back: each on its own now.
-        return [error] if len(group) == 1 else [_commit(engine, [job])[0] for job in group]
+        # One of them failed, and the whole group was rolled back: each on its own now. Not where the database is away:
+        # each would wait for it in turn.
+        alike = len(group) == 1 or isinstance(error, AWAY)
+        return [error] * len(group) if alike else [_commit(engine, [job])[0] for job in group]
     return [None] * len(group)
