@@ -9,12 +9,16 @@ from pathlib import Path
 import uvicorn
 from starlette.types import ASGIApp
 
+from study.apps.server.connections import Connection
 from study.apps.server.hosting import Host, Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.protocol import Protocol
 from study.experiment.rendering import read_manifest
 from study.experiment.responses import open_responses
+
+MOST_CONNECTIONS = 4000
+"""Beyond it requests get status 503, and pages ask again. A browser opens up to six while films load."""
 
 
 def run(
@@ -35,6 +39,7 @@ def run(
         Where the address can't be listened at.
     """
     manifest = read_manifest(folder)
+    _allow_files(MOST_CONNECTIONS + 100)
     listening = listen(host, port)
     name = f"[{host}]" if ":" in host else host
     with open_responses(folder) as responses:
@@ -48,6 +53,9 @@ def configuration(app: ASGIApp, *, behind_proxy: bool = False) -> uvicorn.Config
     """How uvicorn runs: quiet, with connections that outlive a trial, ending within seconds."""
     return uvicorn.Config(
         app,
+        http=Connection,
+        ws="none",
+        limit_concurrency=MOST_CONNECTIONS,
         log_level="warning",
         access_log=False,
         server_header=False,
@@ -55,6 +63,19 @@ def configuration(app: ASGIApp, *, behind_proxy: bool = False) -> uvicorn.Config
         timeout_keep_alive=75,
         timeout_graceful_shutdown=5,
     )
+
+
+def _allow_files(wanted: int) -> None:
+    """Each connection is an open file, of which a process may often have no more than 1,024 unless it asks."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if most != resource.RLIM_INFINITY:
+        wanted = min(wanted, most)
+    if now != resource.RLIM_INFINITY and now < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def listen(host: str, port: int) -> socket.socket:
