@@ -1,173 +1,225 @@
 """How far intervals and tests can be trusted: simulated studies with known truth through the real analysis.
 
-Run it from the repository: `python benchmarks/calibration.py [studies] [preference|psychometric|mixed|same-different]`;
-2,000 studies a cell take some minutes. Observers are drawn here, by code that the analysis does not use. In
-2004's design: 35 people (or fewer), 6 answers at each of 7 levels, or 8 preferences.
+    python benchmarks/calibration.py psychometric --cells check drawn:31 --studies 2000
+    python benchmarks/calibration.py psychometric --cells check --profile --studies 500
+    python benchmarks/calibration.py same-different --cells 2004 other --out cells.jsonl
+    python benchmarks/calibration.py preference | mixed | pooled | speed
+
+Observers are drawn by code that the analysis does not use; what they are stands in `calibration_psychometric` and
+`calibration_same_different`. `--cells` takes sets or names of cells. Each cell is printed when it is done; with `--out`
+it is also added to a file of JSON lines, and cells that stand there already (same studies and seed) are not run again.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+import json
 import time
+from pathlib import Path
 
+import calibration_psychometric as psychometric
+import calibration_same_different as same_different
 import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 from scipy.stats import beta
 
+from study.analysis import differencing
 from study.analysis.group_models import psychometric_mixed
-from study.analysis.preference import participant_tests, published_test
-from study.analysis.psychometric import fit_psychometric, make_model
+from study.analysis.preference import published_test
+from study.analysis.preference_tests import participant_tests
+from study.analysis.psychometric import fit_many, fit_psychometric, make_model
 from study.analysis.psychometric_likelihood import fit_likelihood
-from study.analysis.same_different import Counts, crossing_of_lines, crossings
-from study.analysis.same_different_model import ModelFit, fit_model
+from study.analysis.psychometric_study import analyse_psychometric
+from study.analysis.same_different import Counts, crossings
+from study.analysis.same_different_mixed import fit_mixed_thresholds
+from study.analysis.same_different_model import fit_model
 
-LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
-CRITERION, LAPSE = 2.0, 0.02
-SIDES = (("shorter", 8.0), ("longer", 7.0))
-
-
-def chances(scale, criterion):
-    """P("different") at the levels for observers whose own thresholds would be 8 and 7 frames at scale 1."""
-    delta = np.linspace(0, 10, 100001)
-    tails = ndtr((delta - CRITERION) / np.sqrt(2)) + ndtr((-delta - CRITERION) / np.sqrt(2))
-    unit = np.interp(0.75, LAPSE / 2 + (1 - LAPSE) * tails, delta)
-    distance = scale[:, None] * unit * np.where(LEVELS < 0, -LEVELS / 8, LEVELS / 7)
-    tails = ndtr((distance - criterion[:, None]) / np.sqrt(2)) + ndtr((-distance - criterion[:, None]) / np.sqrt(2))
-    return LAPSE / 2 + (1 - LAPSE) * tails
+PSYCHOMETRIC = {"first": psychometric.FIRST, "check": psychometric.CHECK, "confirm": psychometric.CONFIRM}
+SAME_DIFFERENT = {"2004": same_different.DESIGN_2004, "other": same_different.OTHER}
 
 
-def people(rng, count, spread):
-    """Observers who differ in sensitivity (logarithm) and criterion by this standard deviation."""
-    return chances(
-        np.exp(spread * rng.normal(size=count)), np.maximum(CRITERION + spread * rng.normal(size=count), 0.2)
-    )
+class Kept:
+    """Rows that were done, in a file of JSON lines."""
+
+    def __init__(self, path):
+        self.path = Path(path) if path else None
+        lines = self.path.read_text(encoding="utf-8").splitlines() if self.path and self.path.exists() else []
+        self.rows = [json.loads(line) for line in lines]
+
+    def has(self, cell, studies, seed):
+        """Whether this cell was run already."""
+        asked = (cell, studies, seed)
+        return any((row["cell"], row["studies"], row["seed"]) == asked for row in self.rows)
+
+    def add(self, rows, columns):
+        """Print rows and keep them."""
+        for row in rows:
+            print(" ".join(text(row.get(key), width) for key, width in columns), flush=True)
+            if self.path:
+                with self.path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps({key: plain(value) for key, value in row.items()}) + "\n")
 
 
-def group_truth(spread):
-    """Where the percentages of endlessly many such observers cross 75%: the curve itself, and straight lines."""
-    rng = np.random.default_rng(0)
-    mean = people(rng, 400_000, spread).mean(axis=0)
-    lines = [crossing_of_lines(-LEVELS[3::-1], mean[3::-1]), crossing_of_lines(LEVELS[3:], mean[3:])]
-    scale = np.exp(spread * rng.normal(size=4000))
-    criterion = np.maximum(CRITERION + spread * rng.normal(size=4000), 0.2)
-    factors = np.linspace(0.5, 2.0, 301)
-    # All levels stretch alike, so one level stretched until it reaches 75% gives the threshold of the curve.
-    curve = []
-    for place in (2, 4):
-        reached = [chances(scale * factor, criterion)[:, place].mean() for factor in factors * 1.6]
-        curve.append(abs(LEVELS[place]) * np.interp(0.75, reached, factors * 1.6))
-    return curve, [float(line) for line in lines]
+def plain(value):
+    return value if isinstance(value, str | int) else None if not np.isfinite(value) else round(float(value), 5)
 
 
-def same_different(studies):
-    """Coverage of 95% intervals, bias, and standard errors against the scatter of estimates."""
-    print(f"{'people':>6} {'spread':>6} {'side':>8} {'truth':>6} {'mean':>6} {'sd':>5} {'se':>5} {'cover':>6}   lines: "
-          f"{'truth':>6} {'mean':>6} {'cover':>6}")  # fmt: skip
-    for count, spread in ((35, 0.0), (35, 0.15), (35, 0.3), (8, 0.0), (8, 0.15), (8, 0.3)):
-        rng, (curve, lines) = np.random.default_rng(1), group_truth(spread)
-        rows = {side: [] for side, _ in SIDES}
-        started = time.perf_counter()
-        for _ in range(studies):
-            different = rng.binomial(6, people(rng, count, spread)).astype(float)
-            counts = Counts(tuple(map(str, range(count))), LEVELS, different, np.full(different.shape, 6.0))
-            fit, read = fit_model(counts), crossings(counts, resamples=2)
-            for place, (side, _) in enumerate(SIDES):
-                rows[side].append((*verdict(fit, side, curve[place]), *verdict(read, side, lines[place])))
-        for place, (side, _) in enumerate(SIDES):
-            mean, error, inside, read_mean, _, read_inside = np.array(rows[side], dtype=float).T
-            print(f"{count:6} {spread:6} {side:>8} {curve[place]:6.2f} {np.nanmean(mean):6.2f} {np.nanstd(mean):5.2f} "
-                  f"{np.nanmean(error):5.2f} {inside.mean():6.3f}          {lines[place]:6.2f} "
-                  f"{np.nanmean(read_mean):6.2f} {read_inside.mean():6.3f}", flush=True)  # fmt: skip
-        print(f"       {1000 * (time.perf_counter() - started) / studies:.0f} ms a study")
+def text(value, width):
+    if value is None or (isinstance(value, float) and not np.isfinite(value)):
+        return f"{'':{width}}"
+    return f"{value:{width}.3f}" if isinstance(value, float) else f"{value!s:{width}}"
 
 
-def verdict(found, side, truth):
-    """Estimate, standard error, and whether the interval holds the truth; open ends hold all beyond."""
-    if isinstance(found, str):
-        return np.nan, np.nan, True
-    threshold = found.jnd[side] if isinstance(found, ModelFit) else found[side]
-    low, high = threshold.interval.low, threshold.interval.high
-    inside = (low is None or low <= truth) and (high is None or truth <= high)
-    return threshold.frames or np.nan, threshold.standard_error or np.nan, inside
+def head(columns):
+    print(" ".join(f"{key:{width}}" for key, width in columns), flush=True)
 
 
-def preference(studies):
+def chosen(sets, wanted, drawn=None):
+    """Cells of the sets and names asked for."""
+    everything = [cell for cells in sets.values() for cell in cells]
+    found = []
+    for name in wanted or sets:
+        if drawn and name.startswith("drawn:"):
+            found += drawn(int(name.split(":")[1]))
+            continue
+        cells = sets.get(name) or [cell for cell in everything if cell.name == name]
+        if not cells:
+            raise SystemExit(
+                f"expected cells out of {', '.join([*sets, *(cell.name for cell in everything)])}, found {name}"
+            )
+        found += cells
+    return found
+
+
+def run_psychometric(options):
+    columns = [("cell", 28), ("covers", 6), ("error", 6), ("below", 6), ("above", 6), ("open", 6), ("no value", 8),
+               ("bias", 7), ("bias error", 10), ("ms", 6), ("profile", 7)]  # fmt: skip
+    head(columns)
+    kept = Kept(options.out)
+    wanted = [name for name in options.cells if name != "prior"]
+    if "prior" in options.cells:
+        for task in ("2afc", "yes-no"):
+            kept.add([psychometric.run_prior(task, options.studies, options.seed)], columns)
+    for cell in chosen(PSYCHOMETRIC, wanted, psychometric.drawn_cells) if wanted or not options.cells else ():
+        if not kept.has(cell.name, options.studies, options.seed):
+            kept.add([psychometric.run(cell, options.studies, options.seed, options.profile)], columns)
+
+
+def run_same_different(options):
+    columns = [("cell", 14), ("side", 8), ("estimate", 23), ("true", 6), ("mean", 6), ("bias", 7), ("bias error", 10),
+               ("sd", 6), ("se", 6), ("covers", 6), ("error", 6), ("open", 6), ("ms mixed", 8)]  # fmt: skip
+    head(columns)
+    kept = Kept(options.out)
+    for group in chosen(SAME_DIFFERENT, options.cells):
+        if not kept.has(group.name, options.studies, options.seed):
+            kept.add(same_different.run(group, options.studies, options.seed), columns)
+
+
+def run_preference(options):
     """Type I error at nominal .05 of the test over participants, the robust one, and the published pooled one."""
     print(f"{'correlation':>11} {'participants':>12} {'robust':>7} {'published':>9}")
     for correlation in (0.0, 0.1, 0.2, 0.3):
-        rng, wrong = np.random.default_rng(2), []
+        rng, wrong = np.random.default_rng(options.seed), []
         shape = 0.5 * (1 / correlation - 1) if correlation else None
-        for _ in range(studies):
+        for _ in range(options.studies):
             own = beta.rvs(shape, shape, size=35, random_state=rng) if shape else np.full(35, 0.5)
-            chosen = rng.binomial(8, own).astype(float)
-            tests = participant_tests(chosen, np.full(35, 8.0))
-            wrong.append((tests["p_value"], tests["robust_p_value"], published_test(int(chosen.sum()), 280).p_value))
+            chose = rng.binomial(8, own).astype(float)
+            tests = participant_tests(chose, np.full(35, 8.0))
+            wrong.append((tests["p_value"], tests["robust_p_value"], published_test(int(chose.sum()), 280).p_value))
         rates = (np.array(wrong, dtype=float) < 0.05).mean(axis=0)
         print(f"{correlation:11} {rates[0]:12.3f} {rates[1]:7.3f} {rates[2]:9.3f}", flush=True)
 
 
-def psychometric(studies):
-    """Coverage of posterior and profile intervals of thresholds, at small and usual sizes, and milliseconds a fit."""
-    heads = ("task", "levels", "answers", "rho", "bias", "posterior", "ms", "profile", "ms")
-    print(" ".join(f"{head:>9}" for head in heads))
-    cells = (("2afc", 5, 20, 0.0), ("2afc", 7, 40, 0.0), ("2afc", 7, 40, 0.02),
-             ("yes-no", 7, 20, 0.0), ("yes-no", 7, 50, 0.0), ("yes-no", 7, 50, 0.02))  # fmt: skip
-    for task, count, answers, rho in cells:
-        rng, levels, model = np.random.default_rng(4), np.arange(1.0, count + 1), make_model(task)
-        guess, middle = (0.5, levels.mean()) if task == "2afc" else (0.05, levels.mean())
-        share = guess + (1 - guess - 0.02) * ndtr((levels - middle) / 3 * 2 * 1.6449)
-        rows, spent = [], np.zeros(2)
-        for place in range(studies):
-            own = rng.beta(share * (1 / rho - 1), (1 - share) * (1 / rho - 1)) if rho else share
-            yes, shown = rng.binomial(answers, own), np.full(count, answers)
-            started = time.perf_counter()
-            fit = fit_psychometric(levels, yes, shown, model)
-            spent[0] += time.perf_counter() - started
-            row = [fit.threshold.value or np.nan, holds(fit.threshold.interval, middle)]
-            if place < studies // 10:
-                started = time.perf_counter()
-                row.append(holds(fit_likelihood(levels, yes, shown, model).interval, middle))
-                spent[1] += time.perf_counter() - started
-            else:
-                row.append(np.nan)
-            rows.append(row)
-        mean, inside, profile = np.nanmean(np.array(rows, dtype=float), axis=0)
-        numbers = (mean - middle, inside, 1000 * spent[0] / studies, profile, 1000 * spent[1] / (studies // 10))
-        print(f"{task:>9} {count:9} {answers:9} {rho:9} " + " ".join(f"{n:9.3f}" for n in numbers), flush=True)
+def many_people(rng, people):
+    """2AFC answers of people who differ in threshold and slope, 7 levels, 30 answers each; the typical threshold 3."""
+    levels, who = np.tile(np.arange(7.0), people), np.repeat(np.arange(people), 7)
+    own = rng.multivariate_normal([-3.0, 1.0], [[0.16, 0.0], [0.0, 0.04]], size=people)
+    chance = 0.5 + 0.5 * ndtr(own[who, 0] + own[who, 1] * levels)
+    return pd.DataFrame({"participant": who, "level": levels, "yes": rng.binomial(30, chance), "shown": 30})
 
 
-def holds(interval, truth):
-    """Whether an interval holds the truth; open ends hold all beyond."""
-    return (interval.low is None or interval.low <= truth) and (interval.high is None or truth <= interval.high)
+def run_mixed(options):
+    """Coverage and time of the mixed model's threshold."""
+    for people in (8, 20):
+        rng, inside, values, spent = np.random.default_rng(options.seed), [], [], []
+        for _ in range(options.studies):
+            table = many_people(rng, people)
+            started = time.process_time()
+            found = psychometric_mixed(table, guess=0.5)
+            spent.append(time.process_time() - started)
+            if found["threshold"] is not None:
+                inside.append(found["low"] <= 3.0 <= found["high"])
+                values.append(found["threshold"])
+        print(f"mixed, {people} people: {len(inside)} of {options.studies} fitted, mean {np.mean(values):.3f} (true 3)"
+              f", covers {np.mean(inside):.3f}, {1000 * np.median(spent):.0f} ms", flush=True)  # fmt: skip
 
 
-def mixed(studies):
-    """Coverage and time of the mixed model's threshold: 8 participants, 7 levels, 30 answers each, 2AFC."""
-    rng, inside, estimates = np.random.default_rng(5), [], []
-    levels, who = np.tile(np.arange(7.0), 8), np.repeat(np.arange(8), 7)
-    started = time.perf_counter()
-    for _ in range(studies):
-        own = rng.multivariate_normal([-3.0, 1.0], [[0.16, 0.0], [0.0, 0.04]], size=8)
-        chance = 0.5 + 0.5 * ndtr(own[who, 0] + own[who, 1] * levels)
-        table = pd.DataFrame({"participant": who, "level": levels, "yes": rng.binomial(30, chance), "shown": 30})
-        found = psychometric_mixed(table, guess=0.5)
-        if found["threshold"] is not None:
-            inside.append(found["low"] <= 3.0 <= found["high"])
-            estimates.append(found["threshold"])
-    spent = 1000 * (time.perf_counter() - started) / studies
-    print(f"mixed: {len(inside)} fitted, mean {np.mean(estimates):.3f} (true 3), covers {np.mean(inside):.3f}")
-    print(f"{spent:.0f} ms a study")
+def run_pooled(options):
+    """How often intervals cover that take the answers of people who differ as one person's, or people as the unit."""
+    for people in (8, 20):
+        rng, inside = np.random.default_rng(options.seed + people), []
+        for _ in range(options.studies):
+            found = analyse_psychometric(many_people(rng, people))
+            pooled, group, mixed = found["pooled"]["threshold"]["interval"], found["group"], found["mixed"]
+            inside.append([part["low"] <= 3.0 <= part["high"] for part in (pooled, group, mixed)])
+        shares = np.mean(inside, axis=0)
+        print(f"{people} people cover: all answers as one person's {shares[0]:.3f}, mean over participants "
+              f"{shares[1]:.3f}, mixed {shares[2]:.3f}", flush=True)  # fmt: skip
+
+
+def run_speed(options):
+    """Milliseconds of processor time: medians of single calls, and batched ones a fit."""
+    rng, levels, shown = np.random.default_rng(options.seed), np.arange(1.0, 8), np.full(7, 40.0)
+    repeats = min(options.studies, 200)
+    for task, guess in (("2afc", 0.5), ("yes-no", 0.05)):
+        share, model = guess + (0.98 - guess) * ndtr((levels - 4) / 3 * 2 * 1.6449), make_model(task)
+        yes = rng.binomial(40, share, size=(repeats, 7)).astype(float)
+        single = clock(lambda row, model=model: fit_psychometric(levels, row, shown, model), yes)
+        profile = clock(lambda row, model=model: fit_likelihood(levels, row, shown, model), yes[:20])
+        batch = clock(lambda rows, model=model: fit_many(levels, rows, shown, model), [yes] * 3) / repeats
+        print(f"{task}: posterior with intervals {single:.2f} ms, in a batch {batch:.2f} ms a fit; "
+              f"likelihood with profile {profile:.0f} ms", flush=True)  # fmt: skip
+    group = same_different.DESIGN_2004[-1]
+    places = np.array(group.levels)
+    share = same_different.chances(group, places, *same_different.draw_people(rng, group, 35))
+    different, asked = rng.binomial(6, share).astype(float), np.full(share.shape, 6.0)
+    counts = Counts(tuple(map(str, range(35))), places, different, asked)
+    frames = np.column_stack([np.maximum(-places, 0), np.maximum(places, 0)])
+    weights = rng.multinomial(35, np.full(35, 1 / 35), size=1000).astype(float)
+    print(f"35 people, same-different: model with jackknife {clock(fit_model, [counts] * 20):.0f} ms, mixed model "
+          f"{clock(fit_mixed_thresholds, [counts] * 20):.0f} ms", flush=True)  # fmt: skip
+    boot = clock(lambda drawn: differencing.fit(frames, drawn @ different, drawn @ asked), [weights] * 5)
+    lines = clock(lambda number: crossings(counts, resamples=number), [1000] * 5)
+    print(
+        f"1,000 bootstraps over participants: of the model {boot:.0f} ms, of straight lines {lines:.0f} ms", flush=True
+    )
+
+
+def clock(call, arguments):
+    """Median milliseconds of processor time of a call; the first one warms up and does not count."""
+    call(arguments[0])
+    spent = []
+    for argument in arguments:
+        started = time.process_time()
+        call(argument)
+        spent.append(time.process_time() - started)
+    return 1000 * float(np.median(spent))
+
+
+PARTS = {"psychometric": run_psychometric, "same-different": run_same_different, "preference": run_preference,
+         "mixed": run_mixed, "pooled": run_pooled, "speed": run_speed}  # fmt: skip
 
 
 if __name__ == "__main__":
-    number = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
-    wanted = sys.argv[2] if len(sys.argv) > 2 else "all"
-    if wanted in ("all", "preference"):
-        preference(number)
-    if wanted in ("all", "psychometric"):
-        psychometric(number)
-    if wanted in ("all", "mixed"):
-        mixed(number)
-    if wanted in ("all", "same-different"):
-        same_different(number)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("part", choices=PARTS)
+    parser.add_argument(
+        "--cells", nargs="*", default=[], help="sets (check, drawn:SEED, 2004, ...) or names; all unless given"
+    )
+    parser.add_argument("--studies", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--profile", action="store_true", help="profile-likelihood intervals too (psychometric; slow)")
+    parser.add_argument("--out", help="a file of JSON lines to which rows are added")
+    asked = parser.parse_args()
+    PARTS[asked.part](asked)

@@ -4,7 +4,9 @@ Three sets, so that a prior chosen on one can be judged on another:
 
 - `first`: the cells with which the prior of the overdispersion was chosen;
 - `check`: written down before any of them was run, unlike the first in levels, widths, rates, sigmoids and placements;
-- `drawn`: drawn at random from the ranges in `drawn_cells`, by a seed, so that nobody chose them.
+- `confirm`: written down after `check` had led to another prior of the lapse rate, before they were run, with lapse
+  rates that this prior holds for unlikely;
+- `drawn:SEED`: drawn at random from the ranges in `drawn_cells`, by a seed, so that nobody chose them.
 
 `prior` is no cell of observers: truths are drawn from the priors that the analysis uses, so that 95% has to come out
 but for errors of the grid (simulation-based calibration, Talts et al. 2018).
@@ -19,7 +21,14 @@ import numpy as np
 from scipy.stats import gumbel_l, logistic, norm
 
 from study.analysis import posterior_grid
-from study.analysis.psychometric import LARGEST_GUESS, LARGEST_LAPSE, fit_psychometric, make_model
+from study.analysis.psychometric import (
+    LARGEST_GUESS,
+    LARGEST_LAPSE,
+    even_edges,
+    fit_psychometric,
+    make_model,
+    quantiles,
+)
 from study.analysis.psychometric_likelihood import fit_likelihood
 
 PEERS = {"normal": norm, "logistic": logistic, "gumbel": gumbel_l, "weibull": gumbel_l}
@@ -90,6 +99,20 @@ CHECK = (
     Cell("yesno-5x20-held", "yes-no", steps(5), 20, 2.8, 2.5, 0.0, 0.0, sigmoid="logistic", held=True),
     Cell("2afc-6x60-corr", "2afc", steps(6), 60, 3.2, 3.0, 0.02, correlation=0.01),
     Cell("yesno-6x40-corr", "yes-no", steps(6), 40, 3.2, 3.0, 0.02, 0.1, correlation=0.04),
+)
+
+CONFIRM = (
+    Cell("c-2afc-7x30-lapse0.1", "2afc", steps(7), 30, 3.7, 3.0, 0.1),
+    Cell("c-2afc-5x15-lapse0", "2afc", steps(5), 15, 2.7, 2.5, 0.0, sigmoid="logistic"),
+    Cell("c-2afc-6x20-lapse0.06", "2afc", steps(6), 20, 4.1, 3.0, 0.06, sigmoid="gumbel"),
+    Cell("c-2afc-9x12", "2afc", steps(9), 12, 4.2, 5.0, 0.03, sigmoid="logistic"),
+    Cell("c-3afc-5x40", "3afc", steps(5), 40, 3.3, 2.5, 0.02, guess=1 / 3),
+    Cell("c-2afc-8x60-weibull", "2afc", RISING, 60, float(np.log(0.08)), 1.4, 0.03, sigmoid="weibull"),
+    Cell("c-2afc-staircase-100", "2afc", steps(8), 100, 4.0, 3.5, 0.04, up=2),
+    Cell("c-yesno-6x25-lapse0.08", "yes-no", steps(6), 25, 3.4, 3.0, 0.08, 0.12, sigmoid="logistic"),
+    Cell("c-yesno-8x15", "yes-no", steps(8), 15, 4.1, 4.5, 0.01, 0.08),
+    Cell("c-yesno-5x60-gumbel", "yes-no", steps(5), 60, 3.1, 2.6, 0.03, 0.03, sigmoid="gumbel"),
+    Cell("c-yesno-7x35-guess0.25", "yes-no", steps(7), 35, 4.4, 3.2, 0.02, 0.25),
 )
 
 
@@ -200,8 +223,8 @@ def run_prior(task, studies, seed):
     covered = []
     for _ in range(studies):
         threshold, log_width = (tapered(rng, *ends) for ends in zip(outer, inner, strict=True))
-        lapse = truncated(rng, LARGEST_LAPSE)
-        guess = 0.5 if task == "2afc" else truncated(rng, LARGEST_GUESS)
+        lapse = truncated(rng, posterior_grid.LAPSE_POWER, LARGEST_LAPSE)
+        guess = 0.5 if task == "2afc" else truncated(rng, posterior_grid.GUESS_POWER, LARGEST_GUESS)
         seen = norm.cdf((levels - threshold) / np.exp(log_width) * 2 * norm.ppf(0.95))
         share = guess + (1 - guess - lapse) * seen
         excess = rng.beta(1, posterior_grid.OVERDISPERSION_POWER)
@@ -217,9 +240,7 @@ def run_prior(task, studies, seed):
 
 def interval_of_grid(grid):
     """The interval before its ends are said to be open."""
-    from study.analysis.psychometric import quantiles
-
-    return quantiles(grid.nodes[0], grid.marginals[0], (0.025, 0.975))
+    return quantiles(even_edges(grid.nodes[0]), grid.marginals[0], (0.025, 0.975))
 
 
 def tapered(rng, outer, inner):
@@ -232,8 +253,8 @@ def tapered(rng, outer, inner):
             return value
 
 
-def truncated(rng, largest):
+def truncated(rng, power, largest):
     while True:
-        rate = rng.beta(1, posterior_grid.PRIOR_POWER)
+        rate = rng.beta(1, power)
         if rate < largest:
             return rate

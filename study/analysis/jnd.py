@@ -22,6 +22,7 @@ from study.analysis.same_different import (
     percent_different,
     same_different_answers,
 )
+from study.analysis.same_different_mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different_model import ModelFit, fit_model
 
 if TYPE_CHECKING:
@@ -48,8 +49,9 @@ def analyse_jnd(
     -------
     dict
         JSON-able: `participants`, `answers`, `missed`, `level`, `percent_different` (rows of Figure 6), `published`
-        (crossings by side), `model` (`ModelFit` as a dict, or None), `model_note`, `d_prime` (rows by level),
-        `clustering` (answers at the pairs with a difference), `motions` (the same per motion), `across_motions`
+        (crossings by side), `model` (`ModelFit` as a dict, or None: the group's curve), `model_note`, `mixed`
+        (`MixedThresholds` as a dict, or None: the median observer, and the group), `mixed_note`, `d_prime` (rows by
+        level), `clustering` (answers at the pairs with a difference), `motions` (the same per motion), `across_motions`
         (tests), `order` (share of "different" by which came first), `order_test` (`decision_rules.order_test`), `rules`
         (differencing against independent observations), `profile` (intervals by profile likelihood, by side),
         `answer` (a sentence).
@@ -58,6 +60,7 @@ def analyse_jnd(
     counts = count_answers(answers)
     published = crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng)
     fitted = fit_model(counts, level=level, confidence=confidence)
+    mixed = fit_mixed_thresholds(counts, level=level, confidence=confidence)
     moved = counts.differences != 0
     given = same_different_answers(answers)
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
@@ -70,6 +73,8 @@ def analyse_jnd(
         "published": published,
         "model": fitted if isinstance(fitted, ModelFit) else None,
         "model_note": fitted.note if isinstance(fitted, ModelFit) else fitted,
+        "mixed": mixed if isinstance(mixed, MixedThresholds) else None,
+        "mixed_note": mixed.note if isinstance(mixed, MixedThresholds) else mixed,
         "d_prime": d_prime_table(counts, confidence),
         "clustering": estimates.clustering(counts.different[:, moved].sum(axis=1), counts.shown[:, moved].sum(axis=1)),
         "motions": _by_motion(given, level, confidence, resamples, rng),
@@ -81,16 +86,21 @@ def analyse_jnd(
         ),
         "profile": profile_intervals(counts, level, confidence),
     }
-    return {**dict(estimates.plain(result)), "answer": in_words(published, fitted, level)}
+    return {**dict(estimates.plain(result)), "answer": in_words(published, fitted, mixed, level)}
 
 
-def in_words(published: Mapping[str, Threshold], fitted: ModelFit | str, level: float) -> str:
-    """Return the thresholds in two sentences: as published, and corrected."""
+def in_words(
+    published: Mapping[str, Threshold], fitted: ModelFit | str, mixed: MixedThresholds | str, level: float
+) -> str:
+    """Return the thresholds in sentences: as published, corrected, and those of the median observer."""
     first = f"Read off straight lines, as published, {100 * level:.0f}% of the answers are “different” at "
     first += _sides_in_words(published)
     if isinstance(fitted, str):
         return f"{first}. No model was fitted: {fitted}."
-    return f"{first}. By the differencing model the just noticeable difference is {_sides_in_words(fitted.jnd)}."
+    text = f"{first}. By the differencing model the just noticeable difference is {_sides_in_words(fitted.jnd)}."
+    if isinstance(mixed, str):
+        return text
+    return f"{text} That is the group's; the median observer's is {_sides_in_words(mixed.typical)}."
 
 
 def _sides_in_words(thresholds: Mapping[str, Threshold]) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study.analysis.estimates import Interval
-from study.analysis.posterior_grid import Grid, evaluate, posterior_range
+from study.analysis.posterior_grid import OVERDISPERSION_EDGES, Grid, evaluate, posterior_range
 from study.analysis.sigmoids import Sigmoid, sigmoid_named
 from study.errors import AnalysisError
 
@@ -63,7 +63,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter: posterior mean and marginal interval; None where the data don't tell."""
+    """A parameter: posterior median and marginal interval; None where the data don't tell."""
 
     value: float | None
     interval: Interval
@@ -201,7 +201,8 @@ def fit_psychometric(
     -----
     Priors: flat for thresholds within the levels, falling to none half their range outside; flat for the logarithm of
     the width from half the smallest step between levels to the whole range, falling to none at a quarter and at four
-    times; Beta(1, 10) for lapse and guess rate, Beta(1, 25) for overdispersion.
+    times; Beta(1, 20) for the lapse rate, Beta(1, 10) for the guess rate, Beta(1, 40) for overdispersion. Estimates are
+    medians, which mean the same on a level and on its logarithm.
 
     Examples
     --------
@@ -263,22 +264,26 @@ def _caution(data: Data) -> str:
 
 
 def _estimate(grid: Grid, place: int, confidence: float, name: str) -> Estimate:
-    """Posterior mean and marginal interval of one axis of the grid."""
+    """Posterior median and marginal interval of one axis of the grid."""
     nodes, mass = grid.nodes[place], grid.marginals[place]
     if len(nodes) == 1:
         value = float(nodes[0])
         return Estimate(value, Interval(value, value, confidence))
-    low, high = quantiles(nodes, mass, ((1 - confidence) / 2, (1 + confidence) / 2))
-    mean = float((nodes * mass).sum())
+    edges = OVERDISPERSION_EDGES if name == "overdispersion" else even_edges(nodes)
+    low, median, high = quantiles(edges, mass, ((1 - confidence) / 2, 0.5, (1 + confidence) / 2))
     ends = (None if grid.open_ends[place][0] else low, None if grid.open_ends[place][1] else high)
     note = f"the data leave the {name} open on one side" if None in ends else ""
-    return Estimate(mean, Interval(*ends, confidence), note=note)
+    return Estimate(median, Interval(*ends, confidence), note=note)
 
 
-def quantiles(nodes: FloatArray, mass: FloatArray, shares: Sequence[float]) -> list[float]:
-    """Return quantiles of a distribution given by the mass around evenly spaced nodes."""
+def even_edges(nodes: FloatArray) -> FloatArray:
+    """Return the edges of the cells around evenly spaced nodes."""
     step = nodes[1] - nodes[0]
-    edges = np.concatenate([[nodes[0] - step / 2], nodes + step / 2])
+    return np.concatenate([[nodes[0] - step / 2], nodes + step / 2])
+
+
+def quantiles(edges: FloatArray, mass: FloatArray, shares: Sequence[float]) -> list[float]:
+    """Return quantiles of a distribution given by the mass between edges."""
     cumulated = np.concatenate([[0.0], np.cumsum(mass)])
     return [float(value) for value in np.interp(shares, cumulated / cumulated[-1], edges)]
 

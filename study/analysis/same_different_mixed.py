@@ -29,7 +29,7 @@ FARTHEST_SCORE = 4.2
 COARSEST_STEP = 0.35
 LARGEST_SPREAD = 1.5
 ALIKE = 1e-3
-METHOD = "mixed differencing model; Student interval of the logarithm, participants less one"
+METHOD = "mixed differencing model; Student interval of the logarithm"
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,6 @@ def _thresholds(
     confidence: float,
 ) -> dict[str, Threshold]:
     """Thresholds of the people on the grid; one person there is the median observer."""
-    times = estimates.t_quantile(confidence, len(people.shown) - 1)
     result: dict[str, Threshold] = {}
     for place, side in enumerate(sides):
         largest, nothing = float(people.frames[:, place].max()), estimates.Interval(None, None, confidence)
@@ -270,12 +269,12 @@ def _thresholds(
             note = f"{100 * level:g}% is not crossed: false alarms lie above it, or lapses keep the curve below it"
             result[side] = Threshold(side, None, None, nothing, "not estimable", METHOD, note)
             continue
-        found, variance = math.exp(log_found), float(gradient @ covariance @ gradient)
+        found, (variance, freedom) = math.exp(log_found), _variance(point, covariance, gradient, len(people.shown))
         if not variance > 0:
             note = "the answers do not tell how sure this is"
             result[side] = Threshold(side, found, None, nothing, "reached", METHOD, note)
             continue
-        error = math.sqrt(variance)
+        error, times = math.sqrt(variance), estimates.t_quantile(confidence, freedom)
         low, high = found * math.exp(-times * error), found * math.exp(min(times * error, 50.0))
         interval = estimates.Interval(min(low, largest), high if high <= largest else None, confidence)
         if found > largest:
@@ -285,6 +284,25 @@ def _thresholds(
         note = "" if interval.high is not None else f"the interval reaches beyond the levels shown ({largest:g} frames)"
         result[side] = Threshold(side, found, found * error, interval, "reached", METHOD, note)
     return result
+
+
+def _variance(
+    point: FloatArray, covariance: FloatArray, gradient: FloatArray, participants: int
+) -> tuple[float, float]:
+    """Variance of the log threshold, and its degrees of freedom.
+
+    The part that comes from people's differing rests on as many of them as there are, less one; the part that comes
+    from single answers rests on many (Satterthwaite 1946). Maximum likelihood takes the first part too small by one
+    participant, as it does every variance.
+    """
+    variance = float(gradient @ covariance @ gradient)
+    between = float(point[-2] ** 2 + (gradient[0] * point[-1]) ** 2) / participants
+    between *= participants / (participants - 1)
+    variance += between / participants
+    if not variance > 0:
+        return 0.0, math.inf
+    part = min(between / variance, 1.0)
+    return variance, (participants - 1) / max(part, 1e-3) ** 2
 
 
 def _alike_probability(ratio: float) -> float:

@@ -1,0 +1,163 @@
+"""The mixed differencing model: the median observer is found where one curve for all is bent, and doubt is said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import dblquad
+from scipy.stats import binom, norm
+
+from study.analysis.jnd import analyse_jnd
+from study.analysis.same_different import Counts, count_answers
+from study.analysis.same_different_mixed import MixedThresholds, fit_mixed_thresholds
+from study.analysis.same_different_model import ModelFit, fit_model
+
+LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
+
+
+def share_of(scale: float, criterion: float, lapse: float = 0.02) -> np.ndarray:
+    """P("different") where d-prime a frame is 0.4 times `scale` for shorter, 0.45 times `scale` for longer."""
+    delta = scale * np.where(LEVELS < 0, -0.4 * LEVELS, 0.45 * LEVELS)
+    far = norm.sf(criterion, delta, np.sqrt(2)) + norm.cdf(-criterion, delta, np.sqrt(2))
+    return lapse / 2 + (1 - lapse) * far
+
+
+def crossing(slope: float, criterion: float = 2.0, lapse: float = 0.02) -> float:
+    """Where the curve of one observer crosses 75%, by a fine grid."""
+    frames = np.linspace(0, 20, 200001)
+    far = norm.sf(criterion, slope * frames, np.sqrt(2)) + norm.cdf(-criterion, slope * frames, np.sqrt(2))
+    return float(np.interp(0.75, lapse / 2 + (1 - lapse) * far, frames))
+
+
+def people(rng: np.random.Generator, count: int, spread: float, answers: int) -> Counts:
+    shares = [share_of(np.exp(spread * rng.normal()), 2.0 * np.exp(0.1 * rng.normal())) for _ in range(count)]
+    different = rng.binomial(answers, shares).astype(float)
+    names = tuple(f"p{place}" for place in range(count))
+    return Counts(names, LEVELS, different, np.full(different.shape, float(answers)))
+
+
+def fitted(counts: Counts) -> MixedThresholds:
+    found = fit_mixed_thresholds(counts)
+    assert isinstance(found, MixedThresholds), found
+    return found
+
+
+def test_the_median_observer_is_found_where_people_differ() -> None:
+    found = fitted(people(np.random.default_rng(3), 400, 0.35, 30))
+    assert found.sensitivity_spread == pytest.approx(0.35, abs=0.04)
+    assert found.criterion_spread == pytest.approx(0.1, abs=0.04)
+    for side, slope in (("shorter", 0.4), ("longer", 0.45)):
+        threshold = found.typical[side]
+        assert threshold.frames == pytest.approx(crossing(slope), rel=0.04)
+        assert (found.population[side].frames or 0) > (threshold.frames or 0)
+    assert found.alike_p_value < 1e-6
+
+
+def test_the_population_is_where_percentages_cross_and_one_curve_lies_further_out() -> None:
+    """Against the mean of many observers' curves, which the model does not see."""
+    rng = np.random.default_rng(4)
+    counts = people(rng, 600, 0.4, 40)
+    found, one = fitted(counts), fit_model(counts)
+    assert isinstance(one, ModelFit)
+    scales = np.exp(0.4 * rng.normal(size=4000))
+    criteria = 2.0 * np.exp(0.1 * rng.normal(size=4000))
+    frames = np.linspace(3, 12, 91)
+    delta = 0.45 * frames * scales[:, None]
+    far = norm.sf(criteria[:, None], delta, 2**0.5) + norm.cdf(-criteria[:, None], delta, 2**0.5)
+    truth = float(np.interp(0.75, 0.01 + 0.98 * far.mean(axis=0), frames))
+    assert found.population["longer"].frames == pytest.approx(truth, rel=0.03)
+    assert (one.jnd["longer"].frames or 0) > (found.typical["longer"].frames or 0)
+
+
+def test_the_marginal_likelihood_is_the_integral() -> None:
+    """Three participants, by adaptive quadrature over both standard scores."""
+    counts = people(np.random.default_rng(5), 3, 0.3, 12)
+    found = fitted(counts)
+    slopes = {}
+    for side in ("shorter", "longer"):
+        frames = found.typical[side].frames
+        assert frames is not None
+        low, high = 0.01, 5.0
+        while high - low > 1e-10:
+            middle = (low + high) / 2
+            low, high = (middle, high) if crossing_at(frames, middle, found) < 0.75 else (low, middle)
+        slopes[side] = low
+    total = 0.0
+    for person in range(3):
+
+        def weighted(first: float, second: float, person: int = person) -> float:
+            factor = np.exp(found.sensitivity_spread * first)
+            criterion = found.criterion * np.exp(found.criterion_spread * second)
+            delta = factor * np.where(LEVELS < 0, -slopes["shorter"] * LEVELS, slopes["longer"] * LEVELS)
+            far = norm.sf(criterion, delta, 2**0.5) + norm.cdf(-criterion, delta, 2**0.5)
+            share = found.lapse / 2 + (1 - found.lapse) * far
+            logs = binom.logpmf(counts.different[person], counts.shown[person], share)
+            return float(np.exp(logs.sum()) * norm.pdf(first) * norm.pdf(second))
+
+        total += np.log(dblquad(weighted, -5, 5, -5, 5, epsabs=1e-12, epsrel=1e-5)[0])
+        total -= binom.logpmf(counts.different[person], counts.shown[person], 0.5).sum()
+        total += np.log(0.5) * counts.shown[person].sum()
+    assert found.log_likelihood == pytest.approx(total, abs=2e-3)
+
+
+def crossing_at(frames: float, slope: float, found: MixedThresholds) -> float:
+    far = norm.sf(found.criterion, slope * frames, 2**0.5) + norm.cdf(-found.criterion, slope * frames, 2**0.5)
+    return float(found.lapse / 2 + (1 - found.lapse) * far)
+
+
+def test_people_who_are_alike_are_not_told_apart() -> None:
+    found = fitted(people_alike(np.random.default_rng(6), 20))
+    assert found.alike_p_value > 0.05
+    for side in ("shorter", "longer"):
+        typical, population = found.typical[side].frames, found.population[side].frames
+        assert typical == pytest.approx(population, rel=0.02)
+
+
+def people_alike(rng: np.random.Generator, count: int) -> Counts:
+    different = rng.binomial(6, np.tile(share_of(1.0, 2.0), (count, 1))).astype(float)
+    return Counts(tuple(map(str, range(count))), LEVELS, different, np.full(different.shape, 6.0))
+
+
+def test_order_of_participants_and_empty_rows_do_not_matter() -> None:
+    counts = people(np.random.default_rng(7), 6, 0.3, 8)
+    turned = replace(counts, different=counts.different[::-1], shown=counts.shown[::-1])
+    idle = Counts(
+        (*counts.participants, "idle"),
+        LEVELS,
+        np.vstack([counts.different, np.zeros(7)]),
+        np.vstack([counts.shown, np.zeros(7)]),
+    )
+    first = fitted(counts).typical["longer"]
+    for other in (turned, idle):
+        assert fitted(other).typical["longer"].frames == pytest.approx(first.frames, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("counts", "says"),
+    [
+        (people_alike(np.random.default_rng(1), 2), "2 participants are too few"),
+        (replace(people_alike(np.random.default_rng(1), 5), different=np.zeros((5, 7))), 'every answer was "same"'),
+        (replace(people_alike(np.random.default_rng(1), 5), differences=LEVELS + 1), "no pairs without a difference"),
+        (Counts((), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))), "no answers"),
+    ],
+    ids=["two people", "all the same", "no zero", "nobody"],
+)
+def test_what_cannot_be_estimated_is_said(counts: Counts, says: str) -> None:
+    found = fit_mixed_thresholds(counts)
+    assert isinstance(found, str)
+    assert says in found
+
+
+def test_a_study_reports_the_median_observer(same_different_study: Callable[..., pd.DataFrame]) -> None:
+    answers = same_different_study(np.random.default_rng(8), participants=10, spread=0.3)
+    result = analyse_jnd(answers, resamples=50)
+    expected = fitted(count_answers(answers))
+    assert result["mixed"]["typical"]["longer"]["frames"] == pytest.approx(expected.typical["longer"].frames)
+    assert "the median observer's is k +" in result["answer"]
+    alone = analyse_jnd(answers[answers["participant"] == "p00"], resamples=50)
+    assert alone["mixed"] is None
+    assert "too few to tell how people differ" in alone["mixed_note"]
