@@ -19,6 +19,11 @@ FILMS = "/films"
 Films = Mapping[str, Mapping[str, int]]
 
 
+def session_name(participant: Participant) -> str:
+    """What a page keeps unsent answers under, so that on a shared computer nobody's are sent as another's."""
+    return hmac.digest(participant.secret.encode(), b"session", "sha256").hex()[:16]
+
+
 def film_name(participant: Participant, step: Step) -> str:
     """The name of a film in one showing: unguessable, and different for every place, trial and attempt."""
     place = f"{step.kind}/{step.study}/{step.trial}/{step.attempt}/{step.stimulus}"
