@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import html
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -56,7 +57,7 @@ def make_app(host: Host) -> Limits:
         Route("/api/study", study, methods=["GET"]),
         Route("/films/{name:str}.mp4", _guarded(film), methods=["GET"]),
         *researcher_routes(host, _guarded),
-        *_pages(),
+        *_pages(host),
     ]
     pages = Starlette(routes=routes, lifespan=_lifespan(host))
     # It would send people to an address made from the request's Host header.
@@ -115,13 +116,18 @@ def _about(host: Host) -> dict[str, Any]:
     }
 
 
-def _pages() -> list[Route]:
+def _pages(host: Host) -> list[Route]:
     """The files of the pages folder, read once: no path of a request ever reaches the file system."""
     routes = []
+    # A page has its language and its name before any script runs.
+    words = {b"{language}": host.protocol.language, b"{title}": host.protocol.title}
     for file in sorted(PAGES.iterdir()):
         if file.suffix not in TYPES:
             continue
-        response = _page(file.read_bytes(), TYPES[file.suffix])
+        content = file.read_bytes()
+        for slot, word in words.items() if file.suffix == ".html" else ():
+            content = content.replace(slot, html.escape(word).encode())
+        response = _page(content, TYPES[file.suffix])
         path = {"index": "/", "researcher": "/researcher", "withdraw": "/withdraw"}.get(file.stem)
         routes.append(Route(path if path and file.suffix == ".html" else f"/pages/{file.name}", response))
     return routes
