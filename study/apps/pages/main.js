@@ -86,8 +86,6 @@ async function run(study) {
 async function start() {
   const study = await getStudy();
   status("");
-  document.documentElement.lang = study.language;
-  document.title = study.title;
   if (study.background) document.documentElement.style.setProperty("--stage", study.background);
   if (!study.touch && window.matchMedia("(pointer: coarse)").matches) {
     screens.notice(study.texts.no_touch);

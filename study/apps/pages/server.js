@@ -1,9 +1,10 @@
 // Talking to the server: one message at a time, kept until it is acknowledged.
-// What must not get lost waits in sessionStorage, so it survives a reload; it is sent again until the server has it.
+// What must not get lost waits in localStorage, under its session's name, so that it survives a reload and a closed tab; it
+// is sent again until the server has it.
 
 import { sleep, status } from "./dom.js";
 
-const KEPT = "segue-kept";
+const KEPT = "segue-kept-"; // and the session's name: on a shared computer nobody's answer is sent as another's
 const FIRST_WAIT_MS = 400;
 const LONGEST_WAIT_MS = 4000;
 const TIMEOUT_MS = 15000;
@@ -17,9 +18,11 @@ export class Refused extends Error {
   }
 }
 
-function storage(action) {
+let session = "";
+
+function storage(action, where = "localStorage") {
   try {
-    return action(window.sessionStorage);
+    return action(window[where]);
   } catch {
     return null; // switched off: the message is kept in memory alone
   }
@@ -55,23 +58,24 @@ async function insist(path, body, waitingText) {
 }
 
 export async function send(path, body, waitingText) {
-  storage((kept) => kept.setItem(KEPT, JSON.stringify({ path, body })));
+  storage((kept) => kept.setItem(KEPT + session, JSON.stringify({ path, body })));
   const { content, waited } = await insist(path, body, waitingText);
-  storage((kept) => kept.removeItem(KEPT));
+  storage((kept) => kept.removeItem(KEPT + session));
   if (waited > 0) tell("waited", { times: waited });
   return content;
 }
 
 export async function begin(body, waitingText) {
-  const previous = storage((kept) => kept.getItem("segue-page")) ?? "";
+  const previous = storage((tab) => tab.getItem("segue-page"), "sessionStorage") ?? "";
   const { content } = await insist("/api/begin", { ...body, page, previous }, waitingText);
-  if (content.kind !== "elsewhere") storage((kept) => kept.setItem("segue-page", page));
+  if (content.kind !== "elsewhere") storage((tab) => tab.setItem("segue-page", page), "sessionStorage");
+  session = content.session ?? "";
   return content;
 }
 
-// What an earlier page of this tab could not send any more; null where there is nothing.
+// What an earlier page of this session could not send any more; null where there is nothing.
 export async function sendKept(waitingText) {
-  const kept = storage((store) => JSON.parse(store.getItem(KEPT)));
+  const kept = storage((store) => JSON.parse(store.getItem(KEPT + session)));
   if (!kept) return null;
   let content = null;
   try {
@@ -79,11 +83,11 @@ export async function sendKept(waitingText) {
   } catch (error) {
     if (!(error instanceof Refused)) throw error; // the session went on without it
   }
-  storage((store) => store.removeItem(KEPT));
+  storage((store) => store.removeItem(KEPT + session));
   return content;
 }
 
-export const hasKept = () => storage((kept) => kept.getItem(KEPT)) !== null;
+export const hasKept = () => storage((kept) => kept.getItem(KEPT + session)) !== null;
 
 // Tells of something that happened; lost where the server can't be reached, and nothing waits for it.
 export function tell(kind, detail = {}) {
@@ -112,7 +116,7 @@ export async function study() {
     } catch {
       // not there yet
     }
-    status("Connecting …");
+    status("…"); // words come with the study
     await sleep(1000);
   }
 }

@@ -13,8 +13,7 @@ async function withdraw(code) {
 }
 
 const study = await getStudy();
-document.documentElement.lang = study.language;
-document.title = study.texts.withdraw;
+document.title = `${study.texts.withdraw} · ${study.title}`;
 const code = element("input", { id: "code", type: "text", autocomplete: "off", spellcheck: "false", maxlength: "60", required: true });
 const form = element(
   "form",

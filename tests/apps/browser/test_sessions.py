@@ -8,7 +8,7 @@ import time
 import pytest
 import sqlalchemy as sa
 from serving import QUESTIONS, TOKEN
-from walking import LOOK, QUESTION, ROLES, answers, go_on, happened, press, read_on, to_question
+from walking import KEPT, LOOK, QUESTION, ROLES, answers, go_on, happened, press, read_on, to_question
 
 from study.experiment.response_tables import presentations
 from study.experiment.responses import answers_frame
@@ -74,9 +74,9 @@ def test_a_restarted_server_gets_the_answer_that_waited(make_site, make_tab):
     site.stop()
     press(tab, keys=True)
     tab.wait_text("The connection is interrupted")
-    assert tab.run("sessionStorage.getItem('segue-kept') !== null")
+    assert tab.run(KEPT)
     site.start()
-    tab.wait("sessionStorage.getItem('segue-kept') === null")
+    tab.wait(f"!({KEPT})")
     go_on(tab)
     table = answers(site)
     assert len(table) == QUESTIONS
@@ -91,11 +91,11 @@ def test_an_answer_waits_through_a_reload_of_the_page(make_site, make_tab):
     to_question(tab)
     tab.call("Network.setBlockedURLs", urls=["*/api/answer"])
     press(tab, keys=True)
-    tab.wait("sessionStorage.getItem('segue-kept') !== null")
+    tab.wait(KEPT)
     assert len(answers(site)) == 0
     tab.call("Network.setBlockedURLs", urls=[])
     tab.reload()
-    tab.wait("sessionStorage.getItem('segue-kept') === null")
+    tab.wait(f"!({KEPT})")
     assert len(answers(site)) == 1
     go_on(tab)
     assert len(answers(site)) == QUESTIONS
@@ -181,7 +181,7 @@ def test_only_legal_keys_count(make_site, make_tab):
     assert len(answers(site)) == 0
     tab.key("d")
     tab.wait(f"!({QUESTION})")
-    tab.wait("sessionStorage.getItem('segue-kept') === null")
+    tab.wait(f"!({KEPT})")
     assert list(answers(site)["answer"]) == ["different"]
 
 
@@ -261,7 +261,7 @@ def test_reaction_times_are_those_of_the_keys(make_site, make_tab):
         injected.append(time.time())
         tab.key(option)
         tab.wait(f"!({QUESTION})", every=0.02)
-    tab.wait("sessionStorage.getItem('segue-kept') === null")
+    tab.wait(f"!({KEPT})")
     with site.responses.engine.connect() as connection:
         rows = connection.execute(sa.select(presentations.c.detail_json).distinct()).scalars().all()
     details = [json.loads(row) for row in rows]

@@ -14,6 +14,9 @@ ROLES = ("trial", "practice", "check")
 END = "That was all"
 QUESTION = "document.querySelectorAll('button.answer:not(:disabled)').length > 0"
 
+# Whether a message waits in the page's storage.
+KEPT = "Object.keys(localStorage).some((name) => name.startsWith('segue-kept-'))"
+
 # What is on the screen, as one word that changes with every step.
 LOOK = """(() => {
   const main = document.getElementById('main');
