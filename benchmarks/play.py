@@ -185,7 +185,7 @@ def measure(trials: int, full_screen: bool) -> dict[str, Any]:
         window.paint = paint_and_inject  # type: ignore[method-assign]
         session = open_session(protocol, plan)
         with suppress(Done):
-            play(window, session, stimuli.stimulus, store, page_look(stimuli, None))
+            play(window, session, stimuli.stimulus, store, page_look(stimuli, session, None))
         display = window.describe()
     injected_s, came_s = injector.times(), peer.times()
     keys = key_summary(np.array(store.answered_s), came_s[:, 0], injected_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from study.experiment.plan import Plan
     from study.experiment.protocol import Protocol
     from study.experiment.responses import Responses
+    from study.experiment.session import Session
     from study.experiment.stimulus_set import StimulusSet
 
 
@@ -124,7 +126,7 @@ def _sit(
     session = open_session(protocol, plan, answers, passed=passed)
     if answers:
         say(f"{plan.participant} goes on after {len(answers)} answers.")
-    look, size = page_look(stimuli, place.font), place.window_size
+    look, size = page_look(stimuli, session, place.font), place.window_size
     take_precedence()
     with open_window(
         protocol.title, full_screen=size is None, size=size or (1280, 800), monitor=place.monitor
@@ -133,11 +135,24 @@ def _sit(
         return play(window, session, stimuli.stimulus, store, look, fill=place.fill, say=say), window.describe()
 
 
-def page_look(stimuli: StimulusSet, font: Path | None) -> Look:
-    """Pages in the colours of the stimuli's background."""
-    from study.apps.player.pages import Look, default_font
+def page_look(stimuli: StimulusSet, session: Session, font: Path | None) -> Look:
+    """Pages in the colours of the stimuli's background, in fonts that have all letters of the session's texts."""
+    from study.apps.player.lettering import fonts_for
+    from study.apps.player.pages import Look
 
-    return Look(stimuli.stimuli[0].figure.background, font or default_font())
+    protocol = session.protocol
+    parts = protocol.model_dump(include={"title", "consent", "form", "texts", "studies"})
+    texts = [*_strings(parts), *(step.text for step in session.steps)]
+    return Look(stimuli.stimuli[0].figure.background, fonts_for(texts, font))
+
+
+def _strings(data: Any) -> Iterator[str]:
+    """All texts in nested lists and tables."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict | list | tuple):
+        for one in data.values() if isinstance(data, dict) else data:
+            yield from _strings(one)
 
 
 def _tell_of_timing(window: Window) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Typed
 from study.apps.player import screens
 from study.apps.player.display import Display
-from study.apps.player.pages import Button, DrawnPage, Look, Page, draw_page, moved
+from study.apps.player.pages import Button, DrawnPage, Look, Page, moved
+from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing
 from study.apps.player.store import Store
 from study.errors import SessionError
@@ -131,16 +132,33 @@ class Desk:
                 elif isinstance(event, Resized):
                     drawn, _ = self.show_page(drawn.page)
 
-    def field(self, field: FormField) -> str:
-        """Ask one question of the form until what is filled in can be taken; empty where it was skipped."""
+    def field(self, field: FormField, before: str, *, first: bool) -> str | None:
+        """Ask one question of the form until what is filled in can be taken.
+
+        Parameters
+        ----------
+        before
+            What was filled in when this question was asked the last time.
+        first
+            Whether no question comes before it.
+
+        Returns
+        -------
+        str or None
+            Empty where it was skipped; None where the participant goes back.
+        """
         if field.kind == "choice":
-            name = self.read_until(screens.field_page(self.protocol, field, "", False))
+            name = self.read_until(screens.field_page(self.protocol, field, before, first=first))
+            if name == "back":
+                return None
             return "" if name == "go-on" else field.choices[int(name.removeprefix("choice-")) - 1]
-        entry, complaint = "", False
-        drawn, _ = self.show_page(screens.field_page(self.protocol, field, entry, complaint))
+        entry, complaint = before, False
+        drawn, _ = self.show_page(screens.field_page(self.protocol, field, entry, first=first))
         while True:
             for event in self.window.wait(None):
                 button = chosen(drawn, event)
+                if button is not None and button.name == "back":
+                    return None
                 if button is not None:
                     try:
                         return sitting.field_value(field, entry.strip())
@@ -154,7 +172,8 @@ class Desk:
                     self.ask_to_stop()
                 elif not isinstance(event, Resized):
                     continue
-                drawn, _ = self.show_page(screens.field_page(self.protocol, field, entry, complaint))
+                page = screens.field_page(self.protocol, field, entry, first=first, complaint=complaint)
+                drawn, _ = self.show_page(page)
 
 
 def chosen(drawn: DrawnPage, event: Event) -> Button | None:

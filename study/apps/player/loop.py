@@ -19,7 +19,8 @@ from study.apps.player import screens
 from study.apps.player.calm import calm, settled
 from study.apps.player.desk import Desk, Stopped
 from study.apps.player.display import Display
-from study.apps.player.pages import Look, draw_page
+from study.apps.player.pages import Look
+from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, frame_at
 from study.apps.player.store import Store
 from study.experiment import session as sitting
@@ -148,7 +149,15 @@ class _Player(Desk):
     # The form, one question at a time
 
     def _form(self) -> None:
-        values = {field.name: self.field(field) for field in self.protocol.form}
+        fields, values, number = self.protocol.form, dict[str, str](), 0
+        while number < len(fields):
+            name = fields[number].name
+            value = self.field(fields[number], values.get(name, ""), first=number == 0)
+            if value is None:
+                number -= 1
+            else:
+                values[name] = value
+                number += 1
         self.session, taken = sitting.filled(self.session, values)
         self.store.form(taken)
 

@@ -48,9 +48,20 @@ def answer_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Pa
     return _with_progress(protocol, page, progress, step.role != "practice")
 
 
-def field_page(protocol: Protocol, field: FormField, entry: str, complaint: bool) -> Page:
-    """One question of the form; `complaint` where what was typed can't be taken."""
+def field_page(protocol: Protocol, field: FormField, entry: str, *, first: bool, complaint: bool = False) -> Page:
+    """One question of the form.
+
+    Parameters
+    ----------
+    entry
+        What is filled in so far.
+    first
+        Whether no question comes before it, so that there is no way back.
+    complaint
+        Whether what was typed can't be taken.
+    """
     texts = protocol.texts
+    back = None if first else Button("back", texts.previous, "up", "↑")
     if field.kind == "choice":
         buttons = [
             Button(f"choice-{number}", choice, str(number) if number <= 9 else "", str(number) if number <= 9 else "")
@@ -58,13 +69,14 @@ def field_page(protocol: Protocol, field: FormField, entry: str, complaint: bool
         ]
         if not field.required:
             buttons.append(Button("go-on", texts.skip, "0", "0"))
-        return Page("", field.label, tuple(buttons), note=texts.form)
+        before = field.choices.index(entry) if entry in field.choices else -1
+        return Page("", field.label, tuple(buttons), note=texts.form, chosen=before, back=back)
     words = texts.go_on if entry or field.required else texts.skip
     hint = _range(field)
     if complaint:
         hint = f"{texts.not_taken} {hint}".strip()
     button = Button("go-on", words, "enter", texts.enter_key)
-    return Page("", field.label, (button,), note=texts.form, entry=entry, hint=hint)
+    return Page("", field.label, (button,), note=texts.form, entry=entry, hint=hint, back=back)
 
 
 def _range(field: FormField) -> str:

@@ -1,5 +1,6 @@
 """Store: where a player's answers and events go, each committed before the player goes on.
 
+A database that goes away for a moment (a server that is started again) is waited for: nobody loses a sitting to it.
 Nothing is written before `begin`, which the player calls once the participant has agreed to take part (at once where
 nobody is asked): who declines leaves nothing behind.
 """
@@ -10,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from typing import Protocol as Shape
 
+from study.experiment.databases import patiently
 from study.experiment.plan import Plan
 from study.experiment.protocol import Protocol
 from study.experiment.responses import (
@@ -67,8 +69,11 @@ class ResponsesStore:
         """Write the session down, or take up the one that there is, with the events that waited for it."""
         if self._record is not None:
             return
-        self._record = begin_session(
-            self._responses, self._protocol, self._plan, library=self._library, library_synthetic=self._synthetic
+        self._record = patiently(
+            lambda: begin_session(
+                self._responses, self._protocol, self._plan, library=self._library, library_synthetic=self._synthetic
+            ),
+            self._responses.place,
         )
         waiting, self._waiting = self._waiting, []
         for kind, detail in waiting:
@@ -76,18 +81,21 @@ class ResponsesStore:
 
     def answer(self, answer: Answer, shown: Sequence[Presentation]) -> None:
         """Commit an answer; it is on disk when this returns."""
-        record_answer(self._responses, self._begun(), answer, shown)
+        record = self._begun()
+        patiently(lambda: record_answer(self._responses, record, answer, shown), self._responses.place)
 
     def form(self, values: Mapping[str, str]) -> None:
         """Commit the form."""
-        record_form(self._responses, self._begun(), values)
+        record = self._begun()
+        patiently(lambda: record_form(self._responses, record, values), self._responses.place)
 
     def event(self, kind: str, detail: Mapping[str, Any] | None = None) -> None:
         """Commit an event, or keep it until the session begins."""
-        if self._record is None:
+        record = self._record
+        if record is None:
             self._waiting.append((kind, detail))
         else:
-            record_event(self._responses, self._record, kind, detail)
+            patiently(lambda: record_event(self._responses, record, kind, detail), self._responses.place)
 
     def _begun(self) -> SessionRecord:
         self.begin()

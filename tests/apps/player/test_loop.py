@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 from renderer.events import CloseAsked, Focus, Key, Resized, Typed
+from study.apps.player.lettering import default_font
 from study.apps.player.loop import Outcome, play
-from study.apps.player.pages import Look, default_font
+from study.apps.player.pages import Look
 from study.apps.player.scripted import Act, ScriptedWindow, click, press
 from study.experiment.session import open_session
 
-LOOK = Look((222, 223, 225), default_font())
+LOOK = Look((222, 223, 225), (default_font(),))
 GO = press("space")
 
 
@@ -174,8 +175,8 @@ def test_ratings_take_digits_arrows_and_the_mouse(make_small: Any, store: Any, t
 
 
 def test_buttons_can_be_clicked(make_small: Any, store: Any) -> None:
-    from study.apps.player.pages import draw_page
     from study.apps.player.screens import answer_page
+    from study.apps.player.sheet import draw_page
     from study.experiment.session import advanced, current
 
     small = make_small()
@@ -210,6 +211,37 @@ def test_consent_and_form_come_first(make_small: Any, store: Any, texts: Any) ->
     assert store.all("form") == [{"age": "18", "vision": "with glasses"}]
 
 
+def test_the_form_leads_back_to_what_was_filled_in_before(make_small: Any, store: Any, texts: Any) -> None:
+    small = make_small(texts["about_you"])
+    back = press("up", 0.1)
+    script = [
+        press("1"), typed("30"), *[Act()] * 2,  # the age, drawn anew after each digit
+        press("1"), back,  # vision: yes; back from the remarks
+        press("3"),  # vision: no
+        typed("none"), *[Act()] * 4, GO, GO, *[press("s")] * 6, GO, GO,
+    ]  # fmt: skip
+    assert sit(small, ScriptedWindow(script), store).end == "finished"
+    assert store.all("form") == [{"age": "30", "vision": "no", "remarks": "none"}]
+
+
+def test_going_back_shows_what_was_chosen_and_typed(texts: Any, make_small: Any) -> None:
+    from study.apps.player.screens import field_page
+
+    small = make_small(texts["about_you"])
+    age, vision, _ = small.protocol.form
+    assert field_page(small.protocol, age, "30", first=True).entry == "30"
+    assert field_page(small.protocol, age, "30", first=True).back is None
+    chosen = field_page(small.protocol, vision, "with glasses", first=False)
+    assert chosen.chosen == 1
+    assert chosen.back is not None
+
+
+def test_enter_goes_on_wherever_the_space_bar_does(make_small: Any, store: Any) -> None:
+    enter = press("enter")
+    window = ScriptedWindow([enter] * 2 + [press("s")] * 6 + [enter] * 2)
+    assert sit(make_small(), window, store).end == "finished"
+
+
 def test_who_declines_leaves_nothing_behind(make_small: Any, store: Any, texts: Any) -> None:
     window = ScriptedWindow([press("2"), GO])
     assert sit(make_small(texts["about_you"]), window, store).end == "declined"
@@ -229,9 +261,9 @@ def test_an_example_plays_and_counts_for_nothing(make_small: Any, store: Any) ->
 
 def test_practice_gets_feedback(make_small: Any, store: Any) -> None:
     small = make_small("", ("example = false\n", "example = false\npractice = 1\n"))
-    window = ScriptedWindow([GO, GO, press("s"), GO, *[press("s")] * 6, GO, GO])
+    window = ScriptedWindow([GO, GO, press("s"), GO, GO, *[press("s")] * 6, GO, GO])
     assert sit(small, window, store).end == "finished"
-    assert len(store.all("answer")) == 7
+    assert len(store.all("answer")) == 7  # after the practice stands a page that says so
 
 
 def test_an_own_clock_says_that_it_measured_nothing(make_small: Any, store: Any) -> None:

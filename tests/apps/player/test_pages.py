@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.apps.player.pages import Button, Look, Page, default_font, draw_page, moved
+from study.apps.player.lettering import default_font
+from study.apps.player.pages import Button, Look, Page, moved
+from study.apps.player.sheet import draw_page
 from study.errors import SessionError
 
-LIGHT = Look((222, 223, 225), default_font())
-DARK = Look((20, 22, 26), default_font())
+LIGHT = Look((222, 223, 225), (default_font(),))
+DARK = Look((20, 22, 26), (default_font(),))
 TWO = (Button("same", "Same", "s", "S"), Button("different", "Different", "d", "D"))
 ASK = Page(question="Were the two motions the same or different?", buttons=TWO)
 
@@ -122,4 +124,4 @@ def test_a_font_that_is_none_is_refused(tmp_path: Path) -> None:
     broken = tmp_path / "font.ttf"
     broken.write_text("no font")
     with pytest.raises(SessionError, match=r"Expected a font file at .*font.ttf"):
-        draw_page(ASK, (640, 480), Look((0, 0, 0), broken))
+        draw_page(ASK, (640, 480), Look((0, 0, 0), (broken,)))

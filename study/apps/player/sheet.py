@@ -1,0 +1,256 @@
+"""Sheet: a page as a picture.
+
+A `Page` comes in, with the size of the window; an RGB picture and the places of its buttons go out. All sizes follow
+from the window's, so a page looks the same on a laptop and on a large screen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from study.apps.player.lettering import Face, leftwards, wrapped
+from study.apps.player.pages import Box, Button, DrawnPage, Look, Page
+from study.errors import SessionError
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+SMALLEST = (320, 240)
+"""Pages are drawn for a window of this size at least; of a smaller one they stick out."""
+
+
+def draw_page(page: Page, size: tuple[int, int], look: Look, *, must_fit: bool = False) -> DrawnPage:
+    """Draw a page for a window of `size` pixels; text too long for it is set smaller, as far as it stays legible.
+
+    Parameters
+    ----------
+    must_fit
+        Refuse a text that does not fit even then, rather than cut it.
+
+    Raises
+    ------
+    SessionError
+        With `must_fit`, for a text that is too long; and for a font that can't be read.
+    """
+    from PIL import Image, ImageDraw
+
+    width, height = size = max(size[0], SMALLEST[0]), max(size[1], SMALLEST[1])
+    base = min(height / 27.0, width / 40.0)
+    for shrink in (1.0, 0.9, 0.8, 0.7, 0.6, 0.5):
+        sheet = _Sheet(page, size, look, base, max(base * shrink, 6.0))
+        if sheet.height <= height * 0.84:
+            break
+    if must_fit and sheet.height > height * 0.84:
+        words = " ".join((page.text or page.question).split()[:8])
+        raise SessionError(
+            f"Expected a text that fits on one page of {width} x {height} pixels, found one that is too long, "
+            f"'{words} ...'; shorten it, or part it."
+        )
+    image = Image.new("RGB", size, look.ground)
+    boxes = sheet.draw(ImageDraw.Draw(image))
+    return DrawnPage(page, np.asarray(image, dtype=np.uint8), tuple(boxes))
+
+
+class _Sheet:
+    """A page at one size of text: measured first, then drawn from the top down, as blocks that stand in its middle."""
+
+    def __init__(self, page: Page, size: tuple[int, int], look: Look, base: float, em: float) -> None:
+        self.page, self.size, self.look, self.base, self.em = page, size, look, base, em
+        column = min(size[0] * 0.86, base * 33)
+        self.text = wrapped(page.text, self._font(1.0), column)
+        self.question = wrapped(page.question, self._font(1.3), column)
+        self.hint = wrapped(page.hint, self._font(0.82), column)
+        self.rows = self._button_rows(size[0] * 0.92)
+        self.parts = self._parts()
+        self.height = sum(high for _, high in self.parts) + self._gaps()
+
+    def _font(self, share: float) -> Face:
+        return Face(self.look.fonts, max(6, round(self.em * share)))
+
+    def _parts(self) -> list[tuple[str, float]]:
+        em, parts = self.em, list[tuple[str, float]]()
+        if self.text:
+            parts.append(("text", sum(1.5 * em if line else 0.75 * em for line in self.text)))
+        if self.question:
+            parts.append(("question", 1.9 * em * len(self.question)))
+        if self.page.entry is not None:
+            parts.append(("entry", 2.4 * em))
+        if self.page.hint:
+            parts.append(("hint", 1.25 * em * len(self.hint)))
+        if self.rows:
+            row = self._button_height() + 0.8 * em
+            parts.append(("buttons", row * len(self.rows) - 0.8 * em))
+        if self.page.low or self.page.high:
+            parts.append(("ends", 1.2 * em))
+        return parts
+
+    def _gaps(self) -> float:
+        return self.em * sum(self._gap(name) for name, _ in self.parts[1:])
+
+    @staticmethod
+    def _gap(name: str) -> float:
+        return {"question": 1.4, "buttons": 2.0, "ends": 0.5, "hint": 0.5}.get(name, 1.2)
+
+    def _button_height(self) -> float:
+        return self.em * (3.4 if any(button.key_words for button in self.page.buttons) else 2.4)
+
+    def _button_width(self, button: Button) -> float:
+        least, margin = (2.6, 1.2) if self._scale else (7.0, 2.0)
+        words = max(self._font(1.0).getlength(button.words), self._font(0.68).getlength(button.key_words) + self.em)
+        return max(least * self.em, words + margin * self.em)
+
+    @property
+    def _scale(self) -> bool:
+        return all(len(button.words) <= 2 for button in self.page.buttons)
+
+    def _button_rows(self, limit: float) -> list[list[tuple[int, float]]]:
+        """Numbers and widths of the buttons, row by row; all as wide as the widest, where that fits; a scale in one."""
+        widths = [self._button_width(button) for button in self.page.buttons]
+        gap, count = self._button_gap, len(widths)
+        if widths and max(widths) * count + gap * (count - 1) <= limit:
+            widths = [max(widths)] * count
+        elif self._scale:
+            return [list(enumerate([(limit - gap * (count - 1)) / count] * count))]
+        rows: list[list[tuple[int, float]]] = []
+        for number, wide in enumerate(widths):
+            used = sum(each + gap for _, each in rows[-1]) if rows else limit + 1
+            if used + wide > limit:
+                rows.append([])
+            rows[-1].append((number, wide))
+        return rows
+
+    @property
+    def _button_gap(self) -> float:
+        return self.em * ((0.7 if len(self.page.buttons) < 10 else 0.4) if self._scale else 1.6)
+
+    # Drawing
+
+    def draw(self, pen: ImageDraw) -> list[Box]:
+        """Draw it all; returns the places of the buttons."""
+        self._draw_note(pen)
+        self._draw_progress(pen)
+        back = [self._draw_back(pen)] if self.page.back is not None else []
+        top = max(self.size[1] * 0.08, (self.size[1] - self.height) * 0.46)
+        boxes: list[Box] = []
+        for index, (name, high) in enumerate(self.parts):
+            top += self.em * self._gap(name) if index else 0.0
+            if name == "text":
+                self._lines(pen, self.text, top, 1.0, 1.5, 0.92)
+            elif name == "question":
+                self._lines(pen, self.question, top, 1.3, 1.9, 1.0)
+            elif name == "entry":
+                self._draw_entry(pen, top)
+            elif name == "hint":
+                self._lines(pen, self.hint, top, 0.82, 1.25, 0.62)
+            elif name == "buttons":
+                boxes = self._draw_buttons(pen, top)
+            else:
+                self._draw_ends(pen, top, boxes)
+            top += high
+        return [*boxes, *back]
+
+    def _middle(self, pen: ImageDraw, words: str, y: float, share: float, ink: float, x: float | None = None) -> None:
+        place = (self.size[0] / 2 if x is None else x, y)
+        self._font(share).draw(pen, place, words, self.look.mix(ink))
+
+    def _lines(self, pen: ImageDraw, lines: Sequence[str], top: float, share: float, lead: float, ink: float) -> None:
+        """Paragraphs of several lines are set from a common left edge, short ones in the middle."""
+        font = self._font(share)
+        widest = max((font.getlength(line) for line in lines), default=0.0)
+        centred = len(lines) <= 2
+        y = top
+        for line in lines:
+            if not line:
+                y += 0.5 * lead * self.em
+                continue
+            at = y + 0.5 * lead * self.em
+            if centred:
+                self._middle(pen, line, at, share, ink)
+            else:
+                side, anchor = (1, "r") if leftwards(line) else (-1, "l")
+                font.draw(pen, ((self.size[0] + side * widest) / 2, at), line, self.look.mix(ink), anchor)
+            y += lead * self.em
+
+    def _draw_buttons(self, pen: ImageDraw, top: float) -> list[Box]:
+        boxes: list[Box] = []
+        high, gap = self._button_height(), self._button_gap
+        for row in self.rows:
+            left = (self.size[0] - sum(wide for _, wide in row) - gap * (len(row) - 1)) / 2
+            for number, wide in row:
+                boxes.append((left, top, left + wide, top + high))
+                self._draw_button(pen, self.page.buttons[number], boxes[-1], number == self.page.chosen)
+                left += wide + gap
+            top += high + 0.8 * self.em
+        return boxes
+
+    def _draw_button(self, pen: ImageDraw, button: Button, box: Box, chosen: bool) -> None:
+        em, (left, top, right, bottom) = self.em, box
+        pen.rounded_rectangle(
+            box,
+            radius=0.45 * em,
+            fill=self.look.raised,
+            outline=self.look.mix(0.95 if chosen else 0.38),
+            width=max(1, round(em * (0.16 if chosen else 0.06))),
+        )
+        middle = (left + right) / 2
+        if not button.key_words:
+            self._middle(pen, button.words, (top + bottom) / 2, 1.0, 1.0, middle)
+            return
+        self._middle(pen, button.words, top + 1.3 * em, 1.0, 1.0, middle)
+        half = max(0.75 * em, self._font(0.68).getlength(button.key_words) / 2 + 0.35 * em)
+        y = top + 2.55 * em
+        cap = (middle - half, y - 0.52 * em, middle + half, y + 0.52 * em)
+        pen.rounded_rectangle(cap, radius=0.2 * em, outline=self.look.mix(0.32), width=max(1, round(em * 0.05)))
+        self._middle(pen, button.key_words, y, 0.68, 0.66, middle)
+
+    def _draw_ends(self, pen: ImageDraw, top: float, boxes: Sequence[Box]) -> None:
+        """Words under the ends of a scale."""
+        left, right = min(box[0] for box in boxes), max(box[2] for box in boxes)
+        y, font, ink = top + 0.6 * self.em, self._font(0.85), self.look.mix(0.75)
+        wide = font.getlength(self.page.low) + font.getlength(self.page.high) + 2 * self.em
+        spread = max(0.0, (wide - (right - left)) / 2)
+        font.draw(pen, (left - spread, y), self.page.low, ink, "l")
+        font.draw(pen, (right + spread, y), self.page.high, ink, "r")
+
+    def _draw_entry(self, pen: ImageDraw, top: float) -> None:
+        em, middle = self.em, self.size[0] / 2
+        font, words = self._font(1.1), self.page.entry or ""
+        half = max(8 * em, font.getlength(words) / 2 + em)
+        box = (middle - half, top, middle + half, top + 2.4 * em)
+        outline, width = self.look.mix(0.6), max(1, round(em * 0.08))
+        pen.rounded_rectangle(box, radius=0.3 * em, fill=self.look.raised, outline=outline, width=width)
+        self._middle(pen, words, top + 1.2 * em, 1.1, 1.0)
+        x = middle + font.getlength(words) / 2 + 0.12 * em
+        pen.line((x, top + 0.6 * em, x, top + 1.8 * em), fill=self.look.mix(0.8), width=width)
+
+    def _draw_note(self, pen: ImageDraw) -> None:
+        if self.page.note:
+            self._middle(pen, self.page.note, 1.8 * self.base, 0.9 * self.base / self.em, 0.6)
+
+    def _draw_back(self, pen: ImageDraw) -> Box:
+        """The way back, small and in the corner, where nobody takes it for an answer."""
+        assert self.page.back is not None, "asked for only where there is one"
+        em, font, words = self.base, Face(self.look.fonts, max(6, round(0.8 * self.base))), self.page.back
+        text = f"{words.key_words}  {words.words}"
+        box = (1.2 * em, self.size[1] - 2.9 * em, 2.8 * em + font.getlength(text), self.size[1] - 1.2 * em)
+        stands = self.page.chosen == len(self.page.buttons)
+        outline, width = self.look.mix(0.95 if stands else 0.2), max(1, round(em * (0.12 if stands else 0.05)))
+        pen.rounded_rectangle(box, radius=0.35 * em, outline=outline, width=width)
+        font.draw(pen, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2), text, self.look.mix(0.7))
+        return box
+
+    def _draw_progress(self, pen: ImageDraw) -> None:
+        if self.page.progress is None:
+            return
+        done, total = self.page.progress
+        em, (width, height) = self.base, self.size
+        half, y, high = min(10 * em, 0.3 * width), height - 2.0 * em, max(2.0, 0.22 * em)
+        box = (width / 2 - half, y, width / 2 + half, y + high)
+        pen.rounded_rectangle(box, radius=high / 2, fill=self.look.mix(0.13))
+        if done:
+            part = max(high, 2 * half * done / max(total, 1))
+            pen.rounded_rectangle((box[0], y, box[0] + part, y + high), radius=high / 2, fill=self.look.mix(0.55))
+        self._middle(pen, self.page.progress_words, y - 0.9 * em, 0.72 * em / self.em, 0.55)
