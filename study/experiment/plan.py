@@ -150,7 +150,7 @@ def draw_plan(
         studies = [studies[i] for i in rng.permutation(len(studies))]
     trials: list[Trial] = []
     for study in studies:
-        own = [pair for pair in pairs if pair.study == study.name]
+        own, for_practice = _pairs_of(study, pairs)
         if not own:
             raise SessionError(
                 f"Expected pairs for the study {study.name!r}, found none; prepare this protocol's stimuli."
@@ -159,11 +159,20 @@ def draw_plan(
         for repeat in range(1, study.repeats + 1):
             shown += _draw_set(study, own, repeat, rng, group)
         # Practice and checks draw from generators of their own, so that they leave the trials as they are.
-        practice = _draw_practice(study, own, generator(seed, "practice", protocol.name, participant, study.name))
+        practice = _draw_practice(
+            study, for_practice or own, generator(seed, "practice", protocol.name, participant, study.name)
+        )
         checks = generator(seed, "checks", protocol.name, participant, study.name)
         trials += [*practice, *_with_checks(study, shown, checks)]
     numbered = tuple(replace(trial, trial=number) for number, trial in enumerate(trials, start=1))
     return Plan(protocol.name, protocol.sha256, participant, seed, group, numbered)
+
+
+def _pairs_of(study: StudySpec, pairs: Sequence[Pair]) -> tuple[list[Pair], list[Pair]]:
+    """A study's pairs: those of its trials, and those for its practice alone."""
+    own = [pair for pair in pairs if pair.study == study.name]
+    for_practice = [pair for pair in own if pair.motion in study.practice_transitions]
+    return [pair for pair in own if pair.motion not in study.practice_transitions], for_practice
 
 
 def _draw_set(
@@ -236,7 +245,7 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
     groups = 1
     for study in protocol.studies:
         if study.order == "by-group":
-            own = sum(pair.study == study.name for pair in pairs)
+            own = len(_pairs_of(study, pairs)[0])
             groups = math.lcm(groups, max(own, 1) if study.task == "rating" else 2)
     return groups
 

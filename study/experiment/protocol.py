@@ -229,6 +229,11 @@ class StudySpec(_Part):
     practice: int = Field(
         default=0, ge=0, le=100, description="Trials with feedback before the study; they count for nothing. [trials]"
     )
+    practice_transitions: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+        default=(),
+        description="Transitions for practice and the example alone, so that neither shows what the study shows; the "
+        "study's own where it is left out.",
+    )
     attention_checks: int = Field(
         default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
     )
@@ -249,6 +254,13 @@ class StudySpec(_Part):
     def methods(self) -> tuple[Method, ...]:
         """The methods whose blend lengths this study shows."""
         return (self.reference,) if self.comparison is None else (self.reference, self.comparison)
+
+    def levels_of(self, transition: str) -> tuple[int, ...]:
+        """The differences that are shown of a transition: all in trials, the plainest where it is for practice alone."""
+        levels = self.differences_frames
+        if transition not in self.practice_transitions:
+            return levels
+        return tuple(level for level in levels if level in (0, min(levels), max(levels)))
 
 
 class Exclusions(_Part):
@@ -281,6 +293,17 @@ class AnalysisSettings(_Part):
         default=0.75, gt=0, lt=1, description="Proportion that defines the just noticeable difference."
     )
     alpha: float = Field(default=0.01, gt=0, lt=1, description="Level of significance (2004 section 5.2).")
+    equivalence_points: float = Field(
+        default=10.0,
+        gt=0,
+        lt=50,
+        description="How far from an even split a preference may lie and count as none; 10 is 40 to 60%. [points]",
+    )
+    confirmatory: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+        default=(),
+        description="Studies whose tests are adjusted together (Holm) and decide; those with a preference where it is "
+        "left out. Tests of the others explore.",
+    )
     exclusions: Exclusions = Field(default=Exclusions(), description="Who and what is left out.")
 
 
@@ -292,6 +315,9 @@ class Protocol(_Part):
     source: str = Field(default="", description="Paper and section that it follows.")
     fps: float = Field(default=30.0, ge=1, le=240, description="Frame rate of every stimulus. [frames per second]")
     seed: int = Field(ge=0, description="Where all of the protocol's randomness comes from.")
+    participants: int | None = Field(
+        default=None, ge=1, le=100_000, description="How many people are to take part, fixed before there is data."
+    )
     study_order: Literal["as-listed", "random"] = Field(
         default="as-listed", description="Order of the studies in a sitting."
     )
@@ -324,8 +350,9 @@ class Protocol(_Part):
     def _consistent(self) -> Self:
         _check_names(self)
         for study in self.studies:
-            for transition in self.transitions_of(study):
+            for transition in (*self.transitions_of(study), *self.practice_of(study)):
                 _check_points(self, study, transition)
+        _check_analysis(self)
         return self
 
     @property
@@ -352,8 +379,24 @@ class Protocol(_Part):
         return _named(self.transitions, name, "transition")
 
     def transitions_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
-        """The transitions that a study shows, in its order."""
-        return tuple(self.transition(name) for name in study.transitions) if study.transitions else self.transitions
+        """The transitions that a study's trials show, in its order: without those for practice alone."""
+        if study.transitions:
+            return tuple(self.transition(name) for name in study.transitions)
+        for_practice = {name for other in self.studies for name in other.practice_transitions}
+        return tuple(transition for transition in self.transitions if transition.name not in for_practice)
+
+    def trials_of(self, study: StudySpec) -> int:
+        """How many trials of a study a participant sees, practice and attention checks apart."""
+        shown = len(self.transitions_of(study))
+        if study.task == "same-different":
+            shown *= len(study.differences_frames)
+        if study.task == "rating":
+            return shown * len(study.methods) * study.repeats
+        return shown * study.repeats * (2 if study.order == "both" else 1)
+
+    def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
+        """The transitions that a study's practice alone shows."""
+        return tuple(self.transition(name) for name in study.practice_transitions)
 
     def points_for(self, study: StudySpec, transition: TransitionSpec) -> Points:
         """The conditions for one transition in one study: the protocol's, the study's and the transition's own."""
@@ -432,13 +475,73 @@ def _check_names(protocol: Protocol) -> None:
                 raise KeyMismatchError(message, kind, index, "name")
     known = [transition.name for transition in protocol.transitions]
     for index, study in enumerate(protocol.studies):
-        where = ("studies", index, "transitions")
-        for name in study.transitions:
-            if name not in known:
-                near = get_close_matches(name, known, n=1)
-                hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-                raise KeyMismatchError(f"expected names of transitions, found {name!r}; {hint}", *where)
-        _check_once(study.transitions, "transition", *where)
+        for key in ("transitions", "practice_transitions"):
+            names = getattr(study, key)
+            _check_known(names, known, "transitions", "studies", index, key)
+            _check_once(names, "transition", "studies", index, key)
+        _check_practice(protocol, study, index)
+        _check_lengths(protocol, study, index)
+
+
+def _check_known(names: Sequence[str], known: Sequence[str], what: str, *location: int | str) -> None:
+    """Refuse names of what there is not, with the nearest one."""
+    for name in names:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            raise KeyMismatchError(f"expected names of {what}, found {name!r}; {hint}", *location)
+
+
+def _check_analysis(protocol: Protocol) -> None:
+    """Refuse decisions about the analysis that the studies can't carry out."""
+    preferences = [study.name for study in protocol.studies if study.task == "preference"]
+    names = protocol.analysis.confirmatory
+    _check_known(names, preferences, "preference studies", "analysis", "confirmatory")
+    _check_once(names, "study", "analysis", "confirmatory")
+    rules, where = protocol.analysis.exclusions, ("analysis", "exclusions")
+    if rules.most_failed_checks is not None and not any(study.attention_checks for study in protocol.studies):
+        raise KeyMismatchError(
+            "expected attention_checks in a study with this rule, found none; add some, or remove the rule",
+            *where,
+            "most_failed_checks",
+        )
+    timed = any(study.task != "rating" for study in protocol.studies)
+    if timed and rules.fastest_s is not None and rules.fastest_s >= protocol.timing.answer_s:
+        raise KeyMismatchError(
+            f"expected less than timing.answer_s, {protocol.timing.answer_s:g} s, found {rules.fastest_s:g}, which "
+            "leaves no answer; lower it",
+            *where,
+            "fastest_s",
+        )
+
+
+def _check_lengths(protocol: Protocol, study: StudySpec, index: int) -> None:
+    """Refuse more practice, or more attention checks, than a study has trials."""
+    trials = protocol.trials_of(study)
+    for key in ("practice", "attention_checks"):
+        found = getattr(study, key)
+        if found > trials:
+            raise KeyMismatchError(
+                f"expected no more than the {trials} trials of {study.name!r}, found {found}; lower it",
+                "studies",
+                index,
+                key,
+            )
+
+
+def _check_practice(protocol: Protocol, study: StudySpec, index: int) -> None:
+    """Refuse practice that shows what the study shows, and transitions for a practice that there is not."""
+    where = ("studies", index, "practice_transitions")
+    if study.practice_transitions and not study.practice:
+        raise KeyMismatchError("expected practice of one trial or more with them, found none; set practice", *where)
+    shown = protocol.transitions_of(study)
+    if not shown:
+        raise KeyMismatchError(f"expected a transition for the trials of {study.name!r}, found none but these", *where)
+    for transition in shown:
+        if transition.name in study.practice_transitions:
+            raise KeyMismatchError(
+                f"expected transitions that the trials do not show, found {transition.name!r}; name another", *where
+            )
 
 
 def _check_points(protocol: Protocol, study: StudySpec, transition: TransitionSpec) -> None:

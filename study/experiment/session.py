@@ -356,12 +356,15 @@ def _study_steps(protocol: Protocol, plan: Plan, study: StudySpec, answers: Sequ
     steps: list[Step] = []
     again: list[Step] = []
     break_after = protocol.timing.break_after
-    count = 0
+    count, practising = 0, False
     for trial in plan.trials:
         count += trial.role != "practice"
         if trial.study != study.name:
             continue
+        if practising and trial.role != "practice" and protocol.texts.practice_over:
+            steps.append(Step("instructions", study.name, protocol.texts.practice_over.strip()))
         attempt, done = _state(study, trial, [answer for answer in answers if answer.trial == trial.trial])
+        practising = trial.role == "practice" and done is not None
         if done is None:
             continue
         (again if attempt > 1 else steps).extend(_trial_steps(protocol, trial, attempt, done))

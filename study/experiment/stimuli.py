@@ -121,7 +121,7 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
     drafts: dict[_Key, _Draft] = {}
     pairs: list[_DraftPair] = []
     for study in protocol.studies:
-        for transition in protocol.transitions_of(study):
+        for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
             pairs += _draft_pairs(protocol, study, settled[study.name, transition.name], drafts, hops)
     stimuli = _with_cameras(protocol, library, drafts)
     return StimulusSet(
@@ -160,7 +160,11 @@ def _settle_all(
     protocol: Protocol, library: Library, hops: Hops, progress: Callable[[int, int], None] | None
 ) -> tuple[dict[tuple[str, str], Settled], list[str]]:
     """The points of every transition in every study, and the problems of those that have none."""
-    todo = [(study, transition) for study in protocol.studies for transition in protocol.transitions_of(study)]
+    todo = [
+        (study, transition)
+        for study in protocol.studies
+        for transition in (*protocol.transitions_of(study), *protocol.practice_of(study))
+    ]
     settled: dict[tuple[str, str], Settled] = {}
     problems: dict[str, None] = {}
     for done, (study, transition) in enumerate(todo, start=1):
@@ -198,7 +202,7 @@ def _draft_pairs(
         return key
 
     if study.task == "same-different":
-        for difference in study.differences_frames:
+        for difference in study.levels_of(settled.transition.name):
             reference = need(study.reference)
             yield _DraftPair(study, settled, reference, need(study.reference, difference), study.reference, difference)
     elif study.task == "preference":

@@ -274,3 +274,38 @@ def test_practice_is_not_repeated(with_people):
     _, answer = answered(to_question(session), "same", 1.0, shown_well=False)
     assert answer.trial == 1
     assert current(to_question(open_session(protocol, plan, [answer], passed=("consent", "form")))).trial == 2
+
+
+PRACTISING = (
+    'order = "both"',
+    'order = "both"\npractice = 2\npractice_transitions = ["still_slow"]',
+)
+
+
+@pytest.fixture
+def practising(toy_protocol, make_stimuli):
+    protocol = parse_protocol(toy_protocol.text.replace(*PRACTISING))
+    return open_session(protocol, draw_plan(protocol, make_stimuli(protocol).pairs, "p01"))
+
+
+def test_the_end_of_practice_is_said_once(practising):
+    seen = []
+    run(practising, seen=seen)
+    over = [i for i, step in enumerate(seen) if step.text == practising.protocol.texts.practice_over]
+    assert len(over) == 1
+    assert [step.role for step in seen[: over[0]] if step.trial][-1] == "practice"
+    assert (seen[over[0] + 1].kind, seen[over[0] + 1].role, seen[over[0] + 1].trial) == ("first", "trial", 3)
+    _, one = run(practising, 1)
+    for answers, said in ((one, True), (run(practising, 2)[1], False), (run(practising, 5)[1], False)):
+        again = open_session(practising.protocol, practising.plan, answers)
+        assert any(step.text == practising.protocol.texts.practice_over for step in again.steps) == said
+
+
+def test_practice_and_example_show_transitions_of_their_own(practising):
+    plan = practising.plan
+    assert [trial.motion for trial in plan.trials if trial.role == "practice"] == ["still_slow"] * 2
+    assert {trial.motion for trial in plan.trials if trial.study == "jnd" and trial.role == "trial"} == {"slow_quick"}
+    (example,) = (step for step in practising.steps if step.kind == "instructions" and step.stimulus)
+    assert example.stimulus.startswith("still_slow")
+    # Another study, which names no transitions, does not show what is kept for practice.
+    assert {trial.motion for trial in plan.trials if trial.study == "liking"} == {"slow_quick"}

@@ -50,6 +50,17 @@ def test_every_pair_has_its_stimuli(prepared):
     draw_plan(prepared.protocol, prepared.pairs, "p01")
 
 
+def test_practice_has_the_plainest_levels_of_a_transition_of_its_own(toys):
+    old = "differences_frames = [-3, 0, 5]\n"
+    new = 'differences_frames = [-3, 0, 2, 5]\npractice = 2\npractice_transitions = ["still_slow"]\n'
+    prepared = prepare(parse_protocol(TOY_PROTOCOL.replace(old, new)), toys)
+    levels = {
+        motion: [pair.difference_frames for pair in prepared.pairs if (pair.study, pair.motion) == ("jnd", motion)]
+        for motion in ("slow_quick", "still_slow")
+    }
+    assert levels == {"slow_quick": [-3, 0, 2, 5], "still_slow": [-3, 0, 5]}
+
+
 def test_levels_are_the_optimal_length_and_what_was_added(prepared):
     for pair in prepared.pairs[:3]:
         reference, comparison = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record

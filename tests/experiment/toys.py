@@ -169,7 +169,7 @@ def pairs_of(protocol: Protocol) -> tuple[Pair, ...]:
     """Pairs with made-up stimulus ids, as `prepare` would name and order them."""
     pairs = []
     for study in protocol.studies:
-        for transition in protocol.transitions_of(study):
+        for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
             base = Pair(
                 f"{study.name}/{transition.name}",
                 study.name,
@@ -182,7 +182,7 @@ def pairs_of(protocol: Protocol) -> tuple[Pair, ...]:
                 study.comparison or study.reference,
             )
             if study.task == "same-different":
-                for d in study.differences_frames:
+                for d in study.levels_of(transition.name):
                     b = f"{transition.name}{d:+d}" if d else base.a
                     pairs.append(replace(base, name=f"{base.name}/{d:+d}", b=b, difference_frames=d))
             elif study.task == "preference":
