@@ -8,10 +8,21 @@ import signal
 import subprocess
 import sys
 import threading
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 
 import pytest
+import sqlalchemy as sa
 
-from study.experiment.responses import answers_frame, open_responses
+from study.errors import SessionError
+from study.experiment import participants as people
+from study.experiment import response_tables
+from study.experiment.databases import alone, patiently
+from study.experiment.plan import draw_plan
+from study.experiment.response_migrations import MIGRATIONS
+from study.experiment.responses import answers_frame, begin_session, open_responses, record_answer, stored_answers
+from study.experiment.session import Answer
 
 WRITER = """
 import itertools, sys
@@ -60,3 +71,157 @@ def test_every_acknowledged_answer_survives_kills(database, repository, kills):
     assert set(acknowledged) <= set(stored)
     # At most the one answer that was under way at each kill was stored without its word of it arriving.
     assert len(stored) <= len(acknowledged) + kills
+
+
+PROGRAMS, NEWCOMERS, GROUPS, CAP = 3, 9, 4, 22
+
+ARRIVALS = """
+import sys
+sys.path.insert(0, "tests/experiment")
+import toys as c
+from study.experiment import participants as people
+from study.experiment.plan import draw_plan
+from study.experiment.protocol import parse_protocol
+from study.experiment.responses import open_responses, record_answer, session_by_id
+from study.experiment.session import Answer
+database, program, newcomers, groups, cap = sys.argv[1], *map(int, sys.argv[2:])
+protocol = parse_protocol(c.TOY_PROTOCOL)
+pairs = c.pairs_of(protocol)
+sys.stdin.readline()  # until all programs stand here
+responses = open_responses(database)
+for number in range(newcomers):
+    # The first name of each program is the same one.
+    name = f"p{program}-{number}" if number else "everybody"
+    draw = lambda group: draw_plan(protocol, pairs, name, group=group)
+    newcomer = people.Newcomer(name, f"token {program} {number}")
+    found = people.admit(responses, protocol, newcomer, people.Places(groups, cap), draw)
+    if not isinstance(found, str):
+        record = session_by_id(responses, found.session_id)
+        for trial in (1, 2):
+            assert record_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
+        found = "admitted"
+    print(name, found, flush=True)
+"""
+
+
+def test_several_programs_fill_groups_evenly_and_keep_the_cap(database, repository):
+    """They open an empty database, and admit and record as fast as they can, all at one time."""
+    children = []
+    for program in range(PROGRAMS):
+        arguments = [database, *map(str, (program, NEWCOMERS, GROUPS, CAP))]
+        children.append(
+            subprocess.Popen(
+                [sys.executable, "-c", ARRIVALS, *arguments], cwd=repository, text=True, stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+            )
+        )  # fmt: skip
+    for child in children:
+        child.stdin.write("now\n")
+        child.stdin.flush()
+    told = [line.split() for child in children for line in child.communicate()[0].splitlines()]
+    assert [child.returncode for child in children] == [0] * PROGRAMS
+    assert Counter(found for name, found in told if name == "everybody") == {"admitted": 1, "taken": PROGRAMS - 1}
+    assert Counter(found for _, found in told)["admitted"] == CAP
+    with open_responses(database) as responses:
+        filled = people.filled_groups(responses, people.Places(GROUPS))
+        table = answers_frame(responses)
+        with responses.engine.connect() as connection:
+            versions = connection.execute(sa.select(response_tables.schema_version.c.version)).scalars().all()
+            ids = connection.execute(sa.select(response_tables.sessions.c.id)).scalars().all()
+    assert sum(filled) == CAP
+    assert max(filled) - min(filled) <= 1
+    assert Counter(table["participant"]) == dict.fromkeys((name for name, found in told if found == "admitted"), 2)
+    assert sorted(versions) == list(range(1, len(MIGRATIONS) + 1))
+    assert sorted(ids) == list(range(1, CAP + 1))
+
+
+@pytest.fixture
+def two(database):
+    """Two programs' connections to one database."""
+    with open_responses(database) as one, open_responses(database) as other:
+        yield one, other
+
+
+@pytest.fixture
+def plan(toy_protocol, toy_stimuli):
+    return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
+
+
+def test_two_connections_that_record_the_same_answer_record_it_once(two, toy_protocol, plan):
+    record = begin_session(two[0], toy_protocol, plan)
+    with ThreadPoolExecutor(2) as threads:
+        for trial in range(1, 9):
+            together = threading.Barrier(2)
+
+            def send(responses, trial=trial, together=together):
+                together.wait()
+                return record_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
+
+            assert sorted(threads.map(send, two)) == [False, True]
+    assert len(stored_answers(two[0], record.id)) == 8
+
+
+def test_of_two_different_answers_to_one_question_the_first_stands(two, toy_protocol, plan):
+    record = begin_session(two[0], toy_protocol, plan)
+    values = ("same", "different")
+    with ThreadPoolExecutor(2) as threads:
+        for trial in range(1, 9):
+            together = threading.Barrier(2)
+
+            def send(number, trial=trial, together=together):
+                together.wait()
+                try:
+                    return record_answer(two[number], record, Answer(trial, "", 1, values[number], 1.0))
+                except SessionError as refusal:
+                    return str(refusal)
+
+            outcome = list(threads.map(send, (0, 1)))
+            assert outcome.count(True) == 1
+            assert any("found that one is stored already" in str(told) for told in outcome)
+            assert stored_answers(two[0], record.id)[-1].value == values[outcome.index(True)]
+
+
+def test_what_reads_before_it_writes_runs_alone(two):
+    """The second one begins when the first one has ended, and sees what it did."""
+    count = sa.select(sa.func.count()).select_from(response_tables.withdrawals)
+    line = sa.insert(response_tables.withdrawals)
+
+    def add(responses):
+        with alone(responses.engine) as connection:
+            before = connection.execute(count).scalar_one()
+            row = {"session_id": before, "answers": 0, "at": datetime.now(UTC)}
+            connection.execute(line, row)
+        return before
+
+    with ThreadPoolExecutor(8) as threads:
+        assert sorted(threads.map(add, two * 10)) == list(range(20))
+
+
+def away():
+    return sa.exc.OperationalError("SELECT 1", {}, Exception("connection refused"))
+
+
+def test_a_database_that_comes_back_in_time_was_waited_for():
+    failures, waits = [away(), away(), away()], []
+
+    def work():
+        if failures:
+            raise failures.pop()
+        return "done"
+
+    assert patiently(work, "there", wait=waits.append, clock=lambda: sum(waits)) == "done"
+    assert waits == [0.1, 0.2, 0.4]
+
+
+def test_a_database_that_stays_away_is_told_of_and_other_faults_at_once():
+    waits = []
+
+    def work():
+        raise away()
+
+    said = r"there: expected a database that can be written to, found that for 5 s it could not be \(connection refused"
+    with pytest.raises(SessionError, match=said):
+        patiently(work, "there", patience_s=5, wait=waits.append, clock=lambda: sum(waits))
+    assert 5 < sum(waits) < 8
+    with pytest.raises(ZeroDivisionError):
+        patiently(lambda: 1 / 0, "there", wait=waits.append)
