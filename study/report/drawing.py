@@ -108,3 +108,12 @@ def to_svg(figure: Figure, name: str, title: str, description: str) -> str:
     return (
         f'{opening} role="img" aria-labelledby="{name}-title {name}-desc" style="width:100%;height:auto">{names}{rest}'
     ).strip()
+
+
+def as_file(svg: str) -> str:
+    """Return an SVG element of the page as a file of its own: with a size and a typeface that any program knows."""
+    width, height = re.search(r'viewBox="0 0 ([0-9.]+) ([0-9.]+)"', svg).groups()  # type: ignore[union-attr]
+    opening, rest = svg.split(">", 1)
+    opening = re.sub(r' style="[^"]*"', f' width="{width}pt" height="{height}pt"', opening)
+    rest = rest.replace("var(--sans, sans-serif)", "Helvetica, Arial, sans-serif")
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{opening}>{rest}\n'

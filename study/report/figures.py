@@ -137,8 +137,8 @@ def thresholds_figure(result: Result, name: str, mark: str, known: Mapping[str, 
                 _bar(axes, entry["published"][side], -row + 0.14, INK, "o")
                 if entry["model"] and side in entry["model"]["jnd"]:
                     _bar(axes, entry["model"]["jnd"][side], -row - 0.14, BLUE, "s")
-        for place in (known or {}).values():
-            axes.axvline(place, color=ORANGE, linewidth=1.0, linestyle=(0, (2, 2)), zorder=0)
+        for side, place in (known or {}).items():
+            axes.axvline(SIGNS[side] * place, color=ORANGE, linewidth=1.0, linestyle=(0, (2, 2)), zorder=0)
         axes.set_yticks([-row for row in range(len(entries))], [label for label, _ in entries])
         axes.tick_params(axis="y", labelcolor=INK)
         axes.set_ylim(-len(entries) + 0.5, 0.5)

@@ -39,6 +39,19 @@ class Preview:
     alt: str = ""
 
 
+@dataclass(frozen=True)
+class Pictures:
+    """Strips, and videos two by two."""
+
+    strips: tuple[Preview, ...]
+    videos: tuple[tuple[Preview, ...], ...]
+
+
+def embed(manifest: Manifest) -> Pictures:
+    """Return everything that stands in the page to show what participants saw."""
+    return Pictures(tuple(embed_strips(manifest)), tuple(tuple(pair) for pair in embed_videos(manifest)))
+
+
 def data_uri(content: bytes, kind: str) -> str:
     """Return bytes as a data URI."""
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -40,21 +40,11 @@ def stimulus_table(manifest: Manifest) -> Table:
     return tables.make(
         "stimuli",
         "Every stimulus, in frames. k is the length that the method gives; the blend is k and the difference.",
-        [
-            ("transition", "transition", "text"),
-            ("category", "category", "text"),
-            ("method", "method", "text"),
-            ("optimal_frames", "k", "count"),
-            ("difference_frames", "difference", "count"),
-            ("blend_frames", "blend", "count"),
-            ("frames", "in all", "count"),
-            ("source", "from", "text"),
-            ("destination", "to", "text"),
-            ("notes", "notes", "text"),
-            ("id", "hash", "text"),
-        ],
+        "transition category method optimal_frames difference_frames blend_frames frames:count source destination "
+        "notes id",
         rows,
-        files_only=("category", "notes", "id"),
+        headings={"difference_frames": "difference", "frames": "in all", "source": "from"},
+        files_only="category notes id",
     )
 
 
@@ -85,20 +75,10 @@ def motion_table(manifest: Manifest) -> Table:
         "motions",
         "Every motion, in frames of the study: its file, the frame at which the blend starts or ends, its length, and "
         "the frames that were added before and after it where it was too short.",
-        [
-            ("transition", "transition", "text"),
-            ("role", "", "text"),
-            ("motion", "motion", "text"),
-            ("file", "file", "text"),
-            ("frame", "at", "count"),
-            ("frames", "of", "count"),
-            ("added_before", "added before", "count"),
-            ("added_after", "after", "count"),
-            ("changes", "how", "text"),
-            ("notes", "all notes", "text"),
-        ],
+        "transition role motion file frame frames:count added_before added_after changes notes",
         list(rows.values()),
-        files_only=("notes", *(() if any(row["changes"] for row in rows.values()) else ("changes",))),
+        headings={"frames": "of", "notes": "all notes"},
+        files_only="notes" if any(row["changes"] for row in rows.values()) else "notes changes",
     )
 
 
@@ -107,28 +87,32 @@ def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
     started = {}
     if len(sessions) and "started_at" in sessions:
         started = {str(row.participant): str(row.started_at)[:16] for row in sessions.itertuples()}
+    left_out = {row["participant"]: row["reason"] for row in analysis["exclusions"]["participants"]}
     rows = [
-        {**row, "kind": "simulated" if row["simulated"] else "person", "started": started.get(row["participant"], "")}
+        {
+            **row,
+            "kind": "simulated" if row["simulated"] else "person",
+            "started": started.get(row["participant"], ""),
+            "left_out": left_out.get(row["participant"], ""),
+        }
         for row in analysis["quality"]["table"]
     ]
+    hidden = {
+        "kind": analysis["data"] != "mixed",
+        "left_out": not left_out,
+        "shown_badly": not any(row["shown_badly"] for row in rows),
+        "too_fast": not any(row["too_fast"] for row in rows),
+        "false_alarms same_pairs": not any(row["same_pairs"] for row in rows),
+    }
     return tables.make(
         "participants",
-        "Participants. Flags follow the rules above and leave nobody out.",
-        [
-            ("participant", "participant", "text"),
-            ("kind", "kind", "text"),
-            ("started", "started (UTC)", "text"),
-            ("trials", "asked", "count"),
-            ("answered", "answered", "count"),
-            ("missed", "missed", "count"),
-            ("median_response_s", "median time, s", "two"),
-            ("too_fast", "too fast", "count"),
-            ("false_alarms", "false alarms", "count"),
-            ("same_pairs", "of same pairs", "count"),
-            ("flags", "flags", "text"),
-        ],
+        "Participants. Flags follow the rules above and leave nobody out."
+        + (" Who was left out, and why, stands in the last column." if left_out else ""),
+        "participant kind started trials answered missed median_response_s too_fast shown_badly false_alarms "
+        "same_pairs "
+        "flags left_out",
         rows,
-        files_only=("too_fast",) if analysis["data"] == "mixed" else ("too_fast", "kind"),
+        files_only=" ".join(keys for keys, hide in hidden.items() if hide),
     )
 
 

@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, cast, get_args
 
 LONGEST_SHORT = 30
 """Longer text may break into lines. [characters]"""
@@ -16,7 +16,121 @@ LONGEST_SHORT = 30
 WIDTH_OF_TEXT = 100
 """Characters that a table may take in a row before it stands out into the margins."""
 
-Kind = Literal["text", "count", "one", "two", "three", "percent", "p"]
+Kind = Literal["text", "count", "one", "two", "three", "percent", "p", "short"]
+"""How a value is written: as it is, as a whole number, with one to three places, ..., or with three digits."""
+
+
+COLUMNS: Mapping[str, tuple[str, Kind]] = {
+    # What a row is about.
+    "study": ("study", "text"),
+    "motion": ("motion", "text"),
+    "transition": ("transition", "text"),
+    "result": ("result", "text"),
+    "comparison": ("comparison", "text"),
+    "item": ("question", "text"),
+    "method": ("method", "text"),
+    "source": ("source", "text"),
+    "reading": ("reading", "text"),
+    "estimate": ("estimate", "text"),
+    "side": ("blend is", "text"),
+    "difference_frames": ("frames from k", "count"),
+    "remark": ("remark", "text"),
+    # Counts.
+    "participants": ("participants", "count"),
+    "answers": ("answers", "count"),
+    "missed": ("missed", "count"),
+    "different": ("different", "count"),
+    "favouring": ("favouring", "count"),
+    # Estimates, how sure they are, and tests.
+    "frames": ("frames", "two"),
+    "seconds": ("seconds", "three"),
+    "percent": ("percent", "one"),
+    "population_percent": ("over participants", "one"),
+    "mean": ("mean", "two"),
+    "median": ("median", "one"),
+    "value": ("value", "two"),
+    "standard_deviation": ("standard deviation", "two"),
+    "standard_error": ("standard error", "two"),
+    "interval": ("95% interval", "text"),
+    "low": ("95% from", "two"),
+    "high": ("to", "two"),
+    "test": ("test", "text"),
+    "statistic": ("statistic", "two"),
+    "t": ("t", "two"),
+    "chi_square": ("chi-square", "two"),
+    "f": ("F", "two"),
+    "degrees_of_freedom": ("df", "count"),
+    "error_degrees_of_freedom": ("error df", "count"),
+    "p_value": ("p", "p"),
+    "exact_p_value": ("exact p", "p"),
+    "holm_p_value": ("Holm p", "p"),
+    "sum_of_squares": ("SS", "two"),
+    "mean_square": ("MS", "two"),
+    "partial_eta_squared": ("partial eta squared", "two"),
+    "of": ("difference", "text"),
+    "published": ("as published", "text"),
+    "corrected": ("corrected", "text"),
+    # Same-different.
+    "d_prime": ("d-prime", "two"),
+    "criterion": ("criterion", "two"),
+    "known": ("known", "two"),
+    "found": ("found", "two"),
+    "distance": ("off by", "two"),
+    "standard_errors": ("in standard errors", "two"),
+    # Preferences.
+    "order_logit": ("order, logits", "two"),
+    "order_p_value": ("order p", "p"),
+    "spread": ("spread of participants, logits", "two"),
+    "margin": ("counts as none", "text"),
+    "equivalence_p_value": ("equivalence p", "p"),
+    "bayes_factor_null": ("Bayes factor for none", "short"),
+    # How the study went.
+    "part": ("sixth", "count"),
+    "what": ("percent of", "text"),
+    "rule": ("rule", "text"),
+    "reason": ("reason", "text"),
+    "timed_by": ("timed by", "text"),
+    "shown": ("presentations", "count"),
+    "badly": ("faulty", "count"),
+    "again": ("shown again", "count"),
+    "frames_lost": ("frames lost", "count"),
+    "frames_lost_percent": ("frames lost, %", "two"),
+    "median_gap": ("longest gap, median", "two"),
+    "longest_gap": ("longest gap of all", "two"),
+    "all_value": ("of all answers", "two"),
+    "all_low": ("95% from", "two"),
+    "all_high": ("to", "two"),
+    "all_p_value": ("p", "p"),
+    # What was shown, and to whom.
+    "category": ("category", "text"),
+    "optimal_frames": ("k", "count"),
+    "blend_frames": ("blend", "count"),
+    "destination": ("to", "text"),
+    "notes": ("notes", "text"),
+    "id": ("hash", "text"),
+    "role": ("", "text"),
+    "file": ("file", "text"),
+    "frame": ("at", "count"),
+    "added_before": ("added before", "count"),
+    "added_after": ("after", "count"),
+    "changes": ("how", "text"),
+    "participant": ("participant", "text"),
+    "kind": ("kind", "text"),
+    "started": ("started (UTC)", "text"),
+    "trials": ("asked", "count"),
+    "answered": ("answered", "count"),
+    "median_response_s": ("median time, s", "two"),
+    "too_fast": ("too fast", "count"),
+    "shown_badly": ("badly shown", "count"),
+    "false_alarms": ("false alarms", "count"),
+    "same_pairs": ("of same pairs", "count"),
+    "flags": ("flags", "text"),
+    "left_out": ("left out", "text"),
+    # Planning.
+    "studies": ("simulated studies", "count"),
+    "power": ("power", "two"),
+}
+"""Heading and kind of every column that a table of the report may have, by its key; one word for one thing."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +197,8 @@ def written(value: Any, kind: Kind) -> str:
         return f"{value:.1f}%"
     if kind == "p":
         return p_value(value)
+    if kind == "short":
+        return short_number(value)
     places = {"one": 1, "two": 2, "three": 3}[kind]
     return f"{value:.{places}f}".replace("-", "−")
 
@@ -93,6 +209,13 @@ def p_value(value: float) -> str:
         return "< .001"
     text = f"{value:.3f}" if value < 0.1 else f"{value:.2f}"
     return text.removeprefix("0") if value < 0.995 else "1.00"
+
+
+def short_number(value: float) -> str:
+    """Return a ratio with three digits: 12.3, 0.00171, over 1,000, under 0.001."""
+    if value >= 1000:
+        return "over 1,000"
+    return f"{value:.3g}" if value >= 0.001 else "under 0.001"
 
 
 def as_csv(table: Table) -> str:
@@ -116,12 +239,37 @@ def as_json(table: Table) -> str:
 def make(
     name: str,
     caption: str,
-    columns: Sequence[tuple[str, str, Kind]],
+    columns: str,
     rows: Sequence[Mapping[str, Any]],
     *,
-    files_only: Sequence[str] = (),
+    headings: Mapping[str, str] | None = None,
+    files_only: str = "",
 ) -> Table:
-    """Return a table from plain column tuples (key, heading, kind); `files_only` names columns the page leaves out."""
-    return Table(
-        name, caption, tuple(Column(*column, shown=column[0] not in files_only) for column in columns), tuple(rows)
-    )
+    """Return a table.
+
+    Parameters
+    ----------
+    name, caption
+        Of the table; its files have the name.
+    columns
+        Keys of the rows, parted by blanks, each in `COLUMNS`; `low:one` writes the values of `low` as the kind `one`.
+    rows
+        Values by key.
+    headings
+        In place of those in `COLUMNS`.
+    files_only
+        Keys of the columns that the page leaves out, parted by blanks.
+    """
+    hidden = files_only.split()
+    made = []
+    for word in columns.split():
+        key, _, kind = word.partition(":")
+        heading, usual = COLUMNS[key]
+        shown = (headings or {}).get(key, heading)
+        made.append(Column(key, shown, _kind(kind) if kind else usual, key not in hidden))
+    return Table(name, caption, tuple(made), tuple(rows))
+
+
+def _kind(name: str) -> Kind:
+    assert name in get_args(Kind), f"no kind of value is called {name!r}"
+    return cast("Kind", name)

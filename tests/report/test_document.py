@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from study.errors import AnalysisError, SegueError
-from study.report.document import gather, write_report
+from study.report.document import write_report
+from study.report.material import gather
 
 MakeFolder = Callable[..., Path]
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -85,7 +86,7 @@ def test_every_study_has_a_headline_figures_and_tables(written: tuple[Path, Page
     text = path.read_text(encoding="utf-8")
     for words in ("Just noticeable difference", "Geodesic against fixed", "Naturalness", "Versions and hashes"):
         assert words in page.text
-    assert "Simulated observers called 75% of pairs different" in page.text
+    assert "4 simulated observers called 75% of pairs different" in page.text
     assert "answers favoured geodesic over fixed" in page.text
     drawings = re.findall(r'<svg[^>]* role="img" aria-labelledby="([^" ]+) ([^"]+)"', text)
     assert len(drawings) >= 6
@@ -121,7 +122,7 @@ def test_tables_are_written_as_csv_and_json(written: tuple[Path, Page]) -> None:
     folder = path.parent / "tables"
     names = {file.stem for file in folder.glob("*.csv")}
     assert names == {file.stem for file in folder.glob("*.json")} - {"analysis"}
-    assert {"jnd_percent_different", "jnd_thresholds", "stimuli", "motions", "participants"} <= names
+    assert {"results", "confirmatory", "jnd_percent_different", "jnd_thresholds", "stimuli", "participants"} <= names
     with (folder / "jnd_percent_different.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["difference_frames"]) for row in rows] == [-15, -10, -5, 0, 5, 10, 20]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from study.report.sections import ratings_section
+from study.report.ratings_section import ratings_section
 
 
 def question(item: str, mean: float, f: float, p: float) -> dict[str, Any]:
@@ -26,21 +26,23 @@ ROWS = [
 def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
     variance = [question("natural", 0.7, 6.39, 0.0148), question("smooth", 0.3, 1.2, 0.28)]
     section = ratings_section("cuts", "Cuts", ROWS, variance, mark="", points=5, alpha=0.05)
-    ((statement, tests),) = section.headlines
-    assert "was rated higher than" in statement
-    assert "in 2 of 2 questions, in 1 significantly at 0.05" in statement
-    assert tests == "natural: F(1, 48) = 6.39; smooth: F(1, 48) = 1.20"
+    (headline,) = section.headlines
+    assert "was rated higher than" in headline.statement
+    assert "in 2 of 2 questions, in 1 significantly at 0.05" in headline.statement
+    assert headline.detail.startswith("Natural: as published F(1, 48) = 6.39, p = .015; over participants t(25) = ")
+    assert "Smooth: as published F(1, 48) = 1.20, p = .28" in headline.detail
     assert [table.name for table in section.tables] == ["cuts_ratings", "cuts_anova", "cuts_differences"]
     assert {"degrees_of_freedom", "error_degrees_of_freedom"} <= {column.key for column in section.tables[1].columns}
 
 
 def test_the_worse_method_is_not_called_better() -> None:
     variance = [question("natural", -0.7, 6.39, 0.0148)]
-    ((statement, _),) = ratings_section("cuts", "Cuts", ROWS, variance, mark="", points=5).headlines
-    assert statement.startswith("Cut-lee2002 was rated higher than cut-wang2003 in 1 of 1 question")
+    (headline,) = ratings_section("cuts", "Cuts", ROWS, variance, mark="", points=5).headlines
+    assert headline.statement.startswith("Cut-lee2002 was rated higher than cut-wang2003 in 1 of 1 question")
 
 
 def test_a_single_method_has_no_comparison() -> None:
     section = ratings_section("cuts", "Cuts", ROWS[:1], (), mark="", points=5)
     assert [table.name for table in section.tables] == ["cuts_ratings"]
-    assert "rated highest" in section.headlines[0][0]
+    assert section.headlines[0].statement == "Natural: cut-lee2002 was rated 1.50 on average, on a scale of 0 to 4."
+    assert "26 participants" in section.headlines[0].detail

@@ -10,6 +10,7 @@ import pytest
 
 from study.report import words
 from study.report.media import _moments, strip_of_video
+from study.report.same_different_section import headline
 from study.report.tables import as_csv, as_json, make, p_value, written
 
 
@@ -39,11 +40,14 @@ def test_p_value_never_rounds_to_nothing() -> None:
 
 def test_files_have_all_columns_and_full_numbers() -> None:
     table = make(
-        "x", "A table.", [("a", "A", "text"), ("b", "B", "one")], [{"a": 'say "x", y', "b": 0.123456789}, {"a": "z"}],
-        files_only=("b",),
+        "x", "A table.", "remark percent", [{"remark": 'say "x", y', "percent": 0.123456789}, {"remark": "z"}],
+        files_only="percent",
     )  # fmt: skip
-    assert as_csv(table) == 'a,b\n"say ""x"", y",0.123456789\nz,\n'
-    assert json.loads(as_json(table))["rows"] == [{"a": 'say "x", y', "b": 0.123456789}, {"a": "z", "b": None}]
+    assert as_csv(table) == 'remark,percent\n"say ""x"", y",0.123456789\nz,\n'
+    assert json.loads(as_json(table))["rows"] == [
+        {"remark": 'say "x", y', "percent": 0.123456789},
+        {"remark": "z", "percent": None},
+    ]
     assert [[text for text, _ in row] for row in table.cells] == [['say "x", y'], ["z"]]
 
 
@@ -59,11 +63,21 @@ def test_a_threshold_that_is_not_reached_is_said_to_be_so() -> None:
         "shorter": threshold("shorter", 8.0),
     }
     result = {"model": None, "model_note": "every answer was “same”", "published": published, "level": 0.75}
-    statement, detail = words.jnd_headline(result, 30.0, "collected")
-    assert "not reached within the levels shown" in statement
-    assert "8.0 frames (0.27 s) shorter" in statement
-    assert statement.startswith("People called 75%")
-    assert "No model was fitted" in detail
+    result |= {"answers": 84, "participants": 2, "missed": 0}
+    said = headline(result, 30.0, "collected")
+    assert said.statement == "2 people called 75% of pairs different where the blend was 8.0 frames (0.27 s) shorter."
+    assert "Where the blend was longer: not reached within the levels shown" in said.detail
+    assert "84 answers of 2 participants. No model was fitted: every answer was “same”." in said.detail
+
+
+def test_no_threshold_at_all_is_said_to_be_none() -> None:
+    nowhere = {side: threshold(side, None, "not reached") for side in ("longer", "shorter")}
+    result = {"model": None, "model_note": "no", "published": nowhere, "level": 0.75}
+    result |= {"answers": 42, "participants": 1, "missed": 0}
+    assert headline(result, 30.0, "collected").statement.startswith("No just noticeable difference can be given")
+    assert "1 person" in headline(result, 30.0, "collected").statement
+    missed = {**result, "answers": 0, "participants": 0, "missed": 42}
+    assert "all 42 questions were missed" in headline(missed, 30.0, "collected").statement
 
 
 def test_intervals_with_open_ends_are_said_to_be_open() -> None:

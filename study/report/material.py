@@ -1,0 +1,99 @@
+"""What a report is made of: a results folder in, its protocol, stimuli, answers and presentations out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.errors import AnalysisError
+from study.report.planning import read_power
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import sqlalchemy as sa
+
+    from study.experiment.protocol import Protocol
+    from study.experiment.rendering import Manifest
+    from study.experiment.responses import Responses
+
+Result = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """What a report is made of.
+
+    Attributes
+    ----------
+    protocol, manifest
+        What was asked, and what was shown.
+    answers, checks
+        One row an answer; answers to attention checks apart.
+    sessions
+        One row a session, those without answers too.
+    presentations
+        One row a stimulus that was shown.
+    withdrawn
+        How many participants had their answers deleted.
+    power
+        Results of `segue power` that lie in the folder.
+    """
+
+    protocol: Protocol
+    manifest: Manifest
+    answers: pd.DataFrame
+    checks: pd.DataFrame
+    sessions: pd.DataFrame
+    presentations: pd.DataFrame
+    withdrawn: int
+    power: tuple[Result, ...]
+
+
+def gather(folder: Path) -> Material:
+    """Read a results folder.
+
+    Raises
+    ------
+    AnalysisError
+        When there are no answers yet.
+    SegueError
+        When a part of the folder is missing or can't be read.
+    """
+    from study.experiment.protocol import load_protocol
+    from study.experiment.rendering import ANSWERS, PROTOCOL, read_manifest
+    from study.experiment.response_tables import presentations, withdrawals
+    from study.experiment.responses import answers_frame, open_responses, session_table
+
+    protocol, manifest, database = load_protocol(folder / PROTOCOL), read_manifest(folder), folder / ANSWERS
+    if not database.is_file():
+        raise AnalysisError(
+            f"{database}: expected answers, found no database; collect or simulate sessions for this folder first"
+        )
+    with open_responses(database) as responses:
+        material = Material(
+            protocol=protocol,
+            manifest=manifest,
+            answers=answers_frame(responses),
+            checks=answers_frame(responses, roles=("check",)),
+            sessions=session_table(responses),
+            presentations=_table(responses, presentations),
+            withdrawn=len(_table(responses, withdrawals)),
+            power=tuple(read_power(folder)),
+        )
+    if material.answers.empty:
+        gone = f" ({material.withdrawn} withdrawn)" if material.withdrawn else ""
+        raise AnalysisError(f"{database}: expected answers, found none{gone}; collect or simulate sessions first")
+    return material
+
+
+def _table(responses: Responses, table: sa.Table) -> pd.DataFrame:
+    """A table without its details, which hold the times of all frames."""
+    import pandas as pd
+    import sqlalchemy as sa
+
+    columns = [column for column in table.c if column.name != "detail_json"]
+    with responses.engine.connect() as connection:
+        rows = connection.execute(sa.select(*columns)).mappings().all()
+    return pd.DataFrame([dict(row) for row in rows], columns=[column.name for column in columns])

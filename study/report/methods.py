@@ -1,0 +1,256 @@
+"""The methods of a report, ready for a paper: protocol, manifest, presentations and analysis in, paragraphs out.
+
+Each sentence follows from what was run; methods that were not used are neither described nor cited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from study.report import words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.experiment.protocol import Protocol, StudySpec
+    from study.experiment.stimuli import Manifest
+
+Result = Mapping[str, Any]
+
+REFERENCES = {
+    "2003": "Wang, J., & Bodenheimer, B. (2003). An evaluation of a cost metric for selecting transitions between "
+    "motion segments. Symposium on Computer Animation, 232–238.",
+    "2004": "Wang, J., & Bodenheimer, B. (2004). Computing the duration of motion transitions: An empirical approach. "
+    "Symposium on Computer Animation, 335–344.",
+    "2019": "Koyama, Y., & Goto, M. (2019). Precomputed optimal one-hop motion transition for responsive character "
+    "animation. The Visual Computer. doi:10.1007/s00371-019-01693-8",
+    "slerp": "Shoemake, K. (1985). Animating rotation with quaternion curves. SIGGRAPH, 245–254.",
+    "fieller": "Fieller, E. C. (1954). Some problems in interval estimation. Journal of the Royal Statistical "
+    "Society B, "
+    "16, 175–185.",
+    "differencing": "Macmillan, N. A., & Creelman, C. D. (2005). Detection theory: A user’s guide (2nd ed., ch. 9). "
+    "Erlbaum.",
+    "wilson": "Wilson, E. B. (1927). Probable inference, the law of succession, and statistical inference. Journal "
+    "of the "
+    "American Statistical Association, 22, 209–212.",
+    "holm": "Holm, S. (1979). A simple sequentially rejective multiple test procedure. Scandinavian Journal of "
+    "Statistics, 6, 65–70.",
+    "gee": "Liang, K.-Y., & Zeger, S. L. (1986). Longitudinal data analysis using generalized linear models. "
+    "Biometrika, "
+    "73, 13–22.",
+    "gee-small": "Mancl, L. A., & DeRouen, T. A. (2001). A covariance estimator for GEE with improved small-sample "
+    "properties. Biometrics, 57, 126–134.",
+    "equivalence": "Schuirmann, D. J. (1987). A comparison of the two one-sided tests procedure and the power "
+    "approach. "
+    "Journal of Pharmacokinetics and Biopharmaceutics, 15, 657–680.",
+    "bayes": "Rouder, J. N., Speckman, P. L., Sun, D., Morey, R. D., & Iverson, G. (2009). Bayesian t tests for "
+    "accepting "
+    "and rejecting the null hypothesis. Psychonomic Bulletin & Review, 16, 225–237.",
+    "strengths": "Bradley, R. A., & Terry, M. E. (1952). Rank analysis of incomplete block designs. Biometrika, 39, "
+    "324–345.",
+}
+
+BLENDS = {
+    "fixed": "a fixed length",
+    "geodesic": "the geodesic distance of 2004",
+    "velocity": "the joint velocities of 2004",
+    "timewarp": "time-warped blends of 2004",
+    "cut": "a cut",
+    "cut-lee2002": "the cut of least cost under the weights of Lee et al. 2002",
+    "cut-wang2003": "the cut of least cost under the optimised weights of 2003",
+    "cut-pointcloud": "the cut of least cost between point clouds",
+    "one-hop": "the optimal one-hop transition of 2019",
+}
+
+ORDERS = {
+    "both": "each pair in both orders",
+    "random": "the order within pairs at random",
+    "balanced": "half of the pairs in each order",
+    "by-group": "the order by the participant’s group",
+}
+
+
+def methods_paragraphs(
+    protocol: Protocol, manifest: Manifest, analysis: Result, presentations: pd.DataFrame, who: str
+) -> list[tuple[str, str]]:
+    """Return the methods as headed paragraphs: participants and design, stimuli, apparatus, analysis, software.
+
+    Parameters
+    ----------
+    protocol, manifest
+        Of the results folder.
+    analysis
+        From `analyse`.
+    presentations
+        How stimuli were shown: `method`, `shown_well`.
+    who
+        Who answered, in words.
+    """
+    return [
+        ("Participants and design", _design(protocol, analysis, who)),
+        ("Stimuli", _stimuli(protocol, manifest)),
+        ("Apparatus and procedure", _procedure(protocol, analysis, presentations)),
+        ("Analysis", _analysis(protocol, analysis)),
+        ("Exclusions", _excluded(analysis)),
+        ("Software", _software(protocol)),
+    ]
+
+
+def references(protocol: Protocol, analysis: Result) -> list[str]:
+    """Return the works that the methods rest on, by author; only those whose methods were used."""
+    methods = {method for study in protocol.studies for method in study.methods}
+    cuts = {method for method in methods if method.startswith("cut")}
+    used = {"slerp"} if methods - cuts else set()
+    used |= {"2003"} if cuts or analysis["ratings"] else set()
+    used |= {"2004"} if methods & {"geodesic", "velocity", "timewarp", "fixed"} or analysis["jnd"] else set()
+    used |= {"2019"} if "one-hop" in methods else set()
+    used |= {"fieller", "differencing", "wilson"} if analysis["jnd"] else set()
+    if analysis["preference"]:
+        used |= {"wilson", "holm", "gee", "gee-small", "equivalence", "bayes"}
+    used |= {"strengths"} if any(analysis["bradley_terry"].values()) else set()
+    return sorted(REFERENCES[key] for key in used)
+
+
+def _design(protocol: Protocol, analysis: Result, who: str) -> str:
+    studies = words.joined([_study(study) for study in protocol.studies])
+    text = (
+        f"{words.sentence(who)} took part in one sitting of {words.number(len(protocol.studies), 'study', 'studies')}: "
+        f"{studies}. "
+    )
+    asked = analysis["quality"]
+    each = asked["trials"] / max(asked["participants"], 1)
+    return text + (
+        f"Pairs came in random order, drawn anew for every participant (seed {protocol.seed}); a participant answered "
+        f"{each:.0f} questions on average."
+    )
+
+
+def _study(study: StudySpec) -> str:
+    title = words.readable(study.title or study.name)
+    repeated = f", {study.repeats} times" if study.repeats > 1 else ""
+    if study.task == "same-different":
+        levels = ", ".join(f"{value:+d}".replace("-", "−") if value else "0" for value in study.differences_frames)
+        what = f"same or different, blends of {BLENDS[study.reference]} against others longer by {levels} frames"
+    elif study.task == "preference":
+        what = f"which is more natural, {_against(study)}"
+    else:
+        asked = words.number(len(study.items), "question")
+        what = f"ratings on a scale of 0 to {study.scale_points - 1}, {asked}, {_against(study)}"
+    return f"{title} ({what}; {ORDERS[study.order]}{repeated})"
+
+
+def _against(study: StudySpec) -> str:
+    first = BLENDS[study.reference] + _frames_of(study, study.reference)
+    if study.comparison is None:
+        return first
+    return f"{first} against {BLENDS[study.comparison]}{_frames_of(study, study.comparison)}"
+
+
+def _frames_of(study: StudySpec, method: str) -> str:
+    return f" of {words.number(study.fixed_frames, 'frame')}" if method == "fixed" else ""
+
+
+def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
+    shown = protocol.stimuli
+    motions = "synthetic motions" if manifest.synthetic else f"motions of the library {words.library(manifest.library)}"
+    camera = f"a camera travelling with it (smoothed over {shown.track_s:g} s)" if shown.track_s else "a fixed camera"
+    ground = "above a ground plane" if shown.floor else "without a ground plane"
+    feet = " Sliding of planted feet was removed after blending." if shown.clean_feet else ""
+    return (
+        f"{words.number(len(manifest.records), 'transition')} between {motions} were blended by spherical linear "
+        f"interpolation under a {shown.weight} weight, between a start frame in the source and an end frame in the "
+        f"destination (cuts were not blended).{feet} Each was rendered as a {shown.style} figure of {shown.width} × "
+        f"{shown.height} pixels at {protocol.fps:g} frames per second, seen by {camera} {ground}, with "
+        f"{shown.entry_s:g} s before and {shown.exit_s:g} s after the blend."
+    )
+
+
+def _procedure(protocol: Protocol, analysis: Result, presentations: pd.DataFrame) -> str:
+    timing = protocol.timing
+    paired = any(study.task != "rating" for study in protocol.studies)
+    pair = f"The two stimuli of a pair followed each other after {timing.gap_s:g} s. " if paired else ""
+    rest = (
+        f" A break was offered after every {words.number(timing.break_after, 'trial')}." if timing.break_after else ""
+    )
+    return (
+        f"{pair}Participants had {timing.answer_s:g} s to answer; an answer not given in time was recorded as "
+        "missed. A "
+        f"pause of {timing.pause_s:g} s followed.{rest} {_shown(analysis, presentations)}"
+    )
+
+
+def _shown(analysis: Result, presentations: pd.DataFrame) -> str:
+    if not len(presentations):
+        nobody = "No stimulus was shown: observers were simulated." if analysis["data"] == "simulated" else ""
+        return nobody or "How stimuli were shown was not recorded."
+    timers = {
+        "requestVideoFrameCallback": "a web browser, every presented frame logged",
+        "swap": "a window, every buffer swap timed",
+    }
+    parts = [
+        f"{words.number(len(part), 'presentation')} in {timers.get(str(method), f'a way timed by {method} only')}"
+        for method, part in presentations.groupby("method", sort=True)
+    ]
+    badly = int((~presentations["shown_well"].astype(bool)).sum())
+    return (
+        f"Stimuli were presented in {words.joined(parts)}; {badly:,} of {len(presentations):,} presentations stalled, "
+        "lost frames or were hidden."
+    )
+
+
+def _analysis(protocol: Protocol, analysis: Result) -> str:
+    parts = ["The participant was the unit of analysis; published statistics, which pool all answers, stand beside."]
+    if analysis["jnd"]:
+        percent = f"{100 * protocol.analysis.threshold:.0f}%"
+        parts.append(
+            f"Percentages of “different” are means over participants ± standard errors. Just noticeable differences "
+            f"are where these reach {percent}: read off straight lines as in 2004, with Fieller’s intervals over "
+            "participants, and on a differencing model of the same-different task (Macmillan & Creelman 2005: one "
+            "criterion, a slope each for shorter and longer blends, a lapse rate of at most 10%), fitted by maximum "
+            "likelihood to all answers, with intervals by Student’s t of the logarithm from a jackknife over "
+            "participants; profile-likelihood intervals are given beside them."
+        )
+    if analysis["preference"]:
+        count = len(analysis["confirmatory"])
+        family = f" and adjusted by Holm’s method over {count} comparisons" if count > 1 else ""
+        parts.append(
+            "Preferences were tested by Student’s t of one share a participant against one half"
+            f"{family}; chi-square and exact binomial tests of all answers are given as published, with Wilson’s "
+            "intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite quadrature) and generalised "
+            "estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) account for the order of "
+            "presentation. Evidence for no preference is an equivalence test (Schuirmann 1987) and a Bayes factor "
+            "(Rouder et al. 2009)."
+        )
+    if analysis["ratings"]:
+        parts.append(
+            "Ratings were compared by the two-way between-subjects analysis of variance of 2003 (method by order; type "
+            "III sums of squares), and by Student’s t of each participant’s own difference."
+        )
+    parts.append(
+        f"Intervals are of {100 * analysis['confidence']:g}%, the level of significance is {analysis['alpha']:g}. "
+        "Missed answers were left out and counted."
+    )
+    return " ".join(parts)
+
+
+def _excluded(analysis: Result) -> str:
+    found = analysis["exclusions"]
+    if not found["rules"]:
+        return "No rule of exclusion was stated beforehand; no participant and no answer was left out."
+    rules = words.joined([rule["rule"] for rule in found["rules"]])
+    wholly = words.number(len(found["participants"]), "participant")
+    return (
+        f"By rules stated before there was data, these were left out: {rules}; "
+        f"{words.number(found['answers_left_out'], 'answer')} of {analysis['quality']['trials']:,} in all, among them "
+        f"those of {wholly} left out wholly. Results of all answers are given beside."
+    )
+
+
+def _software(protocol: Protocol) -> str:
+    import study
+
+    return (
+        f"Stimuli, sessions and analysis were made with Segue {study.__version__}, under the protocol {protocol.name} "
+        f"(sha256 {protocol.sha256[:12]})."
+    )
