@@ -201,7 +201,7 @@ def fit_psychometric(
     -----
     Priors: flat for thresholds within the levels, falling to none half their range outside; flat for the logarithm of
     the width from half the smallest step between levels to the whole range, falling to none at a quarter and at four
-    times; Beta(1, 20) for the lapse rate, Beta(1, 10) for the guess rate, Beta(1, 40) for overdispersion. Estimates are
+    times; Beta(1, 20) for the lapse rate, Beta(1, 5) for the guess rate, Beta(1, 40) for overdispersion. Estimates are
     medians, which mean the same on a level and on its logarithm.
 
     Examples

@@ -44,10 +44,10 @@ def analyse_psychometric(
     Returns
     -------
     dict
-        JSON-able: `participants` (one fit each), `pooled` (all answers as one person's), `likelihood` (maximum,
-        profile interval and deviance of the same), `group` (mean over participants of their thresholds, with Student's
-        interval), `mixed` (threshold of a typical participant by a mixed model; None for one participant), `levels`
-        (answers by level), `answer` (a sentence).
+        JSON-able: `confidence`, `participants` (one fit each), `pooled` (all answers as one person's), `likelihood`
+        (maximum, profile interval and deviance of the same), `group` (mean over participants of their thresholds, with
+        Student's interval), `mixed` (threshold of a typical participant by a mixed model; None for one participant),
+        `levels` (answers by level), `answer` (a sentence).
     """
     chosen = model or make_model()
     own = []
@@ -56,7 +56,8 @@ def analyse_psychometric(
     levels, yes, shown = (trials[column].to_numpy(dtype=np.float64) for column in ("level", "yes", "shown"))
     best = fit_likelihood(levels, yes, shown, chosen, confidence=confidence, simulations=simulations)
     pooled = _one(trials, chosen, confidence)
-    result = {
+    result: dict[str, Any] = {
+        "confidence": confidence,
         "participants": own,
         "pooled": pooled,
         "likelihood": {"note": best} if isinstance(best, str) else estimates.plain(best),
@@ -64,7 +65,7 @@ def analyse_psychometric(
         "mixed": _typical(trials, chosen, best, confidence),
         "levels": _by_level(trials),
     }
-    return {**dict(estimates.plain(result)), "answer": _in_words(pooled, own)}
+    return {**dict(estimates.plain(result)), "answer": _in_words(result)}
 
 
 def _one(part: pd.DataFrame, model: Model, confidence: float) -> dict[str, Any]:
@@ -92,7 +93,12 @@ def _typical(trials: pd.DataFrame, model: Model, best: LikelihoodFit | str, conf
     if isinstance(best, str) or trials["participant"].nunique() < 2 or model.sigmoid.name not in LINKS_OF:
         return None
     link = LINKS_OF[model.sigmoid.name]
-    return psychometric_mixed(trials, link=link, guess=best.guess, lapse=best.lapse, confidence=confidence)
+    found = psychometric_mixed(trials, link=link, guess=best.guess, lapse=best.lapse, confidence=confidence)
+    shown = trials.loc[trials["shown"] > 0, "level"]
+    if found["threshold"] is None or shown.min() <= found["threshold"] <= shown.max():
+        return found
+    note = f"outside the levels shown ({shown.min():g} to {shown.max():g})"
+    return {**found, "threshold": None, "note": "; ".join(filter(None, (note, found["note"])))}
 
 
 def _group(own: list[dict[str, Any]], model: Model, confidence: float) -> dict[str, Any]:
@@ -133,17 +139,31 @@ def _by_level(trials: pd.DataFrame) -> list[dict[str, Any]]:
     ]
 
 
-def _in_words(pooled: dict[str, Any], own: list[dict[str, Any]]) -> str:
+def _in_words(result: dict[str, Any]) -> str:
+    """The threshold to be believed: of a group over participants, of one participant that participant's own."""
+    pooled, own, group, mixed = (result[name] for name in ("pooled", "participants", "group", "mixed"))
     if not pooled["threshold"]:
         return f"No psychometric function can be fitted: {pooled['note']}."
-    threshold = pooled["threshold"]
-    if threshold["value"] is None:
-        return f"No threshold can be given: {threshold['note']}."
-    low, high = threshold["interval"]["low"], threshold["interval"]["high"]
+    if len(own) == 1:
+        if pooled["threshold"]["value"] is None:
+            return f"No threshold can be given: {pooled['threshold']['note']}."
+        return f"The threshold is {_with_interval(pooled['threshold']['value'], **pooled['threshold']['interval'])}."
+    if mixed and mixed["threshold"] is not None:
+        found = _with_interval(mixed["threshold"], mixed["low"], mixed["high"], result["confidence"])
+        text = f"The threshold of a typical one of {mixed['participants']} participants is {found}, by a mixed model"
+    elif group["mean_threshold"] is not None:
+        found = _with_interval(group["mean_threshold"], group["low"], group["high"], result["confidence"])
+        text = f"The mean threshold of {group['participants']} participants is {found}, by Student's t over them"
+    else:
+        return f"No threshold of the group can be given: {group['note']}."
+    if pooled["threshold"]["value"] is None:
+        return f"{text}."
+    found = pooled["threshold"]
+    alone = _with_interval(found["value"], found["interval"]["low"], found["interval"]["high"])
+    return f"{text}. All answers taken as one person's give {alone}, which is too sure where people differ."
+
+
+def _with_interval(value: float, low: float | None, high: float | None, confidence: float | None = None) -> str:
+    """A number and its interval; open ends are said."""
     ends = f"{'open' if low is None else format(low, '.4g')} to {'open' if high is None else format(high, '.4g')}"
-    text = f"The threshold is {threshold['value']:.4g} (95% interval {ends})"
-    if len(own) > 1:
-        return (
-            f"{text}, all answers of {len(own)} participants taken as one person's; the group's own estimates follow."
-        )
-    return f"{text}."
+    return f"{value:.4g} ({f'{100 * confidence:g}% interval ' if confidence else ''}{ends})"
