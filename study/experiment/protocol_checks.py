@@ -7,19 +7,48 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import Protocol as Shape
 
 from pydantic import ValidationError
 
 from study.experiment.protocol_errors import KeyMismatchError
-from study.experiment.protocol_studies import OPTIMUM_CUTS, StudySpec, check_once
-
-if TYPE_CHECKING:
-    from study.experiment.protocol import Protocol
-    from study.experiment.protocol_stimuli import TransitionSpec
+from study.experiment.protocol_stimuli import Points, Timing, TransitionSpec
+from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec, check_once
 
 
-def check_whole(protocol: Protocol) -> None:
+class Whole(Shape):
+    """What is looked at of a protocol (`protocol.Protocol`, which imports this module)."""
+
+    @property
+    def transitions(self) -> tuple[TransitionSpec, ...]:
+        """All transitions."""
+
+    @property
+    def studies(self) -> tuple[StudySpec, ...]:
+        """All studies."""
+
+    @property
+    def timing(self) -> Timing:
+        """Times of a trial."""
+
+    @property
+    def analysis(self) -> AnalysisSettings:
+        """Decisions about the analysis."""
+
+    def transitions_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
+        """The transitions of a study's trials."""
+
+    def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
+        """The transitions of its practice alone."""
+
+    def trials_of(self, study: StudySpec) -> int:
+        """How many trials it has."""
+
+    def points_for(self, study: StudySpec, transition: TransitionSpec) -> Points:
+        """The conditions for one transition in it."""
+
+
+def check_whole(protocol: Whole) -> None:
     """Refuse a protocol whose parts contradict each other."""
     _check_names(protocol)
     for study in protocol.studies:
@@ -28,7 +57,7 @@ def check_whole(protocol: Protocol) -> None:
     _check_analysis(protocol)
 
 
-def _check_names(protocol: Protocol) -> None:
+def _check_names(protocol: Whole) -> None:
     """Refuse names that stand twice, and studies that name transitions that there are not."""
     for kind in ("transitions", "studies", "form"):
         names = [part.name for part in getattr(protocol, kind)]
@@ -55,7 +84,7 @@ def _check_known(names: Sequence[str], known: Sequence[str], what: str, *locatio
             raise KeyMismatchError(f"expected names of {what}, found {name!r}; {hint}", *location)
 
 
-def _check_analysis(protocol: Protocol) -> None:
+def _check_analysis(protocol: Whole) -> None:
     """Refuse decisions about the analysis that the studies can't carry out."""
     preferences = [study.name for study in protocol.studies if study.task == "preference"]
     names = protocol.analysis.confirmatory
@@ -78,7 +107,7 @@ def _check_analysis(protocol: Protocol) -> None:
         )
 
 
-def _check_lengths(protocol: Protocol, study: StudySpec, index: int) -> None:
+def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
     """Refuse more practice, or more attention checks, than a study has trials."""
     trials = protocol.trials_of(study)
     for key in ("practice", "attention_checks"):
@@ -92,7 +121,7 @@ def _check_lengths(protocol: Protocol, study: StudySpec, index: int) -> None:
             )
 
 
-def _check_practice(protocol: Protocol, study: StudySpec, index: int) -> None:
+def _check_practice(protocol: Whole, study: StudySpec, index: int) -> None:
     """Refuse practice that shows what the study shows, and transitions for a practice that there is not."""
     where = ("studies", index, "practice_transitions")
     if study.practice_transitions and not study.practice:
@@ -107,7 +136,7 @@ def _check_practice(protocol: Protocol, study: StudySpec, index: int) -> None:
             )
 
 
-def _check_points(protocol: Protocol, study: StudySpec, transition: TransitionSpec) -> None:
+def _check_points(protocol: Whole, study: StudySpec, transition: TransitionSpec) -> None:
     """Refuse merged conditions that leave nothing to choose."""
     where = ("transitions", protocol.transitions.index(transition))
     who = f"for the transition {transition.name!r} in the study {study.name!r}"
