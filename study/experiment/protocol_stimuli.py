@@ -70,6 +70,12 @@ class Timing(Part):
         default=5.0, gt=0, le=600, description="Time to answer; after it the answer is missed. [seconds]"
     )
     pause_s: float = Field(default=1.0, ge=0, le=60, description="Enforced pause after each answer. [seconds]")
+    show_again: int = Field(
+        default=1,
+        ge=0,
+        le=3,
+        description="How often a trial that was badly shown is shown again, at the end of its study.",
+    )
     break_after: int = Field(default=0, ge=0, description="A break after so many trials; 0 for none. [trials]")
 
 

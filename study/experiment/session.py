@@ -58,9 +58,6 @@ Kind = Literal[
 LONGEST_TEXT = 1000
 """Characters of a text that a participant may write in the form."""
 
-MAX_ATTEMPTS = 2
-"""A trial that was shown badly is queued again at the end of its study, this many times in all."""
-
 
 @dataclass(frozen=True)
 class Answer:
@@ -276,7 +273,7 @@ def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     if trial.role == "practice" and not trial_goes_on:
         feedback = Step("feedback", here.study, _feedback(session.protocol, trial, answer), role=trial.role)
         session = _with_steps(session, session.position, [feedback])
-    if not _comes_again(trial, answer.attempt, answer.shown_well) or trial_goes_on:
+    if not _comes_again(session.protocol, trial, answer.attempt, answer.shown_well) or trial_goes_on:
         return session, answer
     end = max(i for i, step in enumerate(session.steps) if step.study == trial.study) + 1
     repeat = _trial_steps(session.protocol, trial, answer.attempt + 1, frozenset())
@@ -298,8 +295,9 @@ def _trials_left(steps: Sequence[Step]) -> tuple[int, ...]:
     return tuple(reversed(left))
 
 
-def _comes_again(trial: Trial, attempt: int, shown_well: bool) -> bool:
-    return not shown_well and attempt < MAX_ATTEMPTS and trial.role != "practice"
+def _comes_again(protocol: Protocol, trial: Trial, attempt: int, shown_well: bool) -> bool:
+    """Whether a trial is queued again: badly shown, and not too often yet, so that no slow machine keeps anyone."""
+    return not shown_well and attempt <= protocol.timing.show_again and trial.role != "practice"
 
 
 def right_answer(trial: Trial) -> str | None:
@@ -339,15 +337,15 @@ def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Co
     if strays := sorted({answer.trial for answer in answers} - known):
         raise SessionError(f"Expected answers to the plan's trials 1 to {len(plan.trials)}, found trials {strays}.")
     steps: list[Step] = []
-    if "consent" not in passed and (text := wording.consent_text(protocol, plan)):
+    if "consent" not in passed and (text := wording.consent_text(protocol)):
         steps.append(Step("consent", text=text))
     if protocol.form and "form" not in passed:
         steps.append(Step("form", text=protocol.texts.form.strip()))
-    if not answers and (text := wording.welcome_text(protocol, plan)):
+    if not answers and (text := wording.welcome_text(protocol)):
         steps.append(Step("instructions", text=text))
     for name in dict.fromkeys(trial.study for trial in plan.trials):
         steps += _study_steps(protocol, plan, protocol.study(name), answers)
-    if text := wording.debrief_text(protocol, plan):
+    if text := wording.debrief_text(protocol):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
 
@@ -363,7 +361,7 @@ def _study_steps(protocol: Protocol, plan: Plan, study: StudySpec, answers: Sequ
             continue
         if practising and trial.role != "practice" and protocol.texts.practice_over:
             steps.append(Step("instructions", study.name, protocol.texts.practice_over.strip()))
-        attempt, done = _state(study, trial, [answer for answer in answers if answer.trial == trial.trial])
+        attempt, done = _state(protocol, study, trial, [answer for answer in answers if answer.trial == trial.trial])
         practising = trial.role == "practice" and done is not None
         if done is None:
             continue
@@ -372,13 +370,15 @@ def _study_steps(protocol: Protocol, plan: Plan, study: StudySpec, answers: Sequ
         if break_after and count % break_after == 0 and not last and attempt == 1 and trial.role != "practice":
             steps.append(Step("break", study.name, protocol.texts.break_text.strip()))
     steps += again
-    if steps and (text := wording.instructions_text(protocol, study, plan)):
+    if steps and (text := wording.instructions_text(protocol, study)):
         example = next(trial.first for trial in plan.trials if trial.study == study.name) if study.example else ""
         steps.insert(0, Step("instructions", study.name, text, stimulus=example))
     return steps
 
 
-def _state(study: StudySpec, trial: Trial, answers: Sequence[Answer]) -> tuple[int, frozenset[str] | None]:
+def _state(
+    protocol: Protocol, study: StudySpec, trial: Trial, answers: Sequence[Answer]
+) -> tuple[int, frozenset[str] | None]:
     """Which showing of a trial is due and which of its items are answered; None for the items where it is finished."""
     items = {""} if trial.role == "check" else {item.name for item in study.items} or {""}
     attempt = max((answer.attempt for answer in answers), default=1)
@@ -386,7 +386,7 @@ def _state(study: StudySpec, trial: Trial, answers: Sequence[Answer]) -> tuple[i
     done = frozenset(answer.item for answer in latest)
     if not items <= done:
         return attempt, done
-    if not _comes_again(trial, attempt, all(answer.shown_well for answer in latest)):
+    if not _comes_again(protocol, trial, attempt, all(answer.shown_well for answer in latest)):
         return attempt, None
     return attempt + 1, frozenset()
 

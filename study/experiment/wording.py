@@ -1,8 +1,8 @@
 """Wording: what participants read, with what the protocol leaves to Segue put in; and how long it all takes.
 
-A protocol and a plan come in; texts go out. In the texts of consent, welcome, instructions, question and debriefing
+A protocol comes in; texts go out. In the texts of consent, welcome, instructions, question and debriefing
 `{standard}` stands for the built-in text of the protocol's language, and other words in braces for numbers that follow
-from the protocol and the plan (`protocol_parts.SLOTS`), so that no text can say another number than the study has.
+from the protocol (`protocol_parts.SLOTS`), so that no text can say another number than the study has.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 from study.experiment.languages import words
 
 if TYPE_CHECKING:
-    from study.experiment.plan import Plan, Trial
     from study.experiment.protocol import Protocol, StudySpec
 
 _FILM_BESIDES_S = 1.0
@@ -35,26 +34,26 @@ class Read:
     text: str
 
 
-def consent_text(protocol: Protocol, plan: Plan) -> str:
+def consent_text(protocol: Protocol) -> str:
     """What is agreed to; empty where nobody is asked."""
-    return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol, plan))
+    return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol))
 
 
-def welcome_text(protocol: Protocol, plan: Plan) -> str:
+def welcome_text(protocol: Protocol) -> str:
     """What is read first; empty for nothing."""
     pairs = any(study.task != "rating" for study in protocol.studies)
     standard = _standard(protocol, "welcome_pairs" if pairs else "welcome_films")
     if len(protocol.studies) > 1:
         standard += "\n\n" + _standard(protocol, "parts")
-    return _filled(protocol.texts.welcome, standard, _slots(protocol, plan))
+    return _filled(protocol.texts.welcome, standard, _slots(protocol))
 
 
-def instructions_text(protocol: Protocol, study: StudySpec, plan: Plan) -> str:
+def instructions_text(protocol: Protocol, study: StudySpec) -> str:
     """What is read before a study; empty for nothing."""
     standard = _standard(protocol, study.task)
     if study.practice:
         standard += "\n\n" + _standard(protocol, "practice")
-    return _filled(study.instructions, standard, {**_slots(protocol, plan), "practice": str(study.practice)})
+    return _filled(study.instructions, standard, {**_slots(protocol), "practice": str(study.practice)})
 
 
 def question_text(protocol: Protocol, study: StudySpec) -> str:
@@ -62,9 +61,9 @@ def question_text(protocol: Protocol, study: StudySpec) -> str:
     return _filled(study.question, _standard(protocol, f"question_{study.task}"), {})
 
 
-def debrief_text(protocol: Protocol, plan: Plan) -> str:
+def debrief_text(protocol: Protocol) -> str:
     """What is read at the end; empty for nothing."""
-    return _filled(protocol.texts.debrief, _standard(protocol, "debrief"), _slots(protocol, plan))
+    return _filled(protocol.texts.debrief, _standard(protocol, "debrief"), _slots(protocol))
 
 
 def _standard(protocol: Protocol, name: str) -> str:
@@ -79,45 +78,55 @@ def _filled(text: str, standard: str, slots: Mapping[str, str]) -> str:
     return re.sub(r"\n\s*\n(\s*\n)+", "\n\n", filled).strip()
 
 
-def _slots(protocol: Protocol, plan: Plan) -> dict[str, str]:
+def _slots(protocol: Protocol) -> dict[str, str]:
     return {
-        "minutes": str(minutes(duration_s(protocol, plan))),
-        "trials": str(sum(trial.role == "trial" for trial in plan.trials)),
+        "minutes": str(minutes(duration_s(protocol))),
+        "trials": str(sum(protocol.trials_of(study) for study in protocol.studies)),
         "studies": str(len(protocol.studies)),
         "answer_s": f"{protocol.timing.answer_s:g}",
         "contact": protocol.consent.contact,
     }
 
 
-def duration_s(protocol: Protocol, plan: Plan) -> float:
+def duration_s(protocol: Protocol, *, at_most: bool = False) -> float:
     """How long a sitting takes, in seconds: films, gaps, answers, pauses, breaks, the form and reading.
+
+    Parameters
+    ----------
+    at_most
+        With every answer at the end of its window, and every trial shown again because its films stalled.
 
     Notes
     -----
     Reckoned with films a second longer than entry and exit, two seconds for an answer (six for an item of a rating)
     and 15 letters read a second.
     """
-    timing = protocol.timing
-    total = sum(_trial_s(protocol, trial) for trial in plan.trials)
-    if timing.break_after:
-        total += _BREAK_S * ((len(plan.trials) - 1) // timing.break_after)
-    read = [protocol.consent.text, protocol.texts.welcome, protocol.texts.debrief]
-    standards = ["consent", "welcome_pairs", "debrief"]
-    read += [study.instructions for study in protocol.studies]
-    standards += [study.task for study in protocol.studies]
-    letters = sum(
-        len(text.replace("{standard}", _standard(protocol, name))) for text, name in zip(read, standards, strict=True)
-    )
-    return total + _FIELD_S * len(protocol.form) + letters / _LETTERS_A_SECOND
+    total, counted = 0.0, 0
+    for study in protocol.studies:
+        again = 1 + (protocol.timing.show_again if at_most else 0)
+        shown = again * (protocol.trials_of(study) + study.attention_checks) + study.practice
+        total += shown * _trial_s(protocol, study, at_most)
+        counted += protocol.trials_of(study) + study.attention_checks
+    if protocol.timing.break_after:
+        total += _BREAK_S * ((counted - 1) // protocol.timing.break_after)
+    return total + _FIELD_S * len(protocol.form) + _letters(protocol) / _LETTERS_A_SECOND
 
 
-def _trial_s(protocol: Protocol, trial: Trial) -> float:
+def _trial_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
     stimuli, timing = protocol.stimuli, protocol.timing
     film_s = stimuli.entry_s + stimuli.exit_s + _FILM_BESIDES_S
-    shown_s = 2 * film_s + timing.gap_s if trial.second else film_s
-    items = protocol.study(trial.study).items
-    asked_s = _ITEM_S * len(items) if items and trial.role != "check" else min(_ANSWER_S, timing.answer_s)
-    return shown_s + asked_s + timing.pause_s
+    if study.task == "rating":
+        return film_s + _ITEM_S * len(study.items) + timing.pause_s
+    answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
+    return 2 * film_s + timing.gap_s + answer_s + timing.pause_s
+
+
+def _letters(protocol: Protocol) -> int:
+    """How much there is to read before, between and after the trials."""
+    texts = [(protocol.consent.text, "consent"), (protocol.texts.welcome, "welcome_pairs")]
+    texts += [(study.instructions, study.task) for study in protocol.studies]
+    texts.append((protocol.texts.debrief, "debrief"))
+    return sum(len(text.strip().replace("{standard}", _standard(protocol, name))) for text, name in texts)
 
 
 def minutes(seconds: float) -> int:
@@ -126,21 +135,21 @@ def minutes(seconds: float) -> int:
     return whole if whole <= 10 else 5 * math.ceil(whole / 5)
 
 
-def all_texts(protocol: Protocol, plan: Plan) -> tuple[Read, ...]:
+def all_texts(protocol: Protocol) -> tuple[Read, ...]:
     """Every text of a sitting that participants read, in its order, and then the small words of the front ends."""
     consent = protocol.consent
-    found = [Read("consent.text", consent_text(protocol, plan))]
+    found = [Read("consent.text", consent_text(protocol))]
     found += [Read(f"consent.{name}", getattr(consent, name)) for name in ("agree", "decline", "declined")]
     for field in protocol.form:
         found.append(Read(f"form: {field.name}", " | ".join([field.label, *field.choices])))
-    found.append(Read("texts.welcome", welcome_text(protocol, plan)))
+    found.append(Read("texts.welcome", welcome_text(protocol)))
     for study in protocol.studies:
-        found.append(Read(f"{study.name}: instructions", instructions_text(protocol, study, plan)))
+        found.append(Read(f"{study.name}: instructions", instructions_text(protocol, study)))
         found.append(Read(f"{study.name}: question", question_text(protocol, study)))
         for item in study.items:
             ends = f" [{item.low} ... {item.high}]" if item.low or item.high else ""
             found.append(Read(f"{study.name}: item {item.name}", item.question + ends))
-    found.append(Read("texts.debrief", debrief_text(protocol, plan)))
+    found.append(Read("texts.debrief", debrief_text(protocol)))
     small = [name for name in type(protocol.texts).model_fields if name not in ("welcome", "debrief")]
     found += [Read(f"texts.{name}", getattr(protocol.texts, name)) for name in small]
     return tuple(read for read in found if read.text)

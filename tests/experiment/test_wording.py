@@ -75,8 +75,8 @@ def test_a_protocol_in_another_language_shows_no_built_in_english(language, toy_
     protocol = changed(toy_protocol, top=top)
     plan = first_plan(protocol, toy_stimuli)
     english = changed(toy_protocol)
-    known = {read.text for read in all_texts(english, plan)} - {read.text for read in all_texts(toy_protocol, plan)}
-    read = {read.text for read in all_texts(protocol, plan)}
+    known = {read.text for read in all_texts(english)} - {read.text for read in all_texts(toy_protocol)}
+    read = {read.text for read in all_texts(protocol)}
     assert not known & read
     step = current(open_session(protocol, plan))
     assert step.kind == "consent"
@@ -84,14 +84,13 @@ def test_a_protocol_in_another_language_shows_no_built_in_english(language, toy_
     assert not slots(step.text)
 
 
-def test_slots_are_the_numbers_of_the_study(toy_protocol, toy_stimuli):
+def test_slots_are_the_numbers_of_the_study(toy_protocol):
     protocol = changed(toy_protocol)
-    plan = first_plan(protocol, toy_stimuli)
-    read = {each.where: each.text for each in all_texts(protocol, plan)}
+    read = {each.where: each.text for each in all_texts(protocol)}
     assert "You will see 8 pairs" in read["texts.welcome"]
     assert "There are 2 parts." in read["texts.welcome"]
     assert "you have 5\nseconds" in read["jnd: instructions"]
-    assert f"about {minutes(duration_s(protocol, plan))} minutes" in read["consent.text"].replace("\n", " ")
+    assert f"about {minutes(duration_s(protocol))} minutes" in read["consent.text"].replace("\n", " ")
     assert "| female | male |" in read["form: gender"]
 
 
@@ -181,14 +180,23 @@ def test_instructions_that_speak_of_another_answer_window_are_noticed(toy_protoc
     assert bool(notes) == said
 
 
-def test_a_sitting_lasts_as_long_as_its_parts(toy_protocol, toy_stimuli):
+def test_a_sitting_lasts_as_long_as_its_parts(toy_protocol):
     """Eight pairs of 0.3 + 0.3 + 1 s films, a gap of one second, two to answer, one of pause; then reading."""
-    plan = first_plan(toy_protocol, toy_stimuli)
-    letters = sum(len(text) for text in ("Welcome.", "Thank you.", "Some pairs are the same."))
-    instructions = sum(len(study.instructions) for study in toy_protocol.studies)
-    letters += instructions - len("Some pairs are the same.")
-    assert duration_s(toy_protocol, plan) == pytest.approx(8 * (2 * 1.6 + 1 + 2 + 1) + letters / 15)
+    reading = sum(len(text) for text in ("Welcome.", "Thank you.", "Some pairs are the same.")) / 15
+    assert duration_s(toy_protocol) == pytest.approx(8 * (2 * 1.6 + 1 + 2 + 1) + reading)
+    assert duration_s(toy_protocol, at_most=True) == pytest.approx(16 * (2 * 1.6 + 1 + 5 + 1) + reading)
     assert [minutes(s) for s in (1, 60, 61, 599, 601, 960)] == [1, 1, 2, 10, 15, 20]
+
+
+def test_the_number_of_trials_is_that_of_the_plan(toy_protocol, rating_protocol, make_stimuli):
+    more = toy_protocol.text.replace(
+        'order = "both"', 'order = "both"\nrepeats = 2\npractice = 3\nattention_checks = 2'
+    )
+    for protocol in (toy_protocol, rating_protocol, parse_protocol(more)):
+        plan = draw_plan(protocol, make_stimuli(protocol).pairs, "p01")
+        for study in protocol.studies:
+            shown = [trial for trial in plan.trials if trial.study == study.name and trial.role == "trial"]
+            assert protocol.trials_of(study) == len(shown)
 
 
 def test_the_language_files_are_toml_that_a_person_can_read(repository):
