@@ -107,16 +107,32 @@ def headlines(analysis: dict[str, Any]) -> list[str]:
 @click.command()
 @click.argument("protocol")
 @library_option
+@click.option("--texts", is_flag=True, help="Print all that participants read, too.")
 @json_option
-def check(protocol: str, library: str | None, as_json: bool) -> None:
-    """Everything that would go wrong later, now. Exit status 2 where something can't be shown."""
+def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> None:
+    """Everything that would go wrong later, now, and what has still to be written.
+
+    Exit status 2 where something can't be shown.
+    """
+    from study.experiment.proofreading import to_do
     from study.experiment.stimuli import check as problems_of
+    from study.experiment.wording import all_texts, duration_s, minutes
     from study.motion.library import open_library
 
     checked, opened = load(protocol), open_library(library or "synthetic")
     problems = problems_of(checked, opened)
-    text = "\n".join(problems) or f"{checked.name}: all that it shows can be shown with the library {opened.name}."
-    emit({"protocol": checked.name, "library": opened.name, "problems": problems}, as_json, text)
+    read = [asdict(one) for one in all_texts(checked)] if texts else []
+    usual, longest = (minutes(duration_s(checked, at_most=most)) for most in (False, True))
+    notes = to_do(checked)
+    lines = [f"{one['where']}\n    {one['text']}\n" for one in read]
+    lines += problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]
+    lines.append(
+        f"A sitting takes about {usual} minutes, {longest} where every answer and every film takes its longest."
+    )
+    lines += [f"To do: {note}" for note in notes]
+    result = {"protocol": checked.name, "library": opened.name, "problems": problems, "notes": notes}
+    result |= {"minutes": usual, "minutes_at_most": longest} | ({"texts": read} if texts else {})
+    emit(result, as_json, "\n".join(lines))
     if problems:
         raise click.exceptions.Exit(2)
 
