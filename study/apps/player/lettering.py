@@ -66,6 +66,7 @@ def fonts_for(texts: Iterable[str], own: Path | None = None) -> Fonts:
     return tuple(fonts)
 
 
+@lru_cache(maxsize=4096)
 def _visible(letter: str) -> bool:
     return not letter.isspace() and unicodedata.category(letter) not in ("Cc", "Cf", "Mn", "Me")
 
@@ -92,6 +93,7 @@ def _refuse(missing: set[str]) -> None:
     )
 
 
+@lru_cache(maxsize=4096)
 def _script(letter: str) -> str:
     return unicodedata.name(letter, "UNKNOWN").split()[0]
 
@@ -128,7 +130,9 @@ def _system_fonts() -> list[Path]:
         # "Sans" takes back what is no blemish: "NotoSansMono" stays one, "NotoSans" is none.
         return sum(word in name for word in _LESS_PLAIN) - ("sans" in name), name
 
-    return sorted(map(Path, findSystemFonts()), key=order)
+    # Apple's font of last resort has a box for every letter that there is.
+    fonts = (Path(font) for font in findSystemFonts() if "lastresort" not in font.lower())
+    return sorted(fonts, key=order)
 
 
 @lru_cache(maxsize=128)
@@ -163,15 +167,15 @@ class Face:
             x += loaded.getlength(part)
 
     def _runs(self, text: str) -> list[tuple[Path, str]]:
-        """Parts of a line by font; one part wherever one font has it all, so that letters join and turn round."""
-        whole = (font for font in self._fonts if all(c in letters_of(font) for c in text if _visible(c)))
-        if (font := next(whole, None)) is not None:
-            return [(font, text)]
+        """Parts of a line by font; letters that join stay together wherever one font has the whole line."""
+        if any(_script(letter) in _JOINING for letter in text):
+            whole = (font for font in self._fonts if all(c in letters_of(font) for c in text if _visible(c)))
+            if (font := next(whole, None)) is not None:
+                return [(font, text)]
         runs: list[tuple[Path, str]] = []
         for letter in text:
-            stays = bool(runs) and (not _visible(letter) or letter in letters_of(runs[-1][0]))
             has = (font for font in self._fonts if letter in letters_of(font))
-            font = runs[-1][0] if stays else next(has, self._fonts[0])
+            font = runs[-1][0] if runs and not _visible(letter) else next(has, self._fonts[0])
             if runs and runs[-1][0] == font:
                 runs[-1] = font, runs[-1][1] + letter
             else:
@@ -195,6 +199,19 @@ def wrapped(text: str, face: Face, limit: float) -> list[str]:
             lines.append("")
         lines += _filled(list(_pieces(paragraph)), face, limit)
     return lines
+
+
+def balanced(text: str, face: Face, limit: float) -> list[str]:
+    """A few lines to stand in the middle: as even as can be, so that no last word stands alone."""
+    lines = wrapped(text, face, limit)
+    low, high = limit / max(1, len(lines)), limit
+    while len(lines) > 1 and high - low > 1.0:
+        middle = (low + high) / 2
+        if len(wrapped(text, face, middle)) > len(lines):
+            low = middle
+        else:
+            high = middle
+    return wrapped(text, face, high)
 
 
 def _filled(pieces: Sequence[str], face: Face, limit: float) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from study.apps.player.lettering import Face, leftwards, wrapped
+from study.apps.player.lettering import Face, balanced, leftwards, wrapped
 from study.apps.player.pages import Box, Button, DrawnPage, Look, Page
 from study.errors import SessionError
 
@@ -39,7 +39,7 @@ def draw_page(page: Page, size: tuple[int, int], look: Look, *, must_fit: bool =
 
     width, height = size = max(size[0], SMALLEST[0]), max(size[1], SMALLEST[1])
     base = min(height / 27.0, width / 40.0)
-    for shrink in (1.0, 0.9, 0.8, 0.7, 0.6, 0.5):
+    for shrink in np.arange(1.0, 0.45, -0.05):
         sheet = _Sheet(page, size, look, base, max(base * shrink, 6.0))
         if sheet.height <= height * 0.84:
             break
@@ -54,6 +54,9 @@ def draw_page(page: Page, size: tuple[int, int], look: Look, *, must_fit: bool =
     return DrawnPage(page, np.asarray(image, dtype=np.uint8), tuple(boxes))
 
 
+_ROW_GAP = 0.5
+
+
 class _Sheet:
     """A page at one size of text: measured first, then drawn from the top down, as blocks that stand in its middle."""
 
@@ -61,8 +64,11 @@ class _Sheet:
         self.page, self.size, self.look, self.base, self.em = page, size, look, base, em
         column = min(size[0] * 0.86, base * 33)
         self.text = wrapped(page.text, self._font(1.0), column)
-        self.question = wrapped(page.question, self._font(1.3), column)
-        self.hint = wrapped(page.hint, self._font(0.82), column)
+        if len(self.text) <= 2:
+            self.text = balanced(page.text, self._font(1.0), column)
+        self.question = balanced(page.question, self._font(1.3), column)
+        self.hint = balanced(page.hint, self._font(0.82), column)
+        self.stacked = False
         self.rows = self._button_rows(size[0] * 0.92)
         self.parts = self._parts()
         self.height = sum(high for _, high in self.parts) + self._gaps()
@@ -81,8 +87,8 @@ class _Sheet:
         if self.page.hint:
             parts.append(("hint", 1.25 * em * len(self.hint)))
         if self.rows:
-            row = self._button_height() + 0.8 * em
-            parts.append(("buttons", row * len(self.rows) - 0.8 * em))
+            gap = _ROW_GAP * em
+            parts.append(("buttons", (self._button_height() + gap) * len(self.rows) - gap))
         if self.page.low or self.page.high:
             parts.append(("ends", 1.2 * em))
         return parts
@@ -95,6 +101,8 @@ class _Sheet:
         return {"question": 1.4, "buttons": 2.0, "ends": 0.5, "hint": 0.5}.get(name, 1.2)
 
     def _button_height(self) -> float:
+        if self.stacked:
+            return self.em * 2.2
         return self.em * (3.4 if any(button.key_words for button in self.page.buttons) else 2.4)
 
     def _button_width(self, button: Button) -> float:
@@ -107,20 +115,17 @@ class _Sheet:
         return all(len(button.words) <= 2 for button in self.page.buttons)
 
     def _button_rows(self, limit: float) -> list[list[tuple[int, float]]]:
-        """Numbers and widths of the buttons, row by row; all as wide as the widest, where that fits; a scale in one."""
+        """Numbers and widths of the buttons, row by row: all as wide as the widest in one row, or one below another."""
         widths = [self._button_width(button) for button in self.page.buttons]
         gap, count = self._button_gap, len(widths)
         if widths and max(widths) * count + gap * (count - 1) <= limit:
-            widths = [max(widths)] * count
-        elif self._scale:
-            return [list(enumerate([(limit - gap * (count - 1)) / count] * count))]
-        rows: list[list[tuple[int, float]]] = []
-        for number, wide in enumerate(widths):
-            used = sum(each + gap for _, each in rows[-1]) if rows else limit + 1
-            if used + wide > limit:
-                rows.append([])
-            rows[-1].append((number, wide))
-        return rows
+            return [list(enumerate([max(widths)] * count))]
+        if self._scale:
+            return [list(enumerate([(limit - gap * (count - 1)) / count] * count))] if widths else []
+        self.stacked = True
+        # Beside the words, the key's cap.
+        wide = min(limit, max(widths) + 2.2 * self.em)
+        return [[(number, wide)] for number in range(count)]
 
     @property
     def _button_gap(self) -> float:
@@ -183,7 +188,7 @@ class _Sheet:
                 boxes.append((left, top, left + wide, top + high))
                 self._draw_button(pen, self.page.buttons[number], boxes[-1], number == self.page.chosen)
                 left += wide + gap
-            top += high + 0.8 * self.em
+            top += high + _ROW_GAP * self.em
         return boxes
 
     def _draw_button(self, pen: ImageDraw, button: Button, box: Box, chosen: bool) -> None:
@@ -195,16 +200,23 @@ class _Sheet:
             outline=self.look.mix(0.95 if chosen else 0.38),
             width=max(1, round(em * (0.16 if chosen else 0.06))),
         )
-        middle = (left + right) / 2
+        middle, y = (left + right) / 2, (top + bottom) / 2
         if not button.key_words:
-            self._middle(pen, button.words, (top + bottom) / 2, 1.0, 1.0, middle)
-            return
-        self._middle(pen, button.words, top + 1.3 * em, 1.0, 1.0, middle)
-        half = max(0.75 * em, self._font(0.68).getlength(button.key_words) / 2 + 0.35 * em)
-        y = top + 2.55 * em
-        cap = (middle - half, y - 0.52 * em, middle + half, y + 0.52 * em)
+            self._middle(pen, button.words, y, 1.0, 1.0, middle)
+        elif self.stacked:
+            self._draw_cap(pen, button.key_words, left + 1.3 * em, y)
+            self._font(1.0).draw(pen, (left + 2.6 * em, y), button.words, self.look.mix(1.0), "l")
+        else:
+            self._middle(pen, button.words, top + 1.3 * em, 1.0, 1.0, middle)
+            self._draw_cap(pen, button.key_words, middle, top + 2.55 * em)
+
+    def _draw_cap(self, pen: ImageDraw, words: str, x: float, y: float) -> None:
+        """A key as it looks on a keyboard."""
+        em = self.em
+        half = max(0.75 * em, self._font(0.68).getlength(words) / 2 + 0.35 * em)
+        cap = (x - half, y - 0.52 * em, x + half, y + 0.52 * em)
         pen.rounded_rectangle(cap, radius=0.2 * em, outline=self.look.mix(0.32), width=max(1, round(em * 0.05)))
-        self._middle(pen, button.key_words, y, 0.68, 0.66, middle)
+        self._middle(pen, words, y, 0.68, 0.66, x)
 
     def _draw_ends(self, pen: ImageDraw, top: float, boxes: Sequence[Box]) -> None:
         """Words under the ends of a scale."""

@@ -86,7 +86,8 @@ def test_a_scale_of_eleven_points_is_one_row_with_its_words_at_the_ends() -> Non
 def test_many_long_choices_take_several_rows() -> None:
     choices = tuple(Button(f"c{i}", f"a rather long choice, number {i}", str(i), str(i)) for i in range(1, 7))
     boxes = draw_page(Page(question="Which?", buttons=choices), (1000, 700), LIGHT).boxes
-    assert len({top for _, top, _, _ in boxes}) > 1
+    assert len({top for _, top, _, _ in boxes}) == 6  # one below another, all alike
+    assert len({(left, right) for left, _, right, _ in boxes}) == 1
     assert all(0 < left < right < 1000 and 0 < top < bottom < 700 for left, top, right, bottom in boxes)
 
 
@@ -125,3 +126,42 @@ def test_a_font_that_is_none_is_refused(tmp_path: Path) -> None:
     broken.write_text("no font")
     with pytest.raises(SessionError, match=r"Expected a font file at .*font.ttf"):
         draw_page(ASK, (640, 480), Look((0, 0, 0), (broken,)))
+
+
+def test_a_way_back_stands_in_the_corner_and_is_reached_by_key_mouse_and_arrows() -> None:
+    page = replace(ASK, back=Button("back", "Back", "up", "↑"))
+    drawn = draw_page(page, (1280, 800), LIGHT)
+    left, top, right, bottom = drawn.boxes[2]
+    assert 0 < left < right < 300
+    assert 700 < top < bottom < 800
+    assert drawn.boxes[:2] == draw_page(ASK, (1280, 800), LIGHT).boxes  # it moves nothing
+    assert drawn.pressed("up") == page.back == drawn.clicked(left + 5, top + 5)
+    last = moved(page, "left")
+    assert last is not None
+    assert draw_page(last, (640, 480), LIGHT).pressed("enter") == page.back
+
+
+def test_the_space_bar_takes_what_the_arrow_keys_stand_on_but_is_a_letter_in_a_field() -> None:
+    assert draw_page(replace(ASK, chosen=1), (640, 480), LIGHT).pressed("space") == TWO[1]
+    field = Page(question="Remarks?", entry="a", buttons=(Button("go-on", "Continue", "enter", "Enter"),), chosen=0)
+    assert draw_page(field, (640, 480), LIGHT).pressed("space") is None
+
+
+def test_enter_takes_the_only_button_and_what_the_space_bar_takes() -> None:
+    go_on, example = Button("go-on", "Continue", "space", "Space"), Button("example", "Example", "e", "E")
+    for buttons in ((go_on,), (go_on, example), (Button("go-on", "Continue"),)):
+        assert draw_page(Page("Read.", buttons=buttons), (640, 480), LIGHT).pressed("enter") == buttons[0]
+    assert draw_page(ASK, (640, 480), LIGHT).pressed("enter") is None
+
+
+def test_questions_have_lines_of_like_length() -> None:
+    long = replace(
+        ASK, question="Which of the two motions that you have just seen was more natural, the first or the last?"
+    )
+    rgb = draw_page(long, (1000, 800), LIGHT).rgb
+    dark = ink(rgb, LIGHT.ground) > 100
+    (_, top, _, _), _ = draw_page(long, (1000, 800), LIGHT).boxes
+    rows = np.flatnonzero(dark[: int(top) - 5].any(axis=1))
+    middle = rows[np.argmax(np.diff(rows))] + 1
+    widths = [np.ptp(np.flatnonzero(part.any(axis=0))) for part in (dark[:middle], dark[middle : int(top) - 5])]
+    assert min(widths) > 0.75 * max(widths)
