@@ -23,6 +23,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from study.analysis.estimates import normal_quantile
 from study.analysis.scoring import maximise
 
 FloatArray = NDArray[np.float64]
@@ -33,6 +34,8 @@ ROOT_TWO = float(np.sqrt(2.0))
 LARGEST_LAPSE = 0.1
 SMALLEST_PROBABILITY = 1e-9
 WIDEST_DELTA = 60.0
+WIDEST_D_PRIME = 12.0
+D_PRIME_POINTS = 60
 
 
 @dataclass(frozen=True)
@@ -226,6 +229,49 @@ def threshold_frames(fits: Fits, kind: Kind = "different", level: float = 0.75) 
     """Return the threshold of every slope in frames, shape (fits, slopes); infinite where it is never reached."""
     delta = threshold_delta(fits.criterion, fits.lapse, kind, level)[:, None]
     return np.asarray(np.where(np.isfinite(delta), delta / fits.slopes, np.inf), dtype=np.float64)
+
+
+# One table of hits and false alarms
+
+
+def d_prime_interval(
+    hits: float, different_pairs: float, alarms: float, same_pairs: float, confidence: float = 0.95
+) -> tuple[float, float | None]:
+    """Return the interval of d-prime by profile likelihood, answers taken as independent; None for an open upper end.
+
+    Parameters
+    ----------
+    hits, different_pairs
+        Answers "different" of all answers where there was a difference.
+    alarms, same_pairs
+        The same where there was none; pairs of both kinds are needed.
+    """
+    frames, reach = np.array([[0.0], [1.0]]), normal_quantile(confidence)
+    counts = (np.array([alarms, hits], dtype=np.float64), np.array([same_pairs, different_pairs], dtype=np.float64))
+    found = fit(frames, counts[0][None], counts[1][None], largest_lapse=0.0)
+    near = np.linspace(-6, 6, D_PRIME_POINTS) * float(np.sqrt(covariance(found, frames, *counts)[2, 2]))
+    line = np.concatenate([[1e-3], np.exp(np.linspace(np.log(0.03), np.log(WIDEST_D_PRIME), D_PRIME_POINTS))])
+    line = np.concatenate([line, np.clip(found.slopes[0, 0] * np.exp(np.clip(near, -9, 9)), 1e-3, WIDEST_D_PRIME)])
+    line = np.unique(line)
+    different, shown = (np.tile(row, (len(line), 1)) for row in counts)
+    low, high = _bounds(frames, 0.0)
+    low, high = np.tile(low, (len(line), 1)), np.tile(high, (len(line), 1))
+    low[:, 2] = high[:, 2] = np.log(line)
+    value = maximise(
+        lambda point, rows: _log_likelihood(point, frames, different[rows], shown[rows]),
+        lambda point, rows: _scores(point, frames, different[rows], shown[rows]),
+        _start(frames, different, shown),
+        low,
+        high,
+    ).value
+    best = max(float(found.log_likelihood[0]), float(value.max()))
+    root = np.sqrt(np.maximum(2 * (best - value), 0.0))
+    inside = np.flatnonzero(root <= reach)
+    first, last = int(inside[0]), int(inside[-1])
+    lower = 0.0 if first == 0 else float(np.interp(reach, root[[first, first - 1]], line[[first, first - 1]]))
+    if last == len(line) - 1:
+        return lower, None
+    return lower, float(np.interp(reach, root[[last, last + 1]], line[[last, last + 1]]))
 
 
 # Covariance

@@ -24,6 +24,7 @@ from study.analysis.same_different import (
 )
 from study.analysis.same_different_mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different_model import ModelFit, fit_model
+from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -218,7 +219,9 @@ def _by_order(given: pd.DataFrame) -> list[dict[str, Any]]:
 # d-prime
 
 
-def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: float) -> dict[str, float | None]:
+def d_prime(
+    hits: float, different_pairs: float, alarms: float, same_pairs: float, confidence: float = 0.95
+) -> dict[str, float | None]:
     """Return d-prime and criterion under the differencing rule, for a table of hits and false alarms.
 
     Parameters
@@ -227,24 +230,36 @@ def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: floa
         Answers "different" of all answers where there was a difference.
     alarms, same_pairs
         The same where there was none.
+    confidence
+        Of the interval.
 
     Returns
     -------
     dict
         `d_prime`, `criterion` (standard deviations of one impression), `standard_error` (of d-prime, by the delta
-        method, answers taken as independent); None where there are no pairs of a kind. d-prime is 0 where hits do not
-        exceed false alarms.
+        method), `low`, `high` (profile likelihood); answers are taken as independent. None where there are no pairs of
+        a kind, and `high` where the answers set no upper end. d-prime is 0 where hits do not exceed false alarms.
+
+    Raises
+    ------
+    AnalysisError
+        For counts that can't be.
 
     Notes
     -----
     One half is added to each count of answers, one to each count of pairs (Hautus 1995), so that 0 and 100% stay
-    finite; this pulls d-prime towards 0 where there are few answers.
+    finite; this pulls d-prime towards 0 where there are few answers. The interval is that of the counts as they are.
     """
     from scipy.optimize import brentq
     from scipy.special import ndtri
 
-    if different_pairs <= 0 or same_pairs <= 0:
-        return {"d_prime": None, "criterion": None, "standard_error": None}
+    for yes, pairs in ((hits, different_pairs), (alarms, same_pairs)):
+        if not 0 <= yes <= pairs < np.inf:
+            raise AnalysisError(
+                f"expected counts with 0 <= different <= pairs, found {yes} of {pairs} pairs; count again"
+            )
+    if different_pairs == 0 or same_pairs == 0:
+        return dict.fromkeys(("d_prime", "criterion", "standard_error", "low", "high"))
     hit, alarm = (hits + 0.5) / (different_pairs + 1), (alarms + 0.5) / (same_pairs + 1)
 
     def solve(hit: float, alarm: float) -> float:
@@ -261,20 +276,18 @@ def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: floa
         by_alarm = (solve(hit, alarm + step) - solve(hit, alarm - step)) / (2 * step)
         variance = by_hit**2 * hit * (1 - hit) / different_pairs + by_alarm**2 * alarm * (1 - alarm) / same_pairs
         error = float(np.sqrt(variance))
-    return {"d_prime": value, "criterion": float(-differencing.ROOT_TWO * ndtri(alarm / 2)), "standard_error": error}
+    low, high = differencing.d_prime_interval(hits, different_pairs, alarms, same_pairs, confidence)
+    criterion = float(-differencing.ROOT_TWO * ndtri(alarm / 2))
+    return {"d_prime": value, "criterion": criterion, "standard_error": error, "low": low, "high": high}
 
 
 def d_prime_table(counts: Counts, confidence: float = 0.95) -> list[dict[str, Any]]:
     """Return d-prime at every level against the pairs with no difference, answers pooled over participants."""
     same = counts.differences == 0
     alarms, same_pairs = float(counts.different[:, same].sum()), float(counts.shown[:, same].sum())
-    times = estimates.normal_quantile(confidence)
     rows: list[dict[str, Any]] = []
     for level in np.flatnonzero(~same):
         hits, pairs = float(counts.different[:, level].sum()), float(counts.shown[:, level].sum())
-        found = d_prime(hits, pairs, alarms, same_pairs)
-        value, error = found["d_prime"], found["standard_error"]
-        low = max(value - times * error, 0.0) if value is not None and error is not None else None
-        high = value + times * error if value is not None and error is not None else None
-        rows.append({"difference_frames": float(counts.differences[level]), **found, "low": low, "high": high})
+        found = d_prime(hits, pairs, alarms, same_pairs, confidence)
+        rows.append({"difference_frames": float(counts.differences[level]), **found})
     return rows

@@ -25,9 +25,9 @@ FINE = (31, 17, 8, 6)
 OVERDISPERSION = np.array([0.0, 0.06, 0.13, 0.25])
 OVERDISPERSION_EDGES = np.array([0.0, 0.03, 0.095, 0.19, 0.999])
 KNOTS = 200
-# Priors Beta(1, power). Lapse rate: half of it lies below 3.4%, nineteen in twenty parts below 14%. Guess rate: a yes-no
-# observer may well say "yes" to every fourth nothing. Overdispersion, the root of the correlation: less than 2% for a
-# correlation of more than 0.01, with which 100 answers are worth 50.
+# Priors Beta(1, power). Lapse rate: half of it lies below 3.4%, nineteen in twenty parts below 14%. Guess rate: a
+# yes-no observer may well say "yes" to every fourth nothing. Overdispersion, the root of the correlation: less than 2%
+# for a correlation of more than 0.01, with which 100 answers are worth 50.
 LAPSE_POWER = 20
 GUESS_POWER = 5
 OVERDISPERSION_POWER = 40
