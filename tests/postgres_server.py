@@ -12,8 +12,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
-ROLE, PASSWORD = "segue", "correct horse"
+ROLE, PASSWORD = "segue", "wombat @ 7/9%"
 NAMES = ("postgres", "nobody")
 
 
@@ -104,7 +105,7 @@ class PostgresServer:
 
     def url(self, database: str, *, password: str = PASSWORD, port: int | None = None) -> str:
         """The URL of a database, over TCP and with a password, as a laboratory uses it."""
-        return f"postgresql+psycopg://{ROLE}:{password.replace(' ', '%20')}@127.0.0.1:{port or self.port}/{database}"
+        return f"postgresql+psycopg://{ROLE}:{quote(password, safe='')}@127.0.0.1:{port or self.port}/{database}"
 
     def _run(self, program: str, *arguments: object) -> None:
         command = [str(self._binaries / program), *map(str, arguments)]
@@ -126,3 +127,8 @@ def _unprivileged(folder: Path) -> dict[str, Any]:
     who = next(known[name] for name in NAMES if name in known)
     os.chown(folder, who.pw_uid, who.pw_gid)
     return {"user": who.pw_uid, "group": who.pw_gid, "extra_groups": []}
+
+
+def without_password(url: str) -> str:
+    """A URL whose password is given elsewhere."""
+    return url.replace(f":{quote(PASSWORD, safe='')}@", "@")

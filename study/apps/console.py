@@ -28,6 +28,18 @@ def library_option(command: Command) -> Command:
     )(command)
 
 
+def database_option(command: Command) -> Command:
+    """Adds `--database` to a verb."""
+    return click.option(
+        "--database",
+        metavar="FILE|URL",
+        envvar="SEGUE_DATABASE",
+        show_envvar=True,
+        help="Where answers are: a file, or postgresql+psycopg://USER@HOST/NAME; responses.sqlite in the results "
+        "folder unless given.",
+    )(command)
+
+
 def emit(result: Mapping[str, Any], as_json: bool, text: str) -> None:
     """Prints a verb's result: the mapping as JSON (numbers that are not finite become null), or the text."""
     from study.analysis.estimates import plain

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.console import emit, json_option, library_option, say
-from study.apps.study_commands import OUT, load, prepare_stimuli, results_folder
+from study.apps.console import database_option, emit, json_option, library_option, say
+from study.apps.study_commands import OUT, check_database, load, prepare_stimuli, results_folder
 
 if TYPE_CHECKING:
     from renderer.window import Window
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), help="Of the trials' order, instead of the protocol's own.")
 @library_option
 @OUT
-@click.option("--database", metavar="URL|FILE", help="Where answers go; responses.sqlite in the results folder.")
+@database_option
 @click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Whose full screen it takes.")
 @click.option("--windowed", is_flag=True, help="In a window, not on the full screen.")
 @click.option("--size", default="1280x800", show_default=True, metavar="WIDTHxHEIGHT", help="Of the window.")
@@ -65,13 +65,15 @@ def play(
     check_display(monitor)
     stimuli = prepare_stimuli(loaded, library)
     folder = results_folder(loaded, out)
+    check_database(database, stimuli)
     record(stimuli, folder)
     with open_responses(database or folder) as responses:
         plan = the_plan(responses, loaded, stimuli, participant, seed, group)
         place = Place(pixels if windowed else None, monitor, not actual_size, font)
         outcome, window = _sit(responses, loaded, stimuli, plan, place)
-    result = {**asdict(outcome), "participant": participant, "folder": str(folder), "window": window}
-    emit(result, as_json, f"{participant}: {outcome.end}; {outcome.answers} answers stored now, in {folder}")
+    where = {"folder": str(folder), "database": responses.place}
+    result = {**asdict(outcome), "participant": participant, **where, "window": window}
+    emit(result, as_json, f"{participant}: {outcome.end}; {outcome.answers} answers stored now, in {responses.place}")
 
 
 def _size(text: str) -> tuple[int, int]:

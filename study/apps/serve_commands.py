@@ -6,8 +6,16 @@ from pathlib import Path
 
 import click
 
-from study.apps.console import library_option, say
-from study.apps.study_commands import OUT, WORKERS, load, prepare_stimuli, render_stimuli, results_folder
+from study.apps.console import database_option, library_option, say
+from study.apps.study_commands import (
+    OUT,
+    WORKERS,
+    check_database,
+    load,
+    prepare_stimuli,
+    render_stimuli,
+    results_folder,
+)
 
 
 @click.command()
@@ -15,6 +23,7 @@ from study.apps.study_commands import OUT, WORKERS, load, prepare_stimuli, rende
 @library_option
 @OUT
 @WORKERS
+@database_option
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0 for all.")
 @click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="0 for any free one.")
 @click.option("--participants", type=click.IntRange(min=1), help="No more than so many; drop-outs are given back.")
@@ -33,6 +42,7 @@ def serve(
     library: str | None,
     out: Path | None,
     workers: int | None,
+    database: str | None,
     host: str,
     port: int,
     participants: int | None,
@@ -56,7 +66,9 @@ def serve(
         )
     if completion_url and not completion_url.startswith(("https://", "http://")):
         raise click.UsageError(f"expected a completion URL that starts with https://, found {completion_url!r}.")
-    render_stimuli(prepare_stimuli(checked, library), folder, workers)
+    stimuli = prepare_stimuli(checked, library)
+    check_database(database, stimuli)
+    render_stimuli(stimuli, folder, workers)
     settings = Settings(
         researcher_token=researcher_token or new_token(),
         most_participants=participants,
@@ -66,10 +78,19 @@ def serve(
         parameters=(*Settings.parameters, *parameters),
     )
 
-    def started(address: str) -> None:
+    def started(address: str, place: str) -> None:
         say(f"participants  {address}/")
         say(f"researcher    {address}/researcher#{settings.researcher_token}")
-        say(f"answers       {folder / 'responses.sqlite'}")
+        say(f"answers       {place}")
         say("Ctrl-C ends it; the same command goes on from there.")
 
-    run(checked, folder, settings, host=host, port=port, behind_proxy=behind_proxy, started=started)
+    run(
+        checked,
+        folder,
+        settings,
+        host=host,
+        port=port,
+        behind_proxy=behind_proxy,
+        database=database,
+        started=started,
+    )

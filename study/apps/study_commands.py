@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.console import emit, json_option, library_option, progress, say
+from study.apps.console import database_option, emit, json_option, library_option, progress, say
 
 if TYPE_CHECKING:
     from study.experiment.protocol import Protocol
@@ -57,16 +57,26 @@ def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> d
     return {**asdict(summary), "folder": str(folder)}
 
 
+def check_database(database: str | None, stimuli: StimulusSet) -> None:
+    """Refuse a database elsewhere that can't be opened, or is about other stimuli, before anything is rendered."""
+    from study.experiment.responses import open_responses, refuse_other_stimuli
+
+    if database is not None:
+        with open_responses(database) as responses:
+            refuse_other_stimuli(responses, [record.id for record in stimuli.records])
+
+
 def simulate_participants(
-    protocol: Protocol, folder: Path, participants: int, seed: int | None = None
+    protocol: Protocol, folder: Path, participants: int, seed: int | None = None, database: str | None = None
 ) -> dict[str, Any]:
     """Simulated sessions on the stimuli of a results folder; the numbers for `--json`."""
     from study.experiment.observers import simulate as simulate_all
     from study.experiment.rendering import read_manifest
-    from study.experiment.responses import open_responses
+    from study.experiment.responses import open_responses, refuse_other_stimuli
 
     manifest = read_manifest(folder)
-    with open_responses(folder) as responses, progress("answers") as report:
+    with open_responses(database or folder) as responses, progress("answers") as report:
+        refuse_other_stimuli(responses, [record.id for record in manifest.records])
         summary = simulate_all(
             protocol,
             manifest,
@@ -75,19 +85,19 @@ def simulate_participants(
             protocol.seed if seed is None else seed,
             lambda done, total: report(done / max(total, 1), f"{done} of {total}"),
         )
-    return {**asdict(summary), "folder": str(folder), "simulated": True}
+    return {**asdict(summary), "folder": str(folder), "database": responses.place, "simulated": True}
 
 
-def analyse_results(folder: Path) -> dict[str, Any]:
+def analyse_results(folder: Path, database: str | None = None) -> dict[str, Any]:
     """All analyses of a results folder, as its protocol decided."""
     from study.analysis.exclusions import rules_of
     from study.analysis.summary import analyse as analyse_all
     from study.experiment.protocol import load_protocol
     from study.experiment.rendering import PROTOCOL
-    from study.experiment.responses import answers_frame, open_responses
+    from study.experiment.responses import answers_frame, open_answers
 
     settings = load_protocol(folder / PROTOCOL).analysis
-    with open_responses(folder) as responses:
+    with open_answers(folder, database) as responses:
         answers, checks = answers_frame(responses), answers_frame(responses, roles=("check",))
     rules = rules_of(settings.exclusions.model_dump())
     return analyse_all(answers, threshold=settings.threshold, alpha=settings.alpha, rules=rules, checks=checks)
@@ -169,9 +179,16 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
 @click.option("--seed", type=click.IntRange(min=0), help="Of the observers' chance; the protocol's unless given.")
 @library_option
 @OUT
+@database_option
 @json_option
 def simulate(
-    protocol: str, participants: int, seed: int | None, library: str | None, out: Path | None, as_json: bool
+    protocol: str,
+    participants: int,
+    seed: int | None,
+    library: str | None,
+    out: Path | None,
+    database: str | None,
+    as_json: bool,
 ) -> None:
     """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
     from study.experiment.rendering import MANIFEST, record
@@ -179,8 +196,10 @@ def simulate(
     checked = load(protocol)
     folder = results_folder(checked, out)
     if library is not None or not (folder / MANIFEST).exists():
-        record(prepare_stimuli(checked, library), folder)
-    summary = simulate_participants(checked, folder, participants, seed)
+        stimuli = prepare_stimuli(checked, library)
+        check_database(database, stimuli)
+        record(stimuli, folder)
+    summary = simulate_participants(checked, folder, participants, seed, database)
     text = (
         f"{summary['folder']}: {summary['participants']} simulated participants, "
         f"{summary['answers']} answers made now, {summary['found']} found"
@@ -190,10 +209,11 @@ def simulate(
 
 @click.command()
 @click.argument("results", type=RESULTS)
+@database_option
 @json_option
-def analyse(results: Path, as_json: bool) -> None:
+def analyse(results: Path, database: str | None, as_json: bool) -> None:
     """Thresholds, preferences and ratings of a results folder."""
-    analysis = analyse_results(results)
+    analysis = analyse_results(results, database)
     emit(analysis, as_json, "\n".join(headlines(analysis)))
 
 
@@ -212,13 +232,14 @@ def report(results: Path, as_json: bool) -> None:
 @click.argument("results", type=RESULTS)
 @click.option("--to", "kind", type=click.Choice(["csv"]), default="csv", show_default=True)
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="File; RESULTS/answers.csv unless given.")
+@database_option
 @json_option
-def export(results: Path, kind: str, out: Path | None, as_json: bool) -> None:
+def export(results: Path, kind: str, out: Path | None, database: str | None, as_json: bool) -> None:
     """All answers as a table for other programs."""
-    from study.experiment.responses import export_csv, open_responses
+    from study.experiment.responses import export_csv, open_answers
 
     del kind  # one so far
-    with open_responses(results) as responses:
+    with open_answers(results, database) as responses:
         file = export_csv(responses, out or results / "answers.csv")
     emit({"file": str(file)}, as_json, str(file))
 

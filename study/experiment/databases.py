@@ -84,11 +84,13 @@ def _address(url_or_path: str | Path) -> sa.URL:
     try:
         url = sa.make_url(text)
     except (sa.exc.ArgumentError, ValueError):
-        # Its own message may hold the password.
+        url = None  # its own message may hold the password
+    if url is None or "@" in f"{url.host}{url.database}":
+        # With a bare @ in the password, the rest of it would pass for a host and be printed.
         raise SessionError(
             "Expected a database URL such as postgresql+psycopg://USER:PASSWORD@HOST/DATABASE, found one that can't be "
             "taken apart; in a password write @ as %40, : as %3A, / as %2F and % as %25."
-        ) from None
+        )
     if url.drivername in _POSTGRESQL:
         return url.set(drivername="postgresql+psycopg")
     if url.drivername in _SQLITE:
@@ -100,7 +102,9 @@ def _address(url_or_path: str | Path) -> sa.URL:
 
 
 def shown(url: sa.URL) -> str:
-    """A URL as it may be printed: without the password, wherever it stands."""
+    """A URL as it may be printed: without the password, wherever it stands; of SQLite the file."""
+    if url.get_backend_name() == "sqlite":
+        return url.database or "a database in memory"
     hidden = {name: "***" for name in url.query if "password" in name}
     return url.update_query_dict(hidden).render_as_string(hide_password=True)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -23,7 +23,7 @@ from study.errors import SessionError
 from study.experiment.databases import alone, cannot_open, open_engine, shown
 from study.experiment.plan import Plan, Trial, plan_from_json
 from study.experiment.protocol import Protocol
-from study.experiment.rendering import write_whole
+from study.experiment.rendering import ANSWERS, write_whole
 from study.experiment.response_migrations import migrate
 from study.experiment.response_tables import (
     answers,
@@ -141,6 +141,35 @@ def open_responses(url_or_path: str | Path) -> Responses:
         engine.dispose()
         raise
     return Responses(engine, place)
+
+
+def open_answers(folder: Path, database: str | Path | None = None) -> Responses:
+    """Open the answers that were given to the stimuli of a results folder: its own, or those in another database.
+
+    Raises
+    ------
+    SessionError
+        Where there are none, and for what `open_responses` refuses.
+    """
+    if database is None and not (folder / ANSWERS).is_file():
+        raise SessionError(
+            f"{folder / ANSWERS}: expected answers, found no database; collect or simulate sessions for this folder "
+            "first, or name the database that they went to (--database)."
+        )
+    return open_responses(folder if database is None else database)
+
+
+def refuse_other_stimuli(responses: Responses, identifiers: Collection[str]) -> None:
+    """Refuse a database whose sessions show stimuli that are not among these: their answers would be about nothing."""
+    known = {*identifiers, ""}  # where one stimulus is rated there is no second
+    for record in all_sessions(responses):
+        shown_there = {name for trial in record.plan.trials for name in (trial.first, trial.second)}
+        if missing := shown_there - known:
+            raise SessionError(
+                f"{responses.place}: expected sessions with the stimuli of this results folder, found that of "
+                f"{record.participant!r}, which shows others ({len(missing)}, made from other motions, or by another "
+                "version of Segue); use another database, or the results folder that it belongs to."
+            )
 
 
 def begin_session(

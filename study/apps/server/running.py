@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -29,24 +30,41 @@ def run(
     host: str = "127.0.0.1",
     port: int = 8000,
     behind_proxy: bool = False,
-    started: Callable[[str], object] | None = None,
+    database: str | None = None,
+    started: Callable[[str, str], object] | None = None,
 ) -> None:
     """Serve a results folder until the process is told to end; answers under way are committed first.
+
+    Parameters
+    ----------
+    database
+        Where answers go, instead of the folder's own `responses.sqlite`.
+    started
+        Told the address and the place of the answers, without a password, once participants can come.
 
     Raises
     ------
     SessionError
-        Where the address can't be listened at.
+        Where the address can't be listened at, or the database can't be opened.
     """
     manifest = read_manifest(folder)
-    _allow_files(MOST_CONNECTIONS + 100)
     listening = listen(host, port)
     name = f"[{host}]" if ":" in host else host
-    with open_responses(folder) as responses:
+    with open_responses(database or folder) as responses:
         app = make_app(Host(protocol, manifest, responses, settings))
         if started:
-            started(f"http://{name}:{listening.getsockname()[1]}")
-        uvicorn.Server(configuration(app, behind_proxy=behind_proxy)).run(sockets=[listening])
+            started(f"http://{name}:{listening.getsockname()[1]}", responses.place)
+        serve(app, listening, behind_proxy=behind_proxy)
+
+
+def serve(app: ASGIApp, listening: socket.socket, *, behind_proxy: bool = False) -> None:
+    """Serve an application in this process until it is told to end."""
+    _allow_files(MOST_CONNECTIONS + 100)
+    # Two hundred answers at one instant are so many new objects that the collector would look through all sittings
+    # several times, a quarter of all work; what is there now stays, and the rest can wait a while.
+    gc.freeze()
+    gc.set_threshold(100_000, 10, 10)
+    uvicorn.Server(configuration(app, behind_proxy=behind_proxy)).run(sockets=[listening])
 
 
 def configuration(app: ASGIApp, *, behind_proxy: bool = False) -> uvicorn.Config:
