@@ -19,10 +19,11 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from study.apps.server.hosting import Host
-from study.apps.server.inbox import Inbox, RefusedError, cookie
+from study.apps.server.inbox import DATABASE_AWAY, Inbox, RefusedError, cookie
 from study.apps.server.limits import Limits
 from study.apps.server.researcher import researcher_routes
 from study.errors import SegueError
+from study.experiment.databases import AWAY, in_words
 
 PAGES = Path(__file__).resolve().parents[1] / "pages"
 TYPES = {
@@ -76,6 +77,9 @@ def _guarded(handler: Handler) -> Handler:
         except SegueError as refusal:
             log.warning("%s %r: %r", request.method, request.url.path, str(refusal))
             return JSONResponse({"error": str(refusal)}, status_code=422)
+        except AWAY as error:
+            log.warning("%s %r: the database is away: %s", request.method, request.url.path, in_words(error))
+            return JSONResponse({"error": DATABASE_AWAY}, status_code=503)
 
     return run
 
