@@ -252,21 +252,19 @@ def started(command: Sequence[str], port: int) -> Iterator[subprocess.Popen[byte
 
 def do_nothing(port: int, reply: bytes) -> None:
     """The peer: the same HTTP server as ours, configured alike; reads a request and sends a fixed reply."""
-    import uvicorn
-
-    from study.apps.server.running import configuration, listen
+    from study.apps.server.running import listen, serve
 
     headers = [(b"content-length", str(len(reply)).encode()), (b"content-type", b"application/json")]
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
-        if scope["type"] != "http":
+        if scope["type"] == "lifespan":
             return
         while (await receive()).get("more_body"):
             pass
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         await send({"type": "http.response.body", "body": reply})
 
-    uvicorn.Server(configuration(app)).run(sockets=[listen("127.0.0.1", port)])
+    serve(app, listen("127.0.0.1", port))
 
 
 def load(folder: Path, count: int, rounds: int) -> list[Key]:

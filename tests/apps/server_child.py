@@ -5,10 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import uvicorn
 from serving import make_host, served_manifest
 
-from study.apps.server.running import configuration, listen
+from study.apps.server.running import listen, serve
 from study.apps.server.web import make_app
 from study.experiment.responses import open_responses
 
@@ -17,5 +16,4 @@ if __name__ == "__main__":
     with open_responses(folder) as responses:
         text = (folder / "protocol.toml").read_text(encoding="utf-8")
         app = make_app(make_host(served_manifest(folder), responses, text))
-        server = uvicorn.Server(configuration(app))
-        server.run(sockets=[listen("127.0.0.1", port)])
+        serve(app, listen("127.0.0.1", port))
