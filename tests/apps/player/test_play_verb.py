@@ -156,21 +156,6 @@ def test_a_session_from_start_to_end(
         assert (table.response_s.dropna() > 0).all()
 
 
-def test_simulation_and_window_have_the_same_trials(make_small: Any, tmp_path: Path) -> None:
-    from study.experiment.observers import simulate
-
-    small = make_small()
-    with open_responses(tmp_path / "simulated.sqlite") as responses:
-        simulate(small.protocol, small.stimuli, responses, 1)
-        simulated = find_session(responses, "sim-001")
-    with open_responses(tmp_path / "played.sqlite") as responses:
-        from study.apps.play_commands import the_plan
-
-        played = the_plan(responses, small.protocol, small.stimuli, "sim-001", None, 0)
-    assert simulated is not None
-    assert trial_table(simulated.plan) == trial_table(played)
-
-
 def test_clicks_answer_and_closing_asks_first(start: Start, protocol_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "results"
     arguments = (protocol_file, "--participant", "p1", "--out", out, "--windowed", "--size", "640x480")

@@ -1,0 +1,182 @@
+"""One seed, one participant: window, browser and simulation show the same trials and store the same table.
+
+The window is scripted and the browser is a client without a screen; both front ends run as they are, each into its own
+database. The protocol has every task, practice, attention checks, breaks and orders by group; two participants, so that
+both groups come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+import sqlalchemy as sa
+from serving import PROTOCOL, Person, make_host, protocol_of, unfilmed
+from starlette.testclient import TestClient
+
+from renderer.events import Key, Typed
+from study.apps.play_commands import the_plan
+from study.apps.player import loop
+from study.apps.player.lettering import default_font
+from study.apps.player.loop import play
+from study.apps.player.pages import Look
+from study.apps.player.scripted import Act, ScriptedWindow, press
+from study.apps.player.store import ResponsesStore
+from study.apps.server.web import make_app
+from study.experiment.observers import simulate
+from study.experiment.plan import Plan, draw_plan, trial_table
+from study.experiment.protocol import Protocol
+from study.experiment.rendering import Manifest
+from study.experiment.response_tables import presentations, sessions
+from study.experiment.responses import ANSWER_COLUMNS, Responses, answers_frame, find_session, open_responses
+from study.experiment.session import advanced, answer_keys, answered, current, filled, open_session
+from study.experiment.stimuli import prepare
+from study.motion.library import open_library
+
+PEOPLE = ("sim-001", "sim-002")
+READ = ("instructions", "feedback", "break", "debrief")
+# What depends on who answers; all else belongs to the trials.
+OF_THE_ANSWER = ("answer", "missed", "correct", "chose_a", "response_s")
+MARKS = ("simulated", "answered_at")
+AGE = "33"
+
+Read = list[tuple[str, str]]
+
+
+def script(protocol: Protocol, plan: Plan) -> Iterator[Act]:
+    """A participant in the window who always gives the first of the legal answers, an act for each page."""
+    state = open_session(protocol, plan)
+    while (step := current(state)).kind != "done":
+        if step.kind == "consent":
+            yield press("1")
+        elif step.kind == "form":
+            yield Act((*(Typed(digit, 0.1) for digit in AGE), Key("enter", 0.2)))
+            yield from [Act()] * len(AGE)  # the page is drawn anew with each digit
+            yield press("enter")
+            state, _ = filled(state, {"age": AGE})
+            continue
+        elif step.kind == "answer":
+            yield press(answer_keys(protocol, step.legal)[step.legal[0]], 0.5)
+            state, _ = answered(state, step.legal[0], 0.5)
+            continue
+        elif step.kind in READ:
+            yield press("space")
+        state = advanced(state)
+    yield press("space")
+
+
+def in_the_window(protocol: Protocol, responses: Responses, monkeypatch: pytest.MonkeyPatch) -> dict[str, Read]:
+    """Both participants in a scripted window; what each of them read."""
+    stimuli = prepare(protocol, open_library("synthetic"))
+    read: dict[str, Read] = {}
+    page_of = loop.screens.reading_page
+    for group, name in enumerate(PEOPLE):
+        plan = the_plan(responses, protocol, stimuli, name, None, group)
+        own = read.setdefault(name, [])
+
+        def noted(protocol: Protocol, step: Any, progress: Any, own: Read = own) -> Any:
+            if progress != (0, 1):  # so that it is not the check of all pages beforehand
+                own.append((step.kind, step.text))
+            return page_of(protocol, step, progress)
+
+        monkeypatch.setattr(loop.screens, "reading_page", noted)
+        store = ResponsesStore(responses, protocol, plan, stimuli.library, stimuli.synthetic)
+        window = ScriptedWindow(script(protocol, plan))
+        look = Look((222, 223, 225), (default_font(),))
+        assert play(window, open_session(protocol, plan), stimuli.stimulus, store, look).end == "finished"
+    return read
+
+
+def in_the_browser(manifest: Manifest, text: str, responses: Responses) -> dict[str, Read]:
+    """The same participants through the server, by links that name them."""
+    read: dict[str, Read] = {}
+    app = make_app(make_host(manifest, responses, text, parameters=("participant",)))
+    with TestClient(app) as client:
+        for name in PEOPLE:
+            fresh = TestClient(app)
+            fresh.portal = client.portal
+            person = Person(fresh, f"page-{name}")
+            view = person.begin(parameters={"participant": name})
+            own = read.setdefault(name, [])
+            while view["kind"] != "done":
+                if view["kind"] in READ:
+                    own.append((view["kind"], view["text"]))
+                view = person.step(view)
+    return read
+
+
+def shown(responses: Responses) -> list[tuple[Any, ...]]:
+    """Every stimulus that was presented, in order."""
+    columns = (sessions.c.participant, presentations.c.trial, presentations.c.attempt, presentations.c.place)
+    query = sa.select(*columns, presentations.c.stimulus).join(sessions, presentations.c.session_id == sessions.c.id)
+    with responses.engine.connect() as connection:
+        rows = connection.execute(query.order_by(presentations.c.session_id, presentations.c.id)).all()
+    return [tuple(row) for row in rows]
+
+
+def table(responses: Responses) -> pd.DataFrame:
+    return answers_frame(responses, all_attempts=True, roles=("trial", "practice", "check"))
+
+
+@pytest.mark.parametrize("seed", [5, 2004])
+def test_window_browser_and_simulation_have_the_same_trials(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    text = PROTOCOL.replace("seed = 5", f"seed = {seed}")
+    protocol = protocol_of(text)
+    manifest = unfilmed(tmp_path / "served", text)
+    with (
+        open_responses(tmp_path / "window.sqlite") as window,
+        open_responses(tmp_path / "browser.sqlite") as browser,
+        open_responses(tmp_path / "simulated.sqlite") as simulated,
+    ):
+        read_in_window = in_the_window(protocol, window, monkeypatch)
+        read_in_browser = in_the_browser(manifest, text, browser)
+        simulate(protocol, manifest, simulated, len(PEOPLE))
+        places = {"window": window, "browser": browser, "simulation": simulated}
+        records = {where: [find_session(place, name) for name in PEOPLE] for where, place in places.items()}
+        tables = {where: table(place) for where, place in places.items()}
+        stimuli = {where: shown(place) for where, place in places.items()}
+
+    # The stored plans, trial by trial: order, stimuli, which comes first, block, group.
+    plans = {
+        where: [(one.plan.group, trial_table(one.plan)) for one in found if one] for where, found in records.items()
+    }
+    assert plans["window"] == plans["browser"] == plans["simulation"]
+    assert [group for group, _ in plans["window"]] == [0, 1]
+    tasks = {trial["task"] for _, trials in plans["window"] for trial in trials}
+    assert tasks == {"same-different", "preference", "rating"}
+
+    # The tables of answers: the same columns of the same types, the same rows, but for answers and marks.
+    assert {tuple(one.columns) for one in tables.values()} == {ANSWER_COLUMNS}
+    trials = {where: one.drop(columns=[*OF_THE_ANSWER, *MARKS]) for where, one in tables.items()}
+    pd.testing.assert_frame_equal(trials["window"], trials["browser"])
+    pd.testing.assert_frame_equal(trials["window"], trials["simulation"])
+    assert set(tables["window"].role) == {"trial", "practice", "check"}
+    # Both always gave the first legal answer.
+    answers = {where: tables[where][[*OF_THE_ANSWER[:4]]] for where in ("window", "browser")}
+    pd.testing.assert_frame_equal(answers["window"], answers["browser"])
+
+    # What was really put on the screen, and what was read between the trials.
+    assert stimuli["window"] == stimuli["browser"]
+    assert len(stimuli["window"]) > 20
+    assert read_in_window == read_in_browser
+    assert {kind for kind, _ in read_in_window[PEOPLE[0]]} == set(READ)
+
+    # Marks.
+    assert not tables["window"].simulated.any()
+    assert not tables["browser"].simulated.any()
+    assert tables["simulation"].simulated.all()
+    assert stimuli["simulation"] == []
+
+
+def test_another_participant_or_another_seed_has_other_trials() -> None:
+    """So that the test above could fail."""
+    protocol, other = protocol_of(), protocol_of(PROTOCOL.replace("seed = 5", "seed = 6"))
+    pairs = prepare(protocol, open_library("synthetic")).pairs
+    own = trial_table(draw_plan(protocol, pairs, "sim-001"))
+    assert own != trial_table(draw_plan(protocol, pairs, "sim-002"))
+    assert own != trial_table(draw_plan(other, pairs, "sim-001"))
