@@ -1,4 +1,4 @@
-"""How many participants a study needs: functions that simulate and analyse come in, a curve and a number go out.
+"""How many participants a study needs: a function that simulates and analyses studies in, a curve and a number out.
 
 Power is counted, not computed from a formula: studies are simulated through the real plan, analysed by the real
 analysis, and those that find what there is to find are counted. Nothing here knows how a study is run.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,10 @@ from study.analysis.estimates import Interval, wilson_interval
 from study.errors import AnalysisError
 
 FloatArray = NDArray[np.float64]
-Simulate = Callable[[np.random.Generator, int], Any]
-Finds = Callable[[Any, int], bool]
+BoolArray = NDArray[np.bool_]
+Run = Callable[[np.random.Generator, int, Sequence[int]], BoolArray]
+"""From a generator, a number of studies and rising numbers of participants: what each study found, shape (studies,
+sizes). One simulation may serve every size, by its first so many participants."""
 
 
 @dataclass(frozen=True)
@@ -57,30 +58,30 @@ class Power:
 
 
 def power_curve(
-    simulate: Simulate,
-    finds: Finds,
+    run: Run,
     sizes: Sequence[int],
     *,
     studies: int = 200,
     target: float = 0.8,
     seed: int = 0,
+    at_once: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Power:
     """Simulate studies and count those that find what is there.
 
     Parameters
     ----------
-    simulate
-        From a generator and a number of participants, the answers of a study.
-    finds
-        From these answers and a number of participants, whether the study's first so many would have found it. So one
-        simulation serves every number, and the points of one curve are not independent of each other.
+    run
+        Simulates and analyses. Where one simulation serves every size, the points of a curve are not independent of
+        each other.
     sizes
         Numbers of participants.
     studies
         Simulated studies.
     target
         Power asked for.
+    seed, at_once
+        The same seed and number of studies at once give the same numbers.
 
     Raises
     ------
@@ -93,11 +94,11 @@ def power_curve(
     if studies < 1 or not 0 < target < 1:
         raise AnalysisError(f"expected studies from 1 on and a power between 0 and 1, found {studies} and {target:g}")
     found = np.zeros(len(wanted), dtype=int)
-    for number in range(studies):
-        data = simulate(np.random.default_rng([seed, number]), wanted[-1])
-        found += np.array([finds(data, size) for size in wanted])
+    for done in range(0, studies, at_once):
+        count = min(at_once, studies - done)
+        found += run(np.random.default_rng([seed, done]), count, wanted).sum(axis=0)
         if progress:
-            progress(number + 1, studies)
+            progress(done + count, studies)
     points = tuple(
         PowerPoint(size, int(count), studies, count / studies, wilson_interval(int(count), studies))
         for size, count in zip(wanted, found, strict=True)
@@ -118,7 +119,7 @@ def _needed(points: Sequence[PowerPoint], target: float) -> tuple[int | None, st
     return math.ceil(sizes[at - 1] + part * (sizes[at] - sizes[at - 1]) - 1e-9), ""
 
 
-def logit_normal(share: float, correlation: float) -> tuple[float, float]:
+def logit_normal(share: float, correlation: float, order_bias: float = 0.0) -> tuple[float, float]:
     """Return mean and standard deviation, in logits, of participants with this mean share and correlation.
 
     Parameters
@@ -127,6 +128,8 @@ def logit_normal(share: float, correlation: float) -> tuple[float, float]:
         Mean share over participants, between 0 and 1.
     correlation
         Intraclass correlation of their answers: variance of the participants' shares over share x (1 - share).
+    order_bias
+        Logits for what is shown first; shares are the means of both orders.
 
     Raises
     ------
@@ -139,14 +142,12 @@ def logit_normal(share: float, correlation: float) -> tuple[float, float]:
         )
     from scipy.optimize import brentq
 
-    centre = math.log(share / (1 - share))
-    if correlation == 0:
-        return centre, 0.0
     points, weights = np.polynomial.hermite_e.hermegauss(61)
     weights = weights / weights.sum()
 
     def shares(mean: float, spread: float) -> FloatArray:
-        return np.asarray(1 / (1 + np.exp(-(mean + spread * points))), dtype=np.float64)
+        both = [1 / (1 + np.exp(-(mean + spread * points + bias))) for bias in (order_bias, -order_bias)]
+        return np.asarray(np.mean(both, axis=0), dtype=np.float64)
 
     def mean_for(spread: float) -> float:
         return float(brentq(lambda mean: float(weights @ shares(mean, spread)) - share, -60, 60))
@@ -155,5 +156,7 @@ def logit_normal(share: float, correlation: float) -> tuple[float, float]:
         own = shares(mean_for(spread), spread)
         return float(weights @ (own - share) ** 2) / (share * (1 - share)) - correlation
 
+    if correlation == 0:
+        return mean_for(0.0), 0.0
     spread = float(brentq(excess, 1e-6, 25.0))
     return mean_for(spread), spread

@@ -37,22 +37,39 @@ def default_p_values(chosen: ArrayLike, shown: ArrayLike) -> FloatArray:
         Student's t of the participants' shares against one half; the exact sign test where all shares are the same;
         NaN with fewer than two participants.
     """
-    from scipy.special import stdtr
-
     yes, total = np.broadcast_arrays(np.asarray(chosen, dtype=np.float64), np.asarray(shown, dtype=np.float64))
     there = total > 0
     share = np.where(there, yes / np.where(there, total, 1.0), 0.0)
-    count = there.sum(axis=-1)
-    enough = count > 1
-    people = np.where(enough, count, 2)
-    mean = share.sum(axis=-1) / np.maximum(count, 1)
-    squares = np.where(there, (share - mean[..., None]) ** 2, 0.0).sum(axis=-1)
-    error = np.sqrt(squares / (people - 1) / people)
-    alike = squares / (people - 1) <= 1e-24
-    statistic = np.abs(mean - 0.5) / np.where(alike, 1.0, error)
-    student = 2 * stdtr(people - 1, -statistic)
+    student = student_p_values(share, there, 0.5)
+    people = there.sum(axis=-1)
+    mean = share.sum(axis=-1) / np.maximum(people, 1)
     sign = np.where(np.abs(mean - 0.5) <= 1e-12, 1.0, np.minimum(1.0, 2.0 * 0.5**people))
-    return np.asarray(np.where(enough, np.where(alike, sign, student), np.nan), dtype=np.float64)
+    return np.asarray(np.where((people > 1) & np.isnan(student), sign, student), dtype=np.float64)
+
+
+def student_p_values(values: FloatArray, there: NDArray[np.bool_], expected: float) -> FloatArray:
+    """Return the p-values of Student's t of many samples at once; NaN where a sample has no spread to judge by.
+
+    Parameters
+    ----------
+    values, there : ndarray, shape (..., participants)
+        One number a participant, and who is there.
+    expected
+        The mean where there is no effect.
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
+    from scipy.special import stdtr
+
+    count = there.sum(axis=-1)
+    people = np.where(count > 1, count, 2)
+    mean = np.where(there, values, 0.0).sum(axis=-1) / np.maximum(count, 1)
+    variance = np.where(there, (values - mean[..., None]) ** 2, 0.0).sum(axis=-1) / (people - 1)
+    known = (count > 1) & (variance > 1e-24)
+    statistic = np.abs(mean - expected) / np.sqrt(np.where(known, variance, 1.0) / people)
+    return np.asarray(np.where(known, 2 * stdtr(people - 1, -statistic), np.nan), dtype=np.float64)
 
 
 def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0.95) -> dict[str, Any]:

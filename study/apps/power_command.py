@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import csv
+import io
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,117 +15,123 @@ from study.apps.console import emit, json_option, library_option, progress
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from study.analysis.power import Power
-    from study.experiment.plan import Trial
+    from study.analysis.power import Power, Run
+    from study.apps.power_studies import Design
+    from study.experiment.plan import Plan
     from study.experiment.protocol import Protocol, StudySpec
 
-Simulate = Callable[["np.random.Generator", int], Any]
-Finds = Callable[[Any, int], bool]
+AT_ONCE = 250
+"""Studies drawn and analysed together: enough to be fast, few enough for little memory."""
 
 
-def plans_of(protocol: Protocol, study: StudySpec, library: str | None, participants: int) -> list[list[Trial]]:
-    """The trials of one study in the real plans of this many participants."""
+def plans_of(protocol: Protocol, library: str | None, participants: int) -> tuple[Plan, ...]:
+    """The real plans of this many participants."""
     from study.apps.study_commands import prepare_stimuli
     from study.experiment.plan import draw_plan
 
     pairs = prepare_stimuli(protocol, library).pairs
-    plans = [draw_plan(protocol, pairs, f"power-{place:03}", group=place) for place in range(participants)]
-    return [[trial for trial in plan.trials if trial.study == study.name and trial.role == "trial"] for plan in plans]
-
-
-def preference_study(
-    plans: Sequence[Sequence[Trial]], share: float, correlation: float, order_bias: float, alpha: float
-) -> tuple[Simulate, Finds]:
-    """Simulated preferences, and whether the test over participants finds them, in the right direction."""
-    import numpy as np
-
-    from study.analysis.power import logit_normal
-    from study.analysis.preference import participant_tests
-    from study.experiment.observer_models import logistic
-
-    mean, spread = logit_normal(share, correlation)
-    signs = [np.array([1.0 if trial.a_first else -1.0 for trial in plan]) for plan in plans]
-
-    def simulate(rng: np.random.Generator, participants: int) -> Any:
-        chosen = np.zeros(participants)
-        for person in range(participants):
-            leaning = mean + spread * rng.standard_normal() + order_bias * signs[person]
-            chosen[person] = (rng.random(len(leaning)) < logistic(leaning)).sum()
-        return chosen
-
-    shown = np.array([len(plan) for plan in plans], dtype=np.float64)
-
-    def finds(chosen: Any, participants: int) -> bool:
-        test = participant_tests(chosen[:participants], shown[:participants])
-        towards = test["mean_percent"] is not None and (test["mean_percent"] > 50) == (share > 0.5)
-        return test["p_value"] is not None and test["p_value"] < alpha and (towards or share == 0.5)
-
-    return simulate, finds
-
-
-def same_different_study(
-    plans: Sequence[Sequence[Trial]], shorter: float, longer: float, spread: float, precision: float, level: float
-) -> tuple[Simulate, Finds]:
-    """Simulated same-different answers, and whether the thresholds' intervals are as narrow as asked on every side."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    from study.analysis.same_different import Counts
-    from study.analysis.same_different_model import ModelFit, fit_model
-    from study.experiment.observer_models import default_observer, probability_different
-    from study.experiment.observers import person
-
-    settings = default_observer(shorter, longer)
-    typical = replace(settings.same_different, log_sensitivity_sd=spread, criterion_sd=spread)
-    settings = replace(settings, same_different=typical)
-    asked = [np.array([float(trial.difference_frames or 0) for trial in plan]) for plan in plans]
-    levels = np.unique(np.concatenate(asked))
-    shown = np.array([[float((own == place).sum()) for place in levels] for own in asked])
-
-    def simulate(rng: np.random.Generator, participants: int) -> Any:
-        seed = int(rng.integers(2**31))
-        people = [person(settings, f"power-{place:03}", seed).settings.same_different for place in range(participants)]
-        chances = np.array([probability_different(who, levels) for who in people])
-        return rng.binomial(shown[:participants].astype(int), chances).astype(np.float64)
-
-    def finds(different: Any, participants: int) -> bool:
-        names = tuple(str(place) for place in range(participants))
-        fit = fit_model(Counts(names, levels, different[:participants], shown[:participants]), level=level)
-        if not isinstance(fit, ModelFit):
-            return False
-        return all(
-            found.interval.low is not None
-            and found.interval.high is not None
-            and found.interval.high - found.interval.low <= 2 * precision
-            for found in fit.jnd.values()
-        )
-
-    return simulate, finds
+    return tuple(draw_plan(protocol, pairs, f"power-{place:03}", group=place) for place in range(participants))
 
 
 def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
-    """The study asked for, or the only one whose power can be told.
+    """The study asked for, or the only one.
 
     Raises
     ------
     AnalysisError
-        When there is none, or more than one to choose from.
+        When there is more than one to choose from, or none of that name.
     """
-    known = [study for study in protocol.studies if study.task in ("same-different", "preference")]
-    names = ", ".join(study.name for study in known)
-    if not known:
-        raise AnalysisError(f"{protocol.name}: expected a same-different or preference study, found none")
+    names = ", ".join(study.name for study in protocol.studies)
     if name is None:
-        if len(known) > 1:
+        if len(protocol.studies) > 1:
             raise AnalysisError(f"{protocol.name}: expected --study with one of {names}")
-        return known[0]
-    for study in known:
+        return protocol.studies[0]
+    for study in protocol.studies:
         if study.name == name:
             return study
     raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
+
+
+def planned(
+    protocol: Protocol, study: StudySpec, plans: tuple[Plan, ...], options: Mapping[str, Any]
+) -> tuple[Run, dict[str, Any]]:
+    """What is simulated, and in words and numbers what is looked for: `effect`, `icc`, `test`, `aim`."""
+    from study.analysis.exclusions import rules_of
+    from study.apps import power_studies as made
+
+    alpha, missed = protocol.analysis.alpha, options["missed"]
+    rules = rules_of(protocol.analysis.exclusions.model_dump())
+
+    def design(settings: Any) -> Design:
+        return made.Design(protocol, study, plans, settings, rules)
+
+    if study.task == "preference":
+        effect = {key: options[key] for key in ("share", "correlation", "order_bias")}
+        settings = made.preference_observer(study, **effect, missed=missed)
+        run = made.preference_study(design(settings), alpha, options["share"])
+        said = {
+            "icc": options["correlation"],
+            "test": f"Student's t over participants at {alpha:g}",
+            "aim": f"find a preference of {100 * options['share']:g}% at the level {alpha:g}",
+        }
+        verdict = _preference_verdict(study.name, options["share"], alpha)
+    elif study.task == "rating":
+        effect = {key: options[key] for key in ("difference", "correlation")}
+        settings = made.rating_observer(study, **effect, missed=missed)
+        run = made.rating_study(design(settings), alpha, options["difference"])
+        said = {
+            "icc": options["correlation"],
+            "test": f"Student's t of participants' differences at {alpha:g}, one question",
+            "aim": f"find a difference of {options['difference']:g} points in one question at the level {alpha:g}",
+        }
+        verdict = _rating_verdict(study, options["difference"], alpha)
+    else:
+        effect = {key: options[key] for key in ("shorter", "longer", "spread", "precision")}
+        settings = made.same_different_observer(options["shorter"], options["longer"], options["spread"], missed)
+        run = made.same_different_study(design(settings), options["precision"], protocol.analysis.threshold)
+        said = {
+            "icc": None,
+            "test": "width of the differencing model's 95% intervals",
+            "aim": f"tell both thresholds to ± {options['precision']:g} frames",
+        }
+        verdict = _threshold_verdict(study.name, options["precision"])
+    if options["sessions"]:
+        run = made.whole_sessions(design(settings), verdict)
+    return run, {"effect": {**effect, "missed": missed}, **said}
+
+
+def _preference_verdict(name: str, share: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        compared = result["preference"].get(name)
+        test = compared[0]["participants"] if compared else None
+        if test is None or test["p_value"] is None:
+            return False
+        return test["p_value"] < alpha and (share == 0.5 or (test["mean_percent"] > 50) == (share > 0.5))
+
+    return found
+
+
+def _rating_verdict(study: StudySpec, difference: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        questions = result["rating_anova"].get(study.name) or []
+        test = questions[0]["difference"] if questions else None
+        if test is None or test["p_value"] is None:
+            return False
+        # Differences are of the later method by name from the earlier; the effect is of the comparison.
+        sign = 1 if str(test["of"]).startswith(f"{study.comparison} minus") else -1
+        return test["p_value"] < alpha and (difference == 0 or (sign * test["mean"] > 0) == (difference > 0))
+
+    return found
+
+
+def _threshold_verdict(name: str, precision: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        model = (result["jnd"].get(name) or {}).get("model")
+        ends = [threshold["interval"] for threshold in model["jnd"].values()] if model else []
+        known = [end for end in ends if end["low"] is not None and end["high"] is not None]
+        return bool(ends) and len(known) == len(ends) and all(e["high"] - e["low"] <= 2 * precision for e in known)
+
+    return found
 
 
 def _sizes(text: str) -> list[int]:
@@ -139,8 +149,10 @@ def _sizes(text: str) -> list[int]:
 @click.option("--share", type=click.FloatRange(0, 1, True, True), default=0.65, show_default=True,
               help="Preference: true share for the first method.")  # fmt: skip
 @click.option("--correlation", type=click.FloatRange(0, 0.9), default=0.1, show_default=True,
-              help="Preference: intraclass correlation of a participant's answers.")  # fmt: skip
+              help="Preference, rating: intraclass correlation of a participant's answers.")  # fmt: skip
 @click.option("--order-bias", type=float, default=0.1, show_default=True, help="Preference: logits for the first.")
+@click.option("--difference", type=float, default=0.7, show_default=True,
+              help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
 @click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=8.0, show_default=True,
               help="Same-different: true threshold, frames shorter.")  # fmt: skip
 @click.option("--longer", type=click.FloatRange(min=0, min_open=True), default=7.0, show_default=True,
@@ -149,12 +161,23 @@ def _sizes(text: str) -> list[int]:
               help="Same-different: how participants differ.")  # fmt: skip
 @click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
               help="Same-different: half the width asked of the 95% intervals, frames.")  # fmt: skip
-@click.option("--studies", type=click.IntRange(min=10), default=200, show_default=True, help="Simulated studies.")
+@click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=0.005, show_default=True,
+              help="Share of answers missed by inattention, besides those that come too late.")  # fmt: skip
+@click.option("--studies", type=click.IntRange(min=10), help="Simulated studies.  [default: 1000; thresholds 200]")
+@click.option("--sessions", is_flag=True, help="Through whole sessions and the whole analysis: slow, and the same.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
+              help="Results folder that gets power_STUDY.json and .csv; its report shows them.")  # fmt: skip
 @library_option
 @json_option
 def power(
-    protocol: str, name: str | None, participants: str, library: str | None, as_json: bool, **options: Any
+    protocol: str,
+    name: str | None,
+    participants: str,
+    library: str | None,
+    out: Path | None,
+    as_json: bool,
+    **options: Any,
 ) -> None:
     """How many participants a protocol needs, at stated effects, by simulation."""
     from study.analysis.estimates import plain
@@ -163,26 +186,47 @@ def power(
 
     checked, sizes = load(protocol), _sizes(participants)
     study = chosen_study(checked, name)
-    plans = plans_of(checked, study, library, max(sizes))
-    if study.task == "preference":
-        effect = {key: options[key] for key in ("share", "correlation", "order_bias")}
-        parts = preference_study(plans, **effect, alpha=checked.analysis.alpha)
-        aim = f"find a preference of {100 * options['share']:g}% at the level {checked.analysis.alpha:g}"
-    else:
-        effect = {key: options[key] for key in ("shorter", "longer", "spread", "precision")}
-        parts = same_different_study(plans, **effect, level=checked.analysis.threshold)
-        aim = f"tell both thresholds to ± {options['precision']:g} frames"
+    plans = plans_of(checked, library, max(sizes))
+    run, said = planned(checked, study, plans, options)
+    slow = options["sessions"] or study.task == "same-different"
+    studies = options["studies"] or (200 if slow else 1000)
     with progress("studies") as report:
         found = power_curve(
-            *parts,
+            run,
             sizes,
-            studies=options["studies"],
+            studies=studies,
             target=options["target"],
             seed=options["seed"],
+            at_once=10 if slow else AT_ONCE,
             progress=lambda done, total: report(done / total, f"{done} of {total}"),
         )
-    result = {"protocol": checked.name, "study": study.name, "effect": effect, "aim": aim, **plain(found)}
-    emit({**result, "answers_per_participant": len(plans[0])}, as_json, _in_words(found, aim, len(plans[0])))
+    answers = sum(trial.study == study.name and trial.role == "trial" for trial in plans[0].trials)
+    through = "whole sessions" if options["sessions"] else "plan, observers, exclusions and default test"
+    named = {"protocol": checked.name, "study": study.name, "task": study.task}
+    made = {"simulations": studies, "through": through, "seed": options["seed"], "answers_per_participant": answers}
+    result = {**named, **said, **plain(found), **made}
+    if out is not None:
+        _write(out, result)
+    emit(result, as_json, _in_words(found, said["aim"], answers))
+
+
+def _write(folder: Path, result: Mapping[str, Any]) -> None:
+    """The result as JSON, and its curve as CSV."""
+    from study.experiment.rendering import write_whole
+
+    stem = folder / f"power_{result['study']}"
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(stem.with_suffix(".json"), (json.dumps(result, indent=1, ensure_ascii=False) + "\n").encode())
+    rows = io.StringIO()
+    table = csv.writer(rows)
+    table.writerow(
+        ["study", "participants", "power", "low", "high", "simulations", "icc", "test", *result["effect"].keys()]
+    )
+    for point in result["points"]:
+        numbers = [point["participants"], point["power"], point["interval"]["low"], point["interval"]["high"]]
+        known = [result["simulations"], result["icc"], result["test"], *result["effect"].values()]
+        table.writerow([result["study"], *numbers, *known])
+    write_whole(stem.with_suffix(".csv"), rows.getvalue().encode())
 
 
 def _in_words(found: Power, aim: str, answers: int) -> str:

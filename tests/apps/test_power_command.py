@@ -1,0 +1,148 @@
+"""`segue power`: against closed forms, against whole sessions, and with answers that are missed or left out."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom, nct, t
+
+from study.analysis.exclusions import Rules
+from study.apps import power_studies
+from study.apps.cli import run
+from study.apps.power_command import _preference_verdict, _rating_verdict, _threshold_verdict, plans_of
+from study.apps.power_studies import Design
+from study.apps.study_commands import load
+
+
+@pytest.fixture(scope="module")
+def preference() -> Design:
+    """2004's study two, 35 real plans, nobody misses anything."""
+    protocol = load("geodesic_vs_fixed")
+    study = protocol.studies[0]
+    settings = power_studies.preference_observer(study, 0.65, 0.0, 0.0, 0.0)
+    settings = replace(settings, response_log_sd=0.0)
+    return Design(protocol, study, plans_of(protocol, None, 35), settings, Rules())
+
+
+def share_found(run_of: Any, size: int, studies: int = 4000, seed: int = 1) -> float:
+    return float(run_of(np.random.default_rng(seed), studies, [size]).mean())
+
+
+def test_without_correlation_power_is_that_of_closed_forms(preference: Design) -> None:
+    """280 independent answers at 65%: Student's t by the noncentral t, and near the exact binomial test's power."""
+    shift = 0.15 / np.sqrt(0.65 * 0.35 / 8) * np.sqrt(np.array([12, 35]))
+    alpha = 0.001
+    for size, noncentrality in zip((12, 35), shift, strict=True):
+        found = share_found(power_studies.preference_study(preference, alpha, 0.65), size)
+        theory = nct.sf(t.ppf(1 - alpha / 2, size - 1), size - 1, noncentrality)
+        assert found == pytest.approx(theory, abs=0.03)
+    counts = np.arange(281)
+    critical = next(k for k in counts if 2 * binom.sf(k - 1, 280, 0.5) < alpha)
+    assert found == pytest.approx(binom.sf(critical - 1, 280, 0.65), abs=0.06)
+
+
+def test_without_an_effect_power_is_the_level(preference: Design) -> None:
+    settings = power_studies.preference_observer(preference.study, 0.5, 0.2, 0.1, 0.02)
+    found = share_found(power_studies.preference_study(replace(preference, settings=settings), 0.05, 0.5), 24)
+    assert found == pytest.approx(0.05, abs=0.015)
+
+
+def test_missed_answers_and_exclusions_cost_power(preference: Design) -> None:
+    settings = power_studies.preference_observer(preference.study, 0.7, 0.1, 0.1, 0.3)
+    missing = replace(preference, settings=settings)
+    strict = replace(missing, rules=Rules(most_missed=0.3))
+    complete = replace(preference, settings=replace(settings, missed=0.0))
+    powers = [
+        share_found(power_studies.preference_study(design, 0.01, 0.7), 20, 1500)
+        for design in (complete, missing, strict)
+    ]
+    assert powers[0] > powers[1] + 0.03
+    assert powers[1] > powers[2] + 0.03
+
+
+def test_answers_too_soon_are_left_out_as_the_protocol_says(preference: Design) -> None:
+    settings = replace(preference.settings, response_median_s=0.2)
+    none_left = replace(preference, settings=settings, rules=Rules(fastest_s=1.0))
+    assert share_found(power_studies.preference_study(none_left, 0.05, 0.65), 35, 200) == 0
+
+
+def both_ways(design: Design, fast: Any, verdict: Any, size: int, studies: int) -> tuple[float, float]:
+    slow = power_studies.whole_sessions(design, verdict)
+    return share_found(fast, size, 2000), share_found(slow, size, studies)
+
+
+@pytest.mark.slow
+def test_preferences_at_once_are_those_of_whole_sessions(preference: Design) -> None:
+    settings = power_studies.preference_observer(preference.study, 0.72, 0.1, 0.1, 0.15)
+    design = replace(preference, settings=settings, rules=Rules(most_missed=0.4, fastest_s=0.6))
+    fast = power_studies.preference_study(design, 0.01, 0.72)
+    found = both_ways(design, fast, _preference_verdict(design.study.name, 0.72, 0.01), 12, 100)
+    assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(100))
+    assert 0.2 < found[0] < 0.95
+
+
+@pytest.mark.slow
+def test_ratings_at_once_are_those_of_whole_sessions() -> None:
+    protocol = load("transition_points")
+    study = protocol.studies[0]
+    protocol = protocol.model_copy(update={"studies": (study.model_copy(update={"items": study.items[:1]}),)})
+    settings = power_studies.rating_observer(study, 1.0, 0.2, 0.0)
+    design = Design(protocol, protocol.studies[0], plans_of(protocol, None, 12), settings, Rules())
+    fast = power_studies.rating_study(design, 0.05, 1.0)
+    found = both_ways(design, fast, _rating_verdict(study, 1.0, 0.05), 12, 60)
+    assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(60))
+
+
+@pytest.mark.slow
+def test_thresholds_are_those_of_whole_sessions() -> None:
+    protocol = load("blend_length_jnd")
+    study = protocol.studies[0]
+    settings = power_studies.same_different_observer(8.0, 7.0, 0.15, 0.02)
+    design = Design(protocol, study, plans_of(protocol, None, 8), settings, Rules())
+    verdict = _threshold_verdict(study.name, 1.7)
+    fast = power_studies.same_different_study(design, 1.7, protocol.analysis.threshold)
+    found = share_found(fast, 8, 100), share_found(power_studies.whole_sessions(design, verdict), 8, 25)
+    assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(25))
+
+
+def test_the_verb_writes_what_the_report_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--participants", "4,30", "--studies", "200", "--share", "0.8", "--out", str(tmp_path), "--json"]
+    assert run(["power", "geodesic_vs_fixed", *arguments]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert json.loads((tmp_path / "power_geodesic_vs_fixed.json").read_text(encoding="utf-8")) == printed
+    powers = [point["power"] for point in printed["points"]]
+    assert powers[0] < powers[1]
+    assert powers[1] > 0.8
+    assert 4 < printed["needed"] <= 30
+    assert (printed["icc"], printed["simulations"], printed["answers_per_participant"]) == (0.1, 200, 8)
+    assert "Student's t over participants at 0.01" in printed["test"]
+    with (tmp_path / "power_geodesic_vs_fixed.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["power"]) for row in rows] == powers
+    assert rows[0]["share"] == "0.8"
+
+
+def test_every_task_has_a_curve(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, more in (("transition_points", ["--difference", "1.5"]), ("blend_length_jnd", ["--precision", "3"])):
+        assert run(["power", name, "--participants", "5,26", "--studies", "10", *more, "--json"]) == 0
+        powers = [point["power"] for point in json.loads(capsys.readouterr().out)["points"]]
+        assert powers[0] < powers[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["wang2004_session"], "expected --study with one of"),
+        (["geodesic_vs_fixed", "--study", "jnd"], "expected one of the studies geodesic_vs_fixed, found 'jnd'"),
+        (["geodesic_vs_fixed", "--participants", "ten"], "expected --participants as numbers"),
+    ],
+)
+def test_refusals(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["power", *arguments]) == 2
+    assert message in capsys.readouterr().err
