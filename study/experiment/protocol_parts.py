@@ -24,9 +24,9 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-SLOTS = ("standard", "minutes", "trials", "studies", "practice", "answer_s", "contact")
+SLOTS = ("standard", "minutes", "trials", "studies", "answer_s", "contact")
 """What may stand in braces in the longer texts: the built-in text, minutes and trials of the sitting, its studies,
-practice trials of the study, seconds to answer, and the protocol's contact."""
+seconds to answer, and the protocol's contact."""
 
 
 def known_slots(text: str, *location: int | str) -> None:

@@ -53,7 +53,7 @@ def instructions_text(protocol: Protocol, study: StudySpec) -> str:
     standard = _standard(protocol, study.task)
     if study.practice:
         standard += "\n\n" + _standard(protocol, "practice")
-    return _filled(study.instructions, standard, {**_slots(protocol), "practice": str(study.practice)})
+    return _filled(study.instructions, standard, _slots(protocol))
 
 
 def question_text(protocol: Protocol, study: StudySpec) -> str:

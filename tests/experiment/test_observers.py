@@ -33,7 +33,8 @@ def alike(settings: ObserverSettings) -> ObserverSettings:
 
 
 def timeless(responses) -> pd.DataFrame:
-    return answers_frame(responses, all_attempts=True).drop(columns="answered_at")
+    roles = ("trial", "practice", "check")
+    return answers_frame(responses, all_attempts=True, roles=roles).drop(columns="answered_at")
 
 
 def test_the_differencing_model_agrees_with_simulated_percepts():

@@ -114,7 +114,7 @@ def test_refusals(library: Library) -> None:
 def test_the_published_protocol_has_fifteen_transitions_at_60_fps() -> None:
     protocol = load_protocol(find_protocol("one_hop_vs_direct"))
     assert protocol.fps == 60
-    assert len(protocol.transitions) == 15
+    assert [len(protocol.transitions_of(study)) for study in protocol.studies] == [15, 15]
     assert [study.one_hop.stay_s for study in protocol.studies] == [1.0, 0.0]
     assert {study.fixed_frames for study in protocol.studies} == {30}
 

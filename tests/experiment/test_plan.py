@@ -12,15 +12,20 @@ from study.errors import SessionError
 from study.experiment.plan import TRIAL_COLUMNS, draw_plan, plan_from_json, trial_table
 
 
+def real(plan):
+    """The trials that count."""
+    return [trial for trial in plan.trials if trial.role == "trial"]
+
+
 def test_the_jnd_study_has_42_pairs_in_both_orders(jnd_protocol, make_stimuli):
     """2004 section 4.2: 7 lengths x 2 orders x 3 motions."""
     plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p01")
-    assert len(plan.trials) == 42
-    assert [trial.trial for trial in plan.trials] == list(range(1, 43))
-    shown = Counter((trial.motion, trial.difference_frames, trial.reference_first) for trial in plan.trials)
+    assert [trial.role for trial in plan.trials] == ["practice"] * 4 + ["trial"] * 42
+    assert [trial.trial for trial in plan.trials] == list(range(1, 47))
+    shown = Counter((trial.motion, trial.difference_frames, trial.reference_first) for trial in real(plan))
     assert set(shown.values()) == {1}
     assert {difference for _, difference, _ in shown} == {-15, -10, -5, 0, 5, 10, 20}
-    for trial in plan.trials:
+    for trial in real(plan):
         reference = trial.first if trial.reference_first else trial.second
         assert reference == f"{trial.motion}-k"
         if trial.difference_frames == 0:
@@ -32,16 +37,17 @@ def test_the_jnd_study_has_42_pairs_in_both_orders(jnd_protocol, make_stimuli):
 def test_pairs_and_orders_are_randomised(jnd_protocol, make_stimuli):
     pairs = make_stimuli(jnd_protocol).pairs
     plans = [draw_plan(jnd_protocol, pairs, f"p{number:02d}") for number in range(40)]
-    assert len({tuple(trial.pair for trial in plan.trials) for plan in plans}) == 40
+    assert len({tuple(trial.pair for trial in real(plan)) for plan in plans}) == 40
     # Where each pair's first showing has the reference first: about half, over 40 x 21 of them (sd 14.5).
     first = sum(
-        next(trial for trial in plan.trials if trial.pair == pair.name).reference_first is True
+        next(trial for trial in real(plan) if trial.pair == pair.name).reference_first is True
         for plan in plans
         for pair in pairs
+        if pair.motion not in jnd_protocol.studies[0].practice_transitions
     )
     assert abs(first - 420) < 75
     # The pair in the first trial differs over participants about as a fair draw of 21 would have it.
-    assert len({plan.trials[0].pair for plan in plans}) > 10
+    assert len({real(plan)[0].pair for plan in plans}) > 10
 
 
 def test_the_same_seed_and_participant_give_the_same_plan(toy_protocol, toy_stimuli):
@@ -69,7 +75,7 @@ def test_another_process_draws_the_same_plan(jnd_protocol, make_stimuli, reposit
 def test_a_known_plan_never_changes(jnd_protocol, make_stimuli):
     """A change here means that stored seeds no longer give the plans that participants saw."""
     plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p01", seed=1)
-    assert [(trial.motion[:4], trial.difference_frames, trial.reference_first) for trial in plan.trials[:6]] == KNOWN
+    assert [(trial.motion[:4], trial.difference_frames, trial.reference_first) for trial in real(plan)[:6]] == KNOWN
 
 
 KNOWN = [

@@ -9,9 +9,11 @@ import pytest
 from study.experiment.observer_models import default_observer, truth
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
+from study.experiment.proofreading import to_do
 from study.experiment.protocol import find_protocol, load_protocol, protocols_folder
 from study.experiment.responses import answers_frame, open_responses
 from study.experiment.stimuli import check, prepare
+from study.experiment.wording import all_texts
 from study.motion.library import open_library
 
 PUBLISHED = ("blend_length_jnd", "geodesic_vs_fixed", "velocity_vs_fixed")
@@ -41,6 +43,29 @@ def test_every_protocol_loads_and_bears_the_name_of_its_file(name):
     assert published(name).name == name
 
 
+@pytest.mark.parametrize("name", [name for name in ALL if name != "demo"])
+def test_every_study_can_be_run_once_somebody_signs_for_it(name):
+    """Consent, form, practice and debriefing are there; what is left to write is who runs it."""
+    protocol = published(name)
+    (left,) = to_do(protocol)
+    assert left.startswith("consent.contact says 'FILL IN")
+    read = {one.where: one.text for one in all_texts(protocol)}
+    assert all(read[where] for where in ("consent.text", "texts.welcome", "texts.debrief"))
+    assert {field.name for field in protocol.form} == {"age", "gender", "vision", "animation"}
+    assert protocol.studies[0].practice > 0
+    assert all(study.instructions for study in protocol.studies)
+    for study in protocol.studies:
+        practised = {transition.name for transition in protocol.practice_of(study)}
+        assert not practised & {transition.name for transition in protocol.transitions_of(study)}
+    assert protocol.participants in (26, 35)  # 2003 section 4.2; 2004 section 4.1
+
+
+def test_attention_checks_are_used_and_have_a_rule():
+    protocol = published("one_hop_vs_direct")
+    assert [study.attention_checks for study in protocol.studies] == [2, 2]
+    assert protocol.analysis.exclusions.most_failed_checks == 0.5
+
+
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_what_all_studies_of_2004_have_in_common(name):
     """30 fps; two seconds of entry and of exit (4.2); five seconds to answer (4.2, 4.3); alpha .01 (5.2)."""
@@ -48,6 +73,7 @@ def test_what_all_studies_of_2004_have_in_common(name):
     assert protocol.fps == 30.0
     assert (protocol.stimuli.entry_s, protocol.stimuli.exit_s) == (2.0, 2.0)
     assert protocol.timing.answer_s == 5.0
+    assert protocol.participants == 35
     assert protocol.analysis.alpha == 0.01
     assert protocol.stimuli.weight == "linear"
     assert "2004" in protocol.source
@@ -59,7 +85,8 @@ def test_study_one_is_as_printed():
     (study,) = protocol.studies
     assert (study.task, study.reference, study.order) == ("same-different", "geodesic", "both")
     assert study.differences_frames == (-15, -10, -5, 0, 5, 10, 20)
-    assert [t.category for t in protocol.transitions] == ["walking", "standing to walking", "running to turning"]
+    shown = [t.category for t in protocol.transitions_of(study)]
+    assert shown == ["walking", "standing to walking", "running to turning"]
     assert protocol.analysis.threshold == 0.75
 
 
@@ -79,9 +106,10 @@ def test_studies_two_and_three_are_as_printed(name, method):
 
 def test_study_two_shows_locomotion_and_study_three_does_not():
     """4.3: standing and idling to walking or running, walking to running, turning; 4.4: boxing, dancing, tai-chi."""
-    two = {t.category for t in published("geodesic_vs_fixed").transitions}
-    assert two == {"standing to walking", "standing to running", "walking to running", "turning"}
-    assert {t.category for t in published("velocity_vs_fixed").transitions} == {"boxing", "dancing", "tai-chi"}
+    two, three = (published(name) for name in ("geodesic_vs_fixed", "velocity_vs_fixed"))
+    locomotion = {"standing to walking", "standing to running", "walking to running", "turning"}
+    assert {t.category for t in two.transitions_of(two.studies[0])} == locomotion
+    assert {t.category for t in three.transitions_of(three.studies[0])} == {"boxing", "dancing", "tai-chi"}
 
 
 def shown_on(name, library):
@@ -100,19 +128,29 @@ def shown_on(name, library):
     return prepared, plan
 
 
+def trials_and_pairs(prepared, plan):
+    """What the study shows, practice apart, which shows other transitions."""
+    trials = [trial for trial in plan.trials if trial.role == "trial"]
+    shown = {trial.motion for trial in trials}
+    assert not shown & {trial.motion for trial in plan.trials if trial.role == "practice"}
+    return trials, [pair for pair in prepared.pairs if pair.motion in shown]
+
+
 def assert_study_one(prepared, plan):
-    assert len(plan.trials) == 42
-    assert set(Counter((t.motion, t.difference_frames, t.reference_first) for t in plan.trials).values()) == {1}
-    assert len(prepared.stimuli) == 21
-    for pair in prepared.pairs:
+    trials, pairs = trials_and_pairs(prepared, plan)
+    assert len(trials) == 42
+    assert set(Counter((t.motion, t.difference_frames, t.reference_first) for t in trials).values()) == {1}
+    assert len({identifier for pair in pairs for identifier in (pair.a, pair.b)}) == 21
+    for pair in pairs:
         reference, comparison = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
         assert 16 <= reference.blend_frames <= 35
         assert comparison.blend_frames == reference.blend_frames + pair.difference_frames
 
 
 def assert_study_two_or_three(prepared, plan):
-    assert len(plan.trials) == 8
-    for pair in prepared.pairs:
+    trials, pairs = trials_and_pairs(prepared, plan)
+    assert len(trials) == len(pairs) == 8
+    for pair in pairs:
         optimal, fixed = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
         assert fixed.blend_frames == 10
         assert 5 <= optimal.blend_frames <= 35
