@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -36,28 +36,49 @@ def mocap() -> Path:
 
 
 @pytest.fixture(scope="session")
-def virtual_display() -> Iterator[str]:
-    """A virtual X display of 800 x 600 pixels, started for these tests; its name, for DISPLAY."""
+def start_display() -> Iterator[Callable[..., VirtualDisplay]]:
+    """`start_display(size, options ...)`: another virtual X display; what runs at the end of the tests is ended."""
     for program, package in (("Xvfb", "xvfb"), ("xdotool", "xdotool")):
         if shutil.which(program) is None:
             unavailable(program, f"install it (Debian, Ubuntu: apt install {package})")
-    read, write = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
-        pass_fds=(write,),
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(write)
-    with os.fdopen(read) as told:
-        number = told.readline().strip()  # written once it takes connections
-    if not number:
-        server.wait()
-        pytest.fail(f"Xvfb ended at once, with status {server.returncode}")
-    try:
-        yield f":{number}"
-    finally:
-        server.terminate()
-        server.wait()
+    started: list[VirtualDisplay] = []
+
+    def begin(size: str = "800x600", *options: str) -> VirtualDisplay:
+        started.append(VirtualDisplay(size, *options))
+        return started[-1]
+
+    yield begin
+    for display in started:
+        display.end()
+
+
+class VirtualDisplay:
+    """An Xvfb of its own; `name` is for DISPLAY."""
+
+    def __init__(self, size: str, *options: str) -> None:
+        read, write = os.pipe()
+        self.server = subprocess.Popen(
+            ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size}x24", "-nolisten", "tcp", *options],
+            pass_fds=(write,),
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(write)
+        with os.fdopen(read) as told:
+            number = told.readline().strip()  # written once it takes connections
+        if not number:
+            self.server.wait()
+            pytest.fail(f"Xvfb ended at once, with status {self.server.returncode}")
+        self.name = f":{number}"
+
+    def end(self) -> None:
+        self.server.terminate()
+        self.server.wait()
+
+
+@pytest.fixture(scope="session")
+def virtual_display(start_display: Callable[..., VirtualDisplay]) -> str:
+    """A virtual X display of 800 x 600 pixels for all tests that need one; its name, for DISPLAY."""
+    return start_display().name
 
 
 @pytest.fixture(scope="session")
