@@ -35,7 +35,7 @@ LARGEST_LAPSE = 0.1
 SMALLEST_PROBABILITY = 1e-9
 WIDEST_DELTA = 60.0
 WIDEST_D_PRIME = 12.0
-D_PRIME_POINTS = 60
+D_PRIME_POINTS = 40
 
 
 @dataclass(frozen=True)
@@ -263,6 +263,7 @@ def d_prime_interval(
         _start(frames, different, shown),
         low,
         high,
+        steps=25,  # those that take longer lie where the likelihood is lowest
     ).value
     best = max(float(found.log_likelihood[0]), float(value.max()))
     root = np.sqrt(np.maximum(2 * (best - value), 0.0))

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study.errors import AnalysisError
+
 FloatArray = NDArray[np.float64]
 
 
@@ -235,6 +237,38 @@ def jackknife_error(left_out: FloatArray) -> float | None:
     if count < 2 or not np.isfinite(left_out).all():
         return None
     return math.sqrt((count - 1) / count * float(((left_out - left_out.mean()) ** 2).sum()))
+
+
+def check_share(value: float, name: str) -> None:
+    """Refuse a confidence or a share at threshold that is none.
+
+    Raises
+    ------
+    AnalysisError
+        Unless it lies between 0 and 1, ends left out.
+    """
+    if not 0 < value < 1:
+        raise AnalysisError(f"expected a {name} between 0 and 1 (0.95, not 95), found {value:g}")
+
+
+def numbers(values: ArrayLike, name: str) -> FloatArray:
+    """Return values as numbers.
+
+    Raises
+    ------
+    AnalysisError
+        Naming the first that is none.
+    """
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        pass
+    for value in np.asarray(values, dtype=object).ravel():
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            raise AnalysisError(f"expected numbers in {name}, found {value!r}; recode or leave out that row") from None
+    raise AnalysisError(f"expected {name} as an array of numbers, found rows of different lengths")
 
 
 def finite(value: float | np.floating[Any] | None) -> float | None:

@@ -56,7 +56,14 @@ def analyse_jnd(
         (tests), `order` (share of "different" by which came first), `order_test` (`decision_rules.order_test`), `rules`
         (differencing against independent observations), `profile` (intervals by profile likelihood, by side),
         `answer` (a sentence).
+
+    Raises
+    ------
+    AnalysisError
+        When a column is missing or can't be read, or confidence or level is none.
     """
+    estimates.check_share(confidence, "confidence")
+    estimates.check_share(level, "level")
     rng = np.random.default_rng(seed)
     counts = count_answers(answers)
     published = crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng)

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study.analysis.estimates import Interval
+from study.analysis.estimates import Interval, check_share, numbers
 from study.analysis.posterior_grid import OVERDISPERSION_EDGES, Grid, evaluate, posterior_range
 from study.analysis.sigmoids import Sigmoid, sigmoid_named
 from study.errors import AnalysisError
@@ -155,7 +155,8 @@ def tidy(levels: ArrayLike, yes: ArrayLike, shown: ArrayLike) -> Data:
     AnalysisError
         When shapes differ or counts can't be.
     """
-    place, right, total = (np.asarray(part, dtype=np.float64) for part in (levels, yes, shown))
+    named = ((levels, "levels"), (yes, "yes"), (shown, "shown"))
+    place, right, total = (numbers(part, name) for part, name in named)
     if place.ndim != 1 or place.shape != right.shape or place.shape != total.shape:
         raise AnalysisError(
             f"expected levels, yes and shown of one shape (blocks,), found {place.shape}, {right.shape}, {total.shape}"
@@ -210,6 +211,7 @@ def fit_psychometric(
     >>> round(fit.threshold.value, 1)
     2.7
     """
+    check_share(confidence, "confidence")
     data, chosen = tidy(levels, yes, shown), model or make_model()
     reason = why_no_fit(data)
     if reason:
@@ -326,6 +328,7 @@ def threshold_at(fit: PsychometricFit, share: float) -> Estimate:
     """
     thresholds, widths, lapses, guesses = np.meshgrid(*fit.grid.nodes[:4], indexing="ij")
     target = (share - guesses) / (1 - guesses - lapses)
+    check_share(share, "share")
     sigmoid, mass = fit.model.sigmoid, fit.grid.density.sum(axis=4)
     with np.errstate(invalid="ignore", divide="ignore"):
         place = thresholds + np.exp(widths) * (sigmoid.inverse(target) - sigmoid.half) / sigmoid.span

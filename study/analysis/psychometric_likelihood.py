@@ -153,6 +153,7 @@ def fit_likelihood(
     simulations, seed
         Data sets drawn from the fit and fitted again, for the p-value of the deviance; 0 takes chi-square.
     """
+    estimates.check_share(confidence, "confidence")
     data, chosen = tidy(levels, yes, shown), model or make_model()
     reason = why_no_fit(data)
     if reason:

@@ -16,12 +16,14 @@ from study.analysis.group_models import psychometric_mixed
 from study.analysis.mixed import Link
 from study.analysis.psychometric import Estimate, Model, PsychometricFit, curve_of, fit_psychometric, make_model
 from study.analysis.psychometric_likelihood import LikelihoodFit, fit_likelihood
+from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FloatArray = NDArray[np.float64]
 
+NEEDED_COLUMNS = ("participant", "level", "yes", "shown")
 LINKS_OF: dict[str, Link] = {"normal": "probit", "logistic": "logit"}
 
 
@@ -48,7 +50,21 @@ def analyse_psychometric(
         (maximum, profile interval and deviance of the same), `group` (mean over participants of their thresholds, with
         Student's interval), `mixed` (threshold of a typical participant by a mixed model; None for one participant),
         `levels` (answers by level), `answer` (a sentence).
+
+    Raises
+    ------
+    AnalysisError
+        When a column is missing, or a count can't be.
     """
+    missing = [name for name in NEEDED_COLUMNS if name not in trials.columns]
+    if missing:
+        raise AnalysisError(
+            f"expected columns {', '.join(NEEDED_COLUMNS)} for a psychometric function, found none named "
+            f"{', '.join(missing)}; name them in the table of trials"
+        )
+    nameless = int(trials["participant"].isna().sum())
+    if nameless:
+        raise AnalysisError(f"expected a participant in every row, found none in {nameless}; name them or leave them out")
     chosen = model or make_model()
     own = []
     for name, part in trials.groupby(trials["participant"].astype(str), sort=True):

@@ -100,6 +100,11 @@ def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
         )
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
     given = chosen[chosen["answer"].notna() & chosen["difference_frames"].notna()]
+    nameless = int(given["participant"].isna().sum())
+    if nameless:
+        raise AnalysisError(
+            f"expected a participant in every row, found none in {nameless}; name them or leave them out"
+        )
     strange = sorted(set(given["answer"].astype(str)) - {"same", "different"})
     if strange:
         raise AnalysisError(f'expected the answers "same" and "different", found {strange[0]!r}; recode the column')
@@ -108,12 +113,17 @@ def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
 
 def count_answers(answers: pd.DataFrame) -> Counts:
     """Count answers by participant and signed difference in blend length."""
+    import pandas as pd
+
     given = same_different_answers(answers)
     if given.empty:
         nothing = np.zeros((0, 0))
         return Counts((), np.zeros(0), nothing, nothing)
     yes = (given["answer"] == "different").astype(float)
-    groups = yes.groupby([given["participant"].astype(str), given["difference_frames"].astype(float)])
+    differences = estimates.numbers(given["difference_frames"], "difference_frames")
+    if not np.isfinite(differences).all():
+        raise AnalysisError("expected finite numbers in difference_frames, found an infinite one; leave out that row")
+    groups = yes.groupby([given["participant"].astype(str), pd.Series(differences, index=given.index)])
     shown, different = groups.size().unstack(fill_value=0), groups.sum().unstack(fill_value=0)
     return Counts(
         tuple(str(name) for name in shown.index),
@@ -262,6 +272,10 @@ def _line_threshold(counts: Counts, side: Side, level: float, confidence: float,
     if len(shares) >= FEWEST_FOR_INTERVAL:
         resampled = crossing_of_lines(sizes, np.nan_to_num(_weighted_means(shares, weights)), level)
         error = bootstrap_error(resampled)
+    if len(shares) >= FEWEST_FOR_INTERVAL and None in (interval.low, interval.high):
+        ends = [word for word, end in (("below", interval.low), ("above", interval.high)) if end is None]
+        open_end = f"open {' and '.join(ends)}: no level shown there can be told from {100 * level:g}%"
+        caution = "; ".join(filter(None, [caution, f"the interval is {open_end}"]))
     if (np.diff(means) < 0).any():
         caution = "; ".join(filter(None, [caution, "percentages do not rise throughout: the first crossing is given"]))
     return Threshold(side, found, error, interval, "reached", method, caution)
