@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from study.analysis import estimates
 from study.analysis.exclusions import Rules, exclude
 from study.analysis.jnd import analyse_jnd
+from study.analysis.no_effect import MARGIN
 from study.analysis.preference import compare, confirmatory, strengths
 from study.analysis.quality import quality
+from study.analysis.rating_cells import rating_cells
 from study.analysis.rating_comparisons import rating_anova
 from study.analysis.ratings import rating_table
 from study.errors import AnalysisError
@@ -19,6 +23,19 @@ if TYPE_CHECKING:
 TASKS = ("same-different", "preference", "rating")
 
 
+@dataclass(frozen=True)
+class _Settings:
+    """What was decided about the analysis, as `analyse` takes it."""
+
+    threshold: float
+    confidence: float
+    alpha: float
+    resamples: int
+    seed: int
+    margin: float
+    family: tuple[str, ...] | None
+
+
 def analyse(
     answers: pd.DataFrame,
     *,
@@ -27,6 +44,8 @@ def analyse(
     alpha: float = 0.05,
     resamples: int = 1000,
     seed: int = 0,
+    margin: float = MARGIN,
+    family: Sequence[str] | None = None,
     rules: Rules | None = None,
     checks: pd.DataFrame | None = None,
 ) -> dict[str, Any]:
@@ -45,6 +64,11 @@ def analyse(
         Level of significance that sentences speak of.
     resamples, seed
         Of the bootstrap over participants behind the standard errors; the same seed gives the same numbers.
+    margin
+        How far from an even split a preference may lie and count as none; 0.1 is 40 to 60%.
+    family
+        Names of the studies whose tests were declared confirmatory before there was data; all preference studies where
+        it is None.
     rules, checks
         What is left out, as stated before there was data, and the answers to attention checks.
 
@@ -53,8 +77,8 @@ def analyse(
     dict
         `jnd` (by name of a same-different study), `preference` (by name of a preference study, a list of compared
         pairs of methods), `confirmatory` (their default tests, adjusted together by Holm's method), `bradley_terry`
-        (strengths by study, where more than two methods were compared), `ratings` and `rating_anova` (by name of a
-        rating study), each empty where there is none;
+        (strengths by study, where more than two methods were compared), `ratings`, `rating_anova` and `rating_cells`
+        (by name of a rating study), each empty where there is none;
         `exclusions` (what was left out by which rule), `without_exclusions` (the same results of all answers; None
         where none was left out), `quality` (of all answers),
         `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
@@ -71,7 +95,8 @@ def analyse(
     if strange:
         raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {strange[0]!r}")
     kept = exclude(answers, rules or Rules(), checks)
-    settings = (threshold, confidence, alpha, resamples, seed)
+    declared = None if family is None else tuple(family)
+    settings = _Settings(threshold, confidence, alpha, resamples, seed, margin, declared)
     result = _studies_analysed(kept.answers, settings)
     left_out = {name: getattr(kept, name) for name in ("rules", "participants", "answers_left_out")}
     result |= {
@@ -85,22 +110,28 @@ def analyse(
     return dict(estimates.plain(result))
 
 
-def _studies_analysed(answers: pd.DataFrame, settings: tuple[float, float, float, int, int]) -> dict[str, Any]:
+def _studies_analysed(answers: pd.DataFrame, settings: _Settings) -> dict[str, Any]:
     """Every study of a table of answers."""
-    threshold, confidence, alpha, resamples, seed = settings
-    result: dict[str, Any] = {"jnd": {}, "preference": {}, "bradley_terry": {}, "ratings": {}, "rating_anova": {}}
+    confidence = settings.confidence
+    kinds = ("jnd", "preference", "bradley_terry", "ratings", "rating_anova", "rating_cells")
+    result: dict[str, Any] = {kind: {} for kind in kinds}
     for (task, study), part in answers.groupby([answers["task"].astype(str), _studies(answers)], sort=False):
         if task == "same-different":
             result["jnd"][study] = analyse_jnd(
-                part, level=threshold, confidence=confidence, resamples=resamples, seed=seed
+                part,
+                level=settings.threshold,
+                confidence=confidence,
+                resamples=settings.resamples,
+                seed=settings.seed,
             )
         elif task == "preference":
-            result["preference"][study] = compare(part, confidence, alpha)
+            result["preference"][study] = compare(part, confidence, settings.alpha, margin=settings.margin)
             result["bradley_terry"][study] = strengths(part, confidence)
         else:
             result["ratings"][study] = rating_table(part, confidence)
             result["rating_anova"][study] = rating_anova(part, confidence)
-    result["confirmatory"] = confirmatory(result["preference"])
+            result["rating_cells"][study] = rating_cells(part, confidence)
+    result["confirmatory"] = confirmatory(result["preference"], settings.family)
     return result
 
 

@@ -119,3 +119,13 @@ def test_quality_without_times(same_different_study: Simulate) -> None:
     assert result["response_s"] == {}
     assert result["table"][0]["median_response_s"] is None
     assert result["simulated_participants"] == 0
+
+
+def test_margin_and_family_are_what_was_declared(preference_study: Simulate) -> None:
+    one, two = (preference_study(np.random.default_rng(seed), 12).assign(study=f"s{seed}") for seed in (1, 2))
+    both = pd.concat([one, two], ignore_index=True)
+    found = analyse(both, margin=0.2, family=["s2"], resamples=20)
+    assert [row["study"] for row in found["confirmatory"]] == ["s2"]
+    assert found["confirmatory"][0]["holm_p_value"] == found["confirmatory"][0]["p_value"]
+    assert {study[0]["no_preference"]["margin"] for study in found["preference"].values()} == {0.2}
+    assert [row["study"] for row in analyse(both, resamples=20)["confirmatory"]] == ["s1", "s2"]
