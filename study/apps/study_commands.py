@@ -100,7 +100,15 @@ def analyse_results(folder: Path, database: str | None = None) -> dict[str, Any]
     with open_answers(folder, database) as responses:
         answers, checks = answers_frame(responses), answers_frame(responses, roles=("check",))
     rules = rules_of(settings.exclusions.model_dump())
-    return analyse_all(answers, threshold=settings.threshold, alpha=settings.alpha, rules=rules, checks=checks)
+    return analyse_all(
+        answers,
+        threshold=settings.threshold,
+        alpha=settings.alpha,
+        margin=settings.equivalence_points / 100.0,
+        family=settings.confirmatory or None,
+        rules=rules,
+        checks=checks,
+    )
 
 
 def headlines(analysis: dict[str, Any]) -> list[str]:
