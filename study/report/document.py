@@ -62,6 +62,8 @@ def write_report(results_folder: str | Path, *, resamples: int = 1000) -> Path:
             material.answers,
             threshold=settings.threshold,
             alpha=settings.alpha,
+            margin=settings.equivalence_points / 100.0,
+            family=settings.confirmatory or None,
             resamples=resamples,
             rules=rules_of(settings.exclusions.model_dump()),
             checks=material.checks,
