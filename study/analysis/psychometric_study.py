@@ -64,7 +64,7 @@ def analyse_psychometric(
         )
     nameless = int(trials["participant"].isna().sum())
     if nameless:
-        raise AnalysisError(f"expected a participant in every row, found none in {nameless}; name them or leave them out")
+        raise AnalysisError(f"expected a participant in every row, found {nameless} without; name them or leave them out")
     chosen = model or make_model()
     own = []
     for name, part in trials.groupby(trials["participant"].astype(str), sort=True):
