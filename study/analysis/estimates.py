@@ -8,13 +8,17 @@ and how much that costs (design effect).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, is_dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = NDArray[np.float64]
 
@@ -237,6 +241,36 @@ def jackknife_error(left_out: FloatArray) -> float | None:
     if count < 2 or not np.isfinite(left_out).all():
         return None
     return math.sqrt((count - 1) / count * float(((left_out - left_out.mean()) ** 2).sum()))
+
+
+def check_columns(table: pd.DataFrame, names: Sequence[str], analysis: str) -> None:
+    """Refuse a table that lacks columns.
+
+    Raises
+    ------
+    AnalysisError
+        Naming what is missing.
+    """
+    missing = [name for name in names if name not in table.columns]
+    if missing:
+        raise AnalysisError(
+            f"expected columns {', '.join(names)} for {analysis}, found none named {', '.join(missing)}; name them so "
+            "in the table"
+        )
+
+
+def check_participants(table: pd.DataFrame) -> None:
+    """Refuse rows that nobody answered.
+
+    Raises
+    ------
+    AnalysisError
+        When a row has no participant.
+    """
+    nameless = int(table["participant"].isna().sum())
+    if nameless:
+        rows = "row" if nameless == 1 else "rows"
+        raise AnalysisError(f"expected a participant in every row, found {nameless} {rows} without; leave them out")
 
 
 def check_share(value: float, name: str) -> None:

@@ -16,7 +16,6 @@ from study.analysis.group_models import psychometric_mixed
 from study.analysis.mixed import Link
 from study.analysis.psychometric import Estimate, Model, PsychometricFit, curve_of, fit_psychometric, make_model
 from study.analysis.psychometric_likelihood import LikelihoodFit, fit_likelihood
-from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,15 +55,8 @@ def analyse_psychometric(
     AnalysisError
         When a column is missing, or a count can't be.
     """
-    missing = [name for name in NEEDED_COLUMNS if name not in trials.columns]
-    if missing:
-        raise AnalysisError(
-            f"expected columns {', '.join(NEEDED_COLUMNS)} for a psychometric function, found none named "
-            f"{', '.join(missing)}; name them in the table of trials"
-        )
-    nameless = int(trials["participant"].isna().sum())
-    if nameless:
-        raise AnalysisError(f"expected a participant in every row, found {nameless} without; name them or leave them out")
+    estimates.check_columns(trials, NEEDED_COLUMNS, "a psychometric function")
+    estimates.check_participants(trials)
     chosen = model or make_model()
     own = []
     for name, part in trials.groupby(trials["participant"].astype(str), sort=True):

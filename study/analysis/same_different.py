@@ -92,19 +92,10 @@ def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
     AnalysisError
         When a column is missing, or an answer is neither "same" nor "different".
     """
-    missing = [name for name in NEEDED_COLUMNS if name not in answers.columns]
-    if missing:
-        raise AnalysisError(
-            f"expected columns {', '.join(NEEDED_COLUMNS)} for a same-different analysis, found none named "
-            f"{', '.join(missing)}; name them in the table of answers"
-        )
+    estimates.check_columns(answers, NEEDED_COLUMNS, "a same-different analysis")
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
     given = chosen[chosen["answer"].notna() & chosen["difference_frames"].notna()]
-    nameless = int(given["participant"].isna().sum())
-    if nameless:
-        raise AnalysisError(
-            f"expected a participant in every row, found none in {nameless}; name them or leave them out"
-        )
+    estimates.check_participants(given)
     strange = sorted(set(given["answer"].astype(str)) - {"same", "different"})
     if strange:
         raise AnalysisError(f'expected the answers "same" and "different", found {strange[0]!r}; recode the column')

@@ -218,7 +218,7 @@ def test_tables_of_hits_and_false_alarms(counts: tuple[float, float, float, floa
         ),
         (
             lambda: analyse_jnd(pd.DataFrame({"participant": [None], "difference_frames": [1], "answer": ["same"]})),
-            "found 1 without",
+            "found 1 row without",
         ),
         (
             lambda: analyse_jnd(
@@ -230,7 +230,7 @@ def test_tables_of_hits_and_false_alarms(counts: tuple[float, float, float, floa
             lambda: analyse_psychometric(
                 pd.DataFrame({"participant": [None], "level": [1.0], "yes": [1], "shown": [2]})
             ),
-            "found 1 without",
+            "found 1 row without",
         ),
         (
             lambda: analyse_jnd(pd.DataFrame({"participant": ["a"], "difference_frames": [1], "answer": ["Same"]})),
