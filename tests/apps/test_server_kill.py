@@ -1,4 +1,4 @@
-"""The server is killed at random moments: every acknowledged answer is there, none twice, and sessions go on."""
+"""Server or database are killed at random moments: acknowledged answers are there, none twice, and sessions go on."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -56,6 +57,9 @@ class Client:
                         self.cookie = cookie.split(";")[0]
                     return json.loads(response.read())
             except urllib.error.HTTPError as refusal:
+                if refusal.code == 503:  # the database is away: pages send again
+                    time.sleep(0.05)
+                    continue
                 self.wrong.append(f"{path}: {refusal.code} {refusal.read()!r}")
                 self.stop.set()
             except (OSError, ValueError, http.client.HTTPException):
@@ -86,50 +90,78 @@ class Client:
             self.finished += bool(view)
 
 
-def start(folder: Path, port: int) -> subprocess.Popen[bytes]:
-    here = Path(__file__).parent
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(here), str(here.parents[1])))}
-    command = [sys.executable, str(here / "server_child.py"), str(folder), str(port)]
-    child = subprocess.Popen(command, env=environment)
-    end = time.monotonic() + 60
-    while time.monotonic() < end:
-        assert child.poll() is None, "the server ended at once"
+@dataclass
+class Running:
+    """A server in a process of its own."""
+
+    folder: Path
+    port: int
+    database: str
+
+    def __post_init__(self) -> None:
+        self.start()
+
+    def start(self) -> None:
+        here = Path(__file__).parent
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(here), str(here.parents[1])))}
+        command = [sys.executable, str(here / "server_child.py"), str(self.folder), str(self.port), self.database]
+        self.child = subprocess.Popen(command, env=environment)
+        wait_for(self.answers)
+
+    def answers(self) -> bool:
+        assert self.child.poll() is None, "the server ended at once"
         try:
-            urllib.request.urlopen(f"http://127.0.0.1:{port}/api/study", timeout=1).close()
+            urllib.request.urlopen(f"http://127.0.0.1:{self.port}/api/study", timeout=1).close()
         except OSError:
-            time.sleep(0.02)
-        else:
-            return child
-    raise AssertionError("the server did not start")
+            return False
+        return True
+
+    def kill(self) -> None:
+        os.kill(self.child.pid, signal.SIGKILL)
+        self.child.wait()
+
+    def kill_and_start(self) -> None:
+        self.kill()
+        self.start()
 
 
-@pytest.mark.parametrize("kills", [4, pytest.param(200, marks=pytest.mark.slow)])
-def test_acknowledged_answers_survive_kills(tmp_path, kills):
-    unfilmed(tmp_path)
+def wait_for(what: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not what():
+        assert time.monotonic() < end, "waited for a minute"
+        time.sleep(0.02)
+
+
+def run_clients(folder: Path, database: str, kills: int, kill: Callable[[Running], object]) -> None:
+    """Serve a study while clients answer, kill again and again, then look at what is stored."""
+    unfilmed(folder)
     port, stop = free_port(), threading.Event()
     clients = [Client(f"http://127.0.0.1:{port}", number, stop) for number in range(CLIENTS)]
     threads = [threading.Thread(target=client.run) for client in clients]
     dice = random.Random(5)
-    child = start(tmp_path, port)
+    running = Running(folder, port, database)
     for thread in threads:
         thread.start()
     try:
         for _ in range(kills):
             time.sleep(dice.uniform(0.02, 0.6))
-            os.kill(child.pid, signal.SIGKILL)
-            child.wait()
-            child = start(tmp_path, port)
+            before = sum(len(client.acknowledged) for client in clients)
+            kill(running)
+            wait_for(lambda: sum(len(client.acknowledged) for client in clients) > before or stop.is_set())  # noqa: B023
         time.sleep(0.3)
     finally:
         stop.set()
         for thread in threads:
             thread.join()
-        child.kill()
-        child.wait()
+        running.kill()
     assert [wrong for client in clients for wrong in client.wrong] == []
-    acknowledged = [key for client in clients for key in client.acknowledged]
+    compare([key for client in clients for key in client.acknowledged], database, kills)
+
+
+def compare(acknowledged: list[tuple[str, int, str, int, str | None]], database: str, kills: int) -> None:
+    """What was acknowledged is stored, once, with at most what each client had under way besides."""
     assert len(acknowledged) > 3 * kills
-    with open_responses(tmp_path) as responses:
+    with open_responses(database) as responses:
         table = answers_frame(responses, roles=ROLES, all_attempts=True)
     columns = ["participant", "trial", "item", "attempt", "answer"]
     stored = [tuple(row) for row in table[columns].itertuples(index=False)]
@@ -137,5 +169,21 @@ def test_acknowledged_answers_survive_kills(tmp_path, kills):
     assert len({row[:4] for row in stored}) == len(stored)
     assert set(acknowledged) <= set(stored)
     assert len(acknowledged) == len(set(acknowledged))
-    # At most the one that each client had under way was stored without its word of it arriving.
     assert len(stored) - len(acknowledged) <= CLIENTS * 2
+
+
+@pytest.mark.parametrize("kills", [4, pytest.param(200, marks=pytest.mark.slow)])
+def test_acknowledged_answers_survive_kills_of_the_server(tmp_path, database, kills):
+    run_clients(tmp_path, database, kills, Running.kill_and_start)
+
+
+@pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.slow)])
+def test_sessions_go_on_when_postgresql_is_killed_and_started_again(tmp_path, postgres_server, postgres_url, kills):
+    """The server of pages runs on: it tells them to send again, and connects anew."""
+
+    def kill(_: Running) -> None:
+        postgres_server.kill()
+        time.sleep(0.2)
+        postgres_server.start()
+
+    run_clients(tmp_path, postgres_url, kills, kill)

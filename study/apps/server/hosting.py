@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import re
 import secrets
 import time
@@ -49,6 +50,9 @@ TAB_SECONDS = 45.0
 
 MOST_EVENTS = 2000
 """Events that are stored of one session; a page that goes wrong can't fill the disk."""
+
+TELL_EVERY_SECONDS = 10.0
+"""How often it is logged that the database is away."""
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
@@ -104,6 +108,7 @@ class Host:
         self.places = people.Places(groups, settings.most_participants, settings.dropped_after)
         self.sittings: dict[str, Sitting] = {}
         self.recent: set[int] = set()
+        self._told_away = -math.inf
         # Arrivals at this server stand in line here, not as threads that wait for the database's lock.
         self._starting = asyncio.Lock()
 
@@ -369,4 +374,10 @@ class Host:
             await asyncio.to_thread(people.seen, self.responses, recent)
         except AWAY as error:
             self.recent |= recent
-            log.warning("Who is here can't be stored now: %s", in_words(error))
+            self.database_away(error)
+
+    def database_away(self, error: Exception) -> None:
+        """Log it, but not for each of the messages that meet it."""
+        if time.monotonic() - self._told_away > TELL_EVERY_SECONDS:
+            self._told_away = time.monotonic()
+            log.warning("The database is away, pages send again: %s", in_words(error))

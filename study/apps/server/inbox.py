@@ -20,7 +20,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from study.apps.server.hosting import Host, Sitting
 from study.apps.server.messages import Answered, Begin, Done, Happened, Withdrawal, read
 from study.errors import SegueError
-from study.experiment.databases import AWAY, in_words
+from study.experiment.databases import AWAY
 
 COOKIE_SECONDS = 14 * 24 * 3600
 DATABASE_AWAY = "The database can't be reached now; send this again."
@@ -154,7 +154,7 @@ class Inbox:
             log.warning("%s: %r", handler.__name__, str(refusal))
             return 422, Reply({"error": str(refusal)})
         except AWAY as error:
-            log.warning("%s: the database is away: %s", handler.__name__, in_words(error))
+            self.host.database_away(error)
             return 503, Reply({"error": DATABASE_AWAY})
 
 

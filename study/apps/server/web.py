@@ -10,6 +10,7 @@ import contextlib
 import html
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from study.apps.server.inbox import DATABASE_AWAY, Inbox, RefusedError, cookie
 from study.apps.server.limits import Limits
 from study.apps.server.researcher import researcher_routes
 from study.errors import SegueError
-from study.experiment.databases import AWAY, in_words
+from study.experiment.databases import AWAY
 
 PAGES = Path(__file__).resolve().parents[1] / "pages"
 TYPES = {
@@ -54,10 +55,11 @@ def make_app(host: Host) -> Limits:
         headers = {"etag": f'"{request.path_params["name"]}"', "last-modified": "Thu, 01 Jan 1970 00:00:00 GMT"}
         return FileResponse(path, media_type="video/mp4", headers=headers)
 
+    guarded = partial(_guarded, host)
     routes = [
         Route("/api/study", study, methods=["GET"]),
-        Route("/films/{name:str}.mp4", _guarded(film), methods=["GET"]),
-        *researcher_routes(host, _guarded),
+        Route("/films/{name:str}.mp4", guarded(film), methods=["GET"]),
+        *researcher_routes(host, guarded),
         *_pages(host),
     ]
     pages = Starlette(routes=routes, lifespan=_lifespan(host))
@@ -66,7 +68,7 @@ def make_app(host: Host) -> Limits:
     return Limits(Inbox(pages, host))
 
 
-def _guarded(handler: Handler) -> Handler:
+def _guarded(host: Host, handler: Handler) -> Handler:
     """Refusals become JSON with one sentence; what went wrong on our side is logged, not shown."""
 
     async def run(request: Request) -> Response:
@@ -78,7 +80,7 @@ def _guarded(handler: Handler) -> Handler:
             log.warning("%s %r: %r", request.method, request.url.path, str(refusal))
             return JSONResponse({"error": str(refusal)}, status_code=422)
         except AWAY as error:
-            log.warning("%s %r: the database is away: %s", request.method, request.url.path, in_words(error))
+            host.database_away(error)
             return JSONResponse({"error": DATABASE_AWAY}, status_code=503)
 
     return run
