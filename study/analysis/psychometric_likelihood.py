@@ -19,7 +19,9 @@ from study.analysis.sigmoids import Sigmoid
 
 FloatArray = NDArray[np.float64]
 
-PROFILE_POINTS = 81
+PROFILE_POINTS = 41
+REFINED_POINTS = 9
+PROFILE_STEPS = 50
 SMALLEST_PROBABILITY = 1e-9
 
 
@@ -74,7 +76,14 @@ def _parts(axis: FloatArray, point: FloatArray, sigmoid: Sigmoid) -> tuple[Float
     return share, np.stack(by, axis=2)
 
 
-def maximum(data_axis: FloatArray, yes: FloatArray, shown: FloatArray, model: Model, held: ArrayLike = ()) -> Maxima:
+def maximum(
+    data_axis: FloatArray,
+    yes: FloatArray,
+    shown: FloatArray,
+    model: Model,
+    held: ArrayLike = (),
+    steps: int = 200,
+) -> Maxima:
     """Fit many data sets at the same levels.
 
     Parameters
@@ -86,6 +95,8 @@ def maximum(data_axis: FloatArray, yes: FloatArray, shown: FloatArray, model: Mo
         Its overdispersion is not used.
     held : array_like, shape (fits,)
         Thresholds to hold, one a fit; none are held where empty.
+    steps
+        Of the search, at most.
 
     Returns
     -------
@@ -109,7 +120,7 @@ def maximum(data_axis: FloatArray, yes: FloatArray, shown: FloatArray, model: Mo
     thresholds = np.asarray(held, dtype=np.float64)
     if thresholds.size:
         low[:, 0] = high[:, 0] = thresholds
-    return maximise(value, scores, _start(data_axis, yes, shown, model), low, high)
+    return maximise(value, scores, _start(data_axis, yes, shown, model), low, high, steps)
 
 
 def _bounds(axis: FloatArray, model: Model) -> tuple[FloatArray, FloatArray]:
@@ -231,27 +242,31 @@ def profile_interval(
     (outer, _), _ = prior_limits(axis)
     centre = float(np.clip(best.point[0, 0], *outer))
     line = np.unique(np.concatenate([np.linspace(*outer, PROFILE_POINTS), [centre]]))
-    for _ in range(2):
-        drop = _drop(axis, data, model, best, line)
-        inside = np.flatnonzero(drop <= reach)
-        if not len(inside):
-            return None, None
-        edges = (max(inside[0] - 1, 0), min(inside[-1] + 1, len(line) - 1))
-        low = _crossing(line, drop, inside[0] - 1, reach) if inside[0] > 0 else None
-        high = _crossing(line, drop, inside[-1], reach) if inside[-1] < len(line) - 1 else None
-        line = np.unique(np.concatenate([np.linspace(line[edges[0]], line[edges[1]], PROFILE_POINTS // 2), [centre]]))
+    inside = np.flatnonzero(_drop(axis, data, model, best, line) <= reach)
+    if not len(inside):
+        return None, None
+    first, last = int(inside[0]), int(inside[-1])
+    low = high = None
+    if first > 0:
+        low = _crossing(axis, data, model, best, line[first - 1], line[first], reach)
+    if last < len(line) - 1:
+        high = _crossing(axis, data, model, best, line[last + 1], line[last], reach)
     return low, high
 
 
 def _drop(axis: FloatArray, data: Data, model: Model, best: Maxima, line: FloatArray) -> FloatArray:
     """Twice the loss of log likelihood where the threshold is held at each point of a line."""
     yes, shown = (np.tile(part, (len(line), 1)) for part in (data.yes, data.shown))
-    held = maximum(axis, yes, shown, model, held=line)
+    held = maximum(axis, yes, shown, model, held=line, steps=PROFILE_STEPS)
     return np.asarray(2 * (max(float(best.value[0]), float(held.value.max())) - held.value), dtype=np.float64)
 
 
-def _crossing(line: FloatArray, drop: FloatArray, before: int, reach: float) -> float:
-    """Where the loss crosses `reach` between two points, along straight lines of its root."""
-    roots = np.sqrt(np.maximum(drop[before : before + 2], 0.0))
-    part = (np.sqrt(reach) - roots[0]) / (roots[1] - roots[0]) if roots[0] != roots[1] else 0.5
-    return float(line[before] + part * (line[before + 1] - line[before]))
+def _crossing(
+    axis: FloatArray, data: Data, model: Model, best: Maxima, outside: float, inside: float, reach: float
+) -> float:
+    """Where the loss crosses `reach` between a threshold outside and one inside, by a finer line and its root."""
+    line = np.linspace(outside, inside, REFINED_POINTS)
+    roots = np.sqrt(np.maximum(_drop(axis, data, model, best, line), 0.0))
+    at = int(np.argmax(roots <= np.sqrt(reach))) or REFINED_POINTS - 1
+    part = np.clip((roots[at - 1] - np.sqrt(reach)) / max(roots[at - 1] - roots[at], 1e-12), 0.0, 1.0)
+    return float(line[at - 1] + part * (line[at] - line[at - 1]))
