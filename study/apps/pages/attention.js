@@ -6,7 +6,7 @@ import { tell } from "./server.js";
 const BEAT_MS = 250;
 const STOPPED_MS = 1500; // between two beats: the page, the browser or the whole machine stood still
 
-const state = { faults: [], filmsOn: false, beat: 0, clock: 0 };
+const state = { faults: [], filmsOn: false, unseen: false, beat: 0, clock: 0 };
 
 function fault(why) {
   if (!state.faults.includes(why)) state.faults.push(why);
@@ -19,6 +19,7 @@ function beat() {
   Object.assign(state, { beat: now, clock });
   if (still < STOPPED_MS || document.hidden) return;
   fault("stood still");
+  state.unseen = true;
   tell("interrupted", { how: "stood still", seconds: Math.round(still) / 1000, at_ms: now });
 }
 
@@ -29,6 +30,7 @@ export function watchAttention() {
     // A hidden page's timers are slowed down on purpose: beats are counted anew once it is seen again.
     Object.assign(state, { beat: performance.now(), clock: Date.now() });
     fault("hidden");
+    state.unseen = true;
     tell(document.hidden ? "focus-lost" : "focus-back", { how: "visibility", at_ms: performance.now() });
   });
   window.addEventListener("blur", () => {
@@ -51,6 +53,13 @@ export function attend() {
 
 export function filmsOn(on) {
   state.filmsOn = on;
+  if (on) state.unseen = document.hidden;
+}
+
+// Whether nobody can have seen all of what was shown since the films began.
+export function unseen() {
+  beat();
+  return state.unseen;
 }
 
 // Why the trial is flagged; none where it is not.

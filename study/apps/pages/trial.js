@@ -1,6 +1,6 @@
 // A trial: films, gap, question, as the server's view says. Resolves with the message that is the answer.
 
-import { attend, faults, filmsOn, visible } from "./attention.js";
+import { attend, faults, filmsOn, unseen, visible } from "./attention.js";
 import { ask, element, heading, secondClick, show, sleep, status } from "./dom.js";
 import { FilmFault, forget, load, loadAhead, release } from "./film.js";
 import { play } from "./playing.js";
@@ -50,13 +50,15 @@ async function loadAll(view, study, onFault) {
   return { place, videos };
 }
 
-async function showFilms(view, study, { first, pauseOver, onFault }) {
+class Unseen extends Error {} // films that were played to nobody
+
+async function showFilms(view, study, { restarts, pauseOver, onFault }) {
   const { place, videos } = await loadAll(view, study, onFault);
   const scale = place.clientWidth / study.size[0]; // of the film's own size
   matchBackground(place, videos[0]);
   await pauseOver;
   await visible();
-  if (first) attend();
+  if (restarts === MOST_RESTARTS) attend();
   filmsOn(true);
   const shown = [];
   let last = performance.now();
@@ -66,6 +68,7 @@ async function showFilms(view, study, { first, pauseOver, onFault }) {
       videos[index].classList.add("now");
       const { last: lastFrame, ...how } = await play(videos[index], film, view.fps);
       videos[index].classList.remove("now");
+      if (restarts && unseen()) throw new Unseen();
       last = lastFrame;
       shown.push({ place: film.place, ...how });
     }
@@ -146,17 +149,21 @@ async function filmFault(study) {
 // Shows the films until they were shown, or given up: null then.
 async function shownFilms(view, study, pauseOver) {
   const onFault = (film, why, attempt) => tell("fault", { what: why, trial: view.trial, place: film.place, try: attempt });
-  for (let restarts = 0; ; restarts += 1) {
+  for (let restarts = MOST_RESTARTS; ; ) {
     try {
-      return await showFilms(view, study, { first: restarts === 0, pauseOver, onFault });
+      return await showFilms(view, study, { restarts, pauseOver, onFault });
     } catch (error) {
-      if (!(error instanceof FilmFault)) throw error;
-      forget(view.films);
-      const why = faults().join(", ");
-      tell("fault", { what: error.why, trial: view.trial, hidden: document.hidden ? 1 : 0, page: why });
+      if (!(error instanceof FilmFault || error instanceof Unseen)) throw error;
       // A hidden tab or a closed lid stops films: they start again when somebody looks, and the trial stays flagged.
-      if (why && restarts < MOST_RESTARTS) await visible();
-      else if ((await filmFault(study)) === "skip") return null;
+      if (unseen() && restarts > 0) {
+        restarts -= 1;
+        tell("interrupted", { trial: view.trial, attempt: view.attempt, how: faults().join(", ") });
+        await visible();
+        continue;
+      }
+      forget(view.films);
+      tell("fault", { what: error.why, trial: view.trial });
+      if ((await filmFault(study)) === "skip") return null;
     }
   }
 }

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -79,28 +80,32 @@ def webkit_tab(virtual_display: str) -> Iterator[WebKitTab]:
 
 
 @pytest.fixture(scope="session")
-def films(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A results folder with films; sites get copies."""
+def films(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """`films(protocol)`: a results folder with its films, drawn once; sites get copies."""
     from renderer.errors import RendererError
     from study.errors import StimulusError
 
-    folder = tmp_path_factory.mktemp("films")
-    try:
-        render(prepared(PROTOCOL), folder, workers=1)
-    except (RendererError, StimulusError) as error:
-        missing("a context to draw films with", str(error))
-    return folder
+    @cache
+    def drawn(text: str) -> Path:
+        folder = tmp_path_factory.mktemp("films")
+        try:
+            render(prepared(text), folder, workers=1)
+        except (RendererError, StimulusError) as error:
+            missing("a context to draw films with", str(error))
+        return folder
+
+    return drawn
 
 
 @pytest.fixture
-def make_site(films: Path, tmp_path: Path) -> Iterator[Callable[..., Site]]:
-    """`make_site(**settings)`: a running server on a copy of the study."""
+def make_site(films: Callable[[str], Path], tmp_path: Path) -> Iterator[Callable[..., Site]]:
+    """`make_site(protocol, **settings)`: a running server on a copy of a study."""
     sites: list[Site] = []
 
-    def make(**settings: Any) -> Site:
+    def make(text: str = PROTOCOL, **settings: Any) -> Site:
         folder = tmp_path / f"site-{len(sites)}"
-        shutil.copytree(films, folder)
-        sites.append(Site(folder, **settings))
+        shutil.copytree(films(text), folder)
+        sites.append(Site(folder, text, **settings))
         return sites[-1]
 
     yield make

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
+import os
+import signal
 import subprocess
 import time
 import urllib.request
@@ -41,6 +43,7 @@ class Tab(Driven):
             connect(f"ws://127.0.0.1:{browser.port}/devtools/page/{target}", max_size=None, ping_interval=None)
         )
         self.number = 0
+        self.closed = False
         self.events: list[dict[str, Any]] = []
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
@@ -113,7 +116,21 @@ class Tab(Driven):
                     found.append(entry["text"])
         return found
 
+    def window(self, state: str) -> None:
+        """Make the tab's window `minimized`, or `normal` again: a page in it is hidden, or is seen."""
+        window = self.call("Browser.getWindowForTarget")["windowId"]
+        self.call("Browser.setWindowBounds", windowId=window, bounds={"windowState": state})
+
+    def offline(self, away: bool) -> None:
+        """Take the network away from this tab, or give it back."""
+        self.call(
+            "Network.emulateNetworkConditions", offline=away, latency=0, downloadThroughput=-1, uploadThroughput=-1
+        )
+
     def close(self) -> None:
+        if self.closed:
+            return
+        self.closed = True
         self.open_things.close()
         self.browser.http(f"/json/close/{self.target}")
 
@@ -142,6 +159,15 @@ class Browser:
         with urllib.request.urlopen(f"http://127.0.0.1:{self.port}{path}", timeout=30) as response:
             return response.read()
 
+    @contextmanager
+    def stopped(self) -> Iterator[None]:
+        """All of the browser's processes stand still, as those of a machine whose lid was closed."""
+        os.killpg(self.process.pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.killpg(self.process.pid, signal.SIGCONT)
+
     def person(self) -> str:
         """A fresh set of cookies and storage, as another participant has."""
         return self.call("Target.createBrowserContext")["browserContextId"]
@@ -159,7 +185,7 @@ class Browser:
 def chromium(executable: str, profile: Path) -> Iterator[Browser]:
     process = subprocess.Popen(
         [executable, *FLAGS, f"--user-data-dir={profile}", "about:blank"],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
     )  # fmt: skip
     try:
         file = profile / "DevToolsActivePort"

@@ -7,8 +7,67 @@ import time
 
 import sqlalchemy as sa
 
-from study.experiment.response_tables import events
+from study.experiment.response_tables import events, presentations
 from study.experiment.responses import answers_frame
+
+SHORT = """\
+name = "short"
+title = "Two of a kind"
+fps = 30
+seed = 3
+
+[stimuli]
+width = 160
+height = 120
+entry_s = 0.3
+exit_s = 0.3
+
+[timing]
+gap_s = 0.1
+pause_s = 0.1
+answer_s = 3.0
+
+[points]
+shortest_frames = 4
+longest_frames = 20
+
+[[transitions]]
+name = "walk_run"
+category = "walking"
+source = "walk"
+destination = "jog"
+
+[[studies]]
+name = "jnd"
+task = "same-different"
+reference = "geodesic"
+differences_frames = [-2, 0]
+order = "both"
+question = "Were they the same?"
+"""
+"""Four trials and nothing else, for what is about one trial."""
+
+RATED = (
+    SHORT[: SHORT.index("[[studies]]")]
+    + """
+[[studies]]
+name = "rating"
+task = "rating"
+reference = "geodesic"
+comparison = "cut"
+order = "random"
+
+[[studies.items]]
+name = "natural"
+question = "How natural was it?"
+low = "not at all"
+high = "very"
+
+[[studies.items]]
+name = "noticeable"
+question = "How noticeable was the passage?"
+"""
+)
 
 ROLES = ("trial", "practice", "check")
 END = "That was all"
@@ -86,8 +145,20 @@ def to_question(tab, number=1):
             return
 
 
-def answers(site):
-    return answers_frame(site.responses, roles=ROLES)
+def answers(site, **more):
+    return answers_frame(site.responses, roles=ROLES, **more)
+
+
+def to_films(tab, place=0):
+    """Walk until a pair's first film plays, or its second."""
+    tab.wait(f"[...document.querySelectorAll('.stage video')][{place}]?.classList.contains('now')", every=0.01)
+
+
+def details(site):
+    """How each film was shown, in the order of showing."""
+    with site.responses.engine.connect() as connection:
+        rows = connection.execute(sa.select(presentations).order_by(presentations.c.id)).mappings().all()
+    return [{**row, "detail": json.loads(row["detail_json"])} for row in rows]
 
 
 def happened(site, kind):
