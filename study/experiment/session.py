@@ -128,7 +128,8 @@ class Session:
     """Where a sitting stands. Use `open_session`, `current`, `advanced`, `answered` and `missed`.
 
     `trials_left` has for each step how many trials have steps from there on: an answer then costs the same however
-    long the plan is.
+    long the plan is. `badly_shown` are the showings (trial and attempt) of which an answer says that they were faulty:
+    a trial with several items comes again where any of them does.
     """
 
     plan: Plan
@@ -136,6 +137,7 @@ class Session:
     steps: tuple[Step, ...]
     trials_left: tuple[int, ...]
     position: int = 0
+    badly_shown: frozenset[tuple[int, int]] = frozenset()
 
 
 def open_session(
@@ -153,8 +155,10 @@ def open_session(
             f"Expected the protocol under which the plan was drawn (sha256 {plan.protocol_sha256[:12]}), found "
             f"{protocol.name!r} with {protocol.sha256[:12]}; use the protocol.toml of the results folder."
         )
-    steps = _steps(protocol, plan, tuple(answers), passed)
-    return Session(plan, protocol, steps, _trials_left(steps))
+    before = tuple(answers)
+    steps = _steps(protocol, plan, before, passed)
+    badly_shown = frozenset((answer.trial, answer.attempt) for answer in before if not answer.shown_well)
+    return Session(plan, protocol, steps, _trials_left(steps), badly_shown=badly_shown)
 
 
 def current(session: Session) -> Step:
@@ -222,6 +226,8 @@ def field_value(field: FormField, value: str) -> str:
             number = float(value)
         except ValueError:
             number = math.nan
+        if "_" in value:  # which Python takes within a number, and nobody else
+            number = math.nan
         least = -math.inf if field.least is None else field.least
         most = math.inf if field.most is None else field.most
         if not (math.isfinite(number) and least <= number <= most):
@@ -242,9 +248,10 @@ def answered(session: Session, value: str, response_s: float, *, shown_well: boo
     step = _asked(session)
     if value not in step.legal:
         raise SessionError(f"Expected one of {', '.join(step.legal)} in trial {step.trial}, found {value!r}.")
-    if response_s < 0 or (step.duration_s is not None and response_s > step.duration_s):
+    longest_s = math.inf if step.duration_s is None else step.duration_s
+    if not (math.isfinite(response_s) and 0 <= response_s <= longest_s):
         raise SessionError(
-            f"Expected a response time from 0 to {step.duration_s} s in trial {step.trial}, found {response_s:g} s; "
+            f"Expected a response time from 0 to {longest_s} s in trial {step.trial}, found {response_s:g} s; "
             "a late answer counts as missed."
         )
     return _record(session, Answer(step.trial, step.item, step.attempt, value, float(response_s), shown_well))
@@ -265,15 +272,17 @@ def _asked(session: Session) -> Step:
 
 def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     """Move on; where the trial was shown badly, add it once more to the end of its study. Practice gets feedback."""
-    here = current(session)
-    session = replace(session, position=session.position + 1)
+    here, showing = current(session), (answer.trial, answer.attempt)
+    badly_shown = session.badly_shown if answer.shown_well else session.badly_shown | {showing}
+    session = replace(session, position=session.position + 1, badly_shown=badly_shown)
     following = current(session)
     trial_goes_on = following.kind == "answer" and following.trial == answer.trial
     trial = session.plan.trial(answer.trial)
     if trial.role == "practice" and not trial_goes_on:
         feedback = Step("feedback", here.study, _feedback(session.protocol, trial, answer), role=trial.role)
         session = _with_steps(session, session.position, [feedback])
-    if not _comes_again(session.protocol, trial, answer.attempt, answer.shown_well) or trial_goes_on:
+    shown_well = showing not in badly_shown
+    if not _comes_again(session.protocol, trial, answer.attempt, shown_well) or trial_goes_on:
         return session, answer
     end = max(i for i, step in enumerate(session.steps) if step.study == trial.study) + 1
     repeat = _trial_steps(session.protocol, trial, answer.attempt + 1, frozenset())
@@ -343,37 +352,62 @@ def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Co
         steps.append(Step("form", text=protocol.texts.form.strip()))
     if not answers and (text := wording.welcome_text(protocol)):
         steps.append(Step("instructions", text=text))
-    for name in dict.fromkeys(trial.study for trial in plan.trials):
-        steps += _study_steps(protocol, plan, protocol.study(name), answers)
+    earlier: dict[int, list[tuple[int, Answer]]] = {}
+    for place, answer in enumerate(answers):
+        earlier.setdefault(answer.trial, []).append((place, answer))
+    studies: dict[str, list[Trial]] = {}
+    for trial in plan.trials:
+        studies.setdefault(trial.study, []).append(trial)
+    breaks = _breaks(protocol, plan)
+    for trials in studies.values():
+        steps += _study_steps(protocol, trials, earlier, breaks)
     if text := wording.debrief_text(protocol):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
 
 
-def _study_steps(protocol: Protocol, plan: Plan, study: StudySpec, answers: Sequence[Answer]) -> list[Step]:
+def _study_steps(
+    protocol: Protocol,
+    trials: Sequence[Trial],
+    earlier: Mapping[int, Sequence[tuple[int, Answer]]],
+    breaks: Collection[int],
+) -> list[Step]:
+    """What is left of a study: its instructions, trials with breaks, and those that come again, as they were queued.
+
+    `earlier` has the answers of each trial that has any, with their places among all; `breaks` the trials with a break
+    after them.
+    """
+    study = protocol.study(trials[0].study)
     steps: list[Step] = []
-    again: list[Step] = []
-    break_after = protocol.timing.break_after
-    count, practising = 0, False
-    for trial in plan.trials:
-        count += trial.role != "practice"
-        if trial.study != study.name:
-            continue
-        if practising and trial.role != "practice" and protocol.texts.practice_over:
+    again: list[tuple[int, list[Step]]] = []
+    begun = any(trial.trial in earlier for trial in trials if trial.role != "practice")
+    practised = trials[0].role == "practice" and not begun
+    for trial in trials:
+        if practised and trial.role != "practice" and protocol.texts.practice_over.strip():
             steps.append(Step("instructions", study.name, protocol.texts.practice_over.strip()))
-        attempt, done = _state(protocol, study, trial, [answer for answer in answers if answer.trial == trial.trial])
-        practising = trial.role == "practice" and done is not None
+        practised = practised and trial.role == "practice"
+        answers = earlier.get(trial.trial, ())
+        attempt, done = _state(protocol, study, trial, [answer for _, answer in answers])
         if done is None:
             continue
-        (again if attempt > 1 else steps).extend(_trial_steps(protocol, trial, attempt, done))
-        last = trial.trial == len(plan.trials)
-        if break_after and count % break_after == 0 and not last and attempt == 1 and trial.role != "practice":
+        if attempt > 1:
+            queued = max(place for place, answer in answers if answer.attempt == attempt - 1)
+            again.append((queued, _trial_steps(protocol, trial, attempt, done)))
+            continue
+        steps += _trial_steps(protocol, trial, attempt, done)
+        if trial.trial in breaks:
             steps.append(Step("break", study.name, protocol.texts.break_text.strip()))
-    steps += again
+    steps += [step for _, repeated in sorted(again, key=lambda one: one[0]) for step in repeated]
     if steps and (text := wording.instructions_text(protocol, study)):
-        example = next(trial.first for trial in plan.trials if trial.study == study.name) if study.example else ""
-        steps.insert(0, Step("instructions", study.name, text, stimulus=example))
+        steps.insert(0, Step("instructions", study.name, text, stimulus=trials[0].first if study.example else ""))
     return steps
+
+
+def _breaks(protocol: Protocol, plan: Plan) -> set[int]:
+    """The trials that a break follows: every so many, practice not counted, and never the last one."""
+    counted = [trial.trial for trial in plan.trials if trial.role != "practice"]
+    every = protocol.timing.break_after
+    return set(counted[every - 1 : -1 : every]) if every else set()
 
 
 def _state(

@@ -296,7 +296,7 @@ def test_the_end_of_practice_is_said_once(practising):
     assert [step.role for step in seen[: over[0]] if step.trial][-1] == "practice"
     assert (seen[over[0] + 1].kind, seen[over[0] + 1].role, seen[over[0] + 1].trial) == ("first", "trial", 3)
     _, one = run(practising, 1)
-    for answers, said in ((one, True), (run(practising, 2)[1], False), (run(practising, 5)[1], False)):
+    for answers, said in ((one, True), (run(practising, 2)[1], True), (run(practising, 5)[1], False)):
         again = open_session(practising.protocol, practising.plan, answers)
         assert any(step.text == practising.protocol.texts.practice_over for step in again.steps) == said
 
