@@ -12,10 +12,11 @@ across a network is found out by asking). Elsewhere arrival is all there is.
 from __future__ import annotations
 
 import ctypes
-import ctypes.util
 import select
 import time
 from typing import Any
+
+from renderer.xlib import InputEvent, Predicate, load_xlib
 
 _KEY_PRESS, _BUTTON_PRESS = 2, 4
 _PROPERTY_CHANGES = 1 << 22
@@ -27,25 +28,11 @@ TICK_MS = 1.0
 """The server counts whole milliseconds."""
 
 
-class _Event(ctypes.Structure):
-    """`XKeyEvent` and `XButtonEvent`, which are alike, and room for every other."""
-
-    _fields_ = (
-        ("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("sent", ctypes.c_int), ("display", ctypes.c_void_p),
-        ("window", ctypes.c_ulong), ("root", ctypes.c_ulong), ("child", ctypes.c_ulong), ("time", ctypes.c_ulong),
-        ("x", ctypes.c_int), ("y", ctypes.c_int), ("x_root", ctypes.c_int), ("y_root", ctypes.c_int),
-        ("state", ctypes.c_uint), ("code", ctypes.c_uint), ("same_screen", ctypes.c_int), ("rest", ctypes.c_long * 12),
-    )  # fmt: skip
-
-
 class _PropertyEvent(ctypes.Structure):
     _fields_ = (
         ("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("sent", ctypes.c_int), ("display", ctypes.c_void_p),
         ("window", ctypes.c_ulong), ("atom", ctypes.c_ulong), ("time", ctypes.c_ulong), ("rest", ctypes.c_long * 18),
     )  # fmt: skip
-
-
-_Predicate = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(_Event), ctypes.c_void_p)
 
 
 def pressed_at(arrived_s: float, server_ms: int) -> float:
@@ -66,8 +53,8 @@ class ServerTimes:
         self._x, self._display = x, ctypes.c_void_p(display)
         self._socket = int(x.XConnectionNumber(self._display))
         self._found: dict[tuple[int, int], list[float]] = {}
-        self._predicate = _Predicate(self._look_at)
-        self._unused = _Event()
+        self._predicate = Predicate(self._look_at)
+        self._unused = InputEvent()
 
     def wait(self, timeout_s: float | None) -> None:
         """Sleep until there are events, or until the time is over."""
@@ -104,33 +91,10 @@ def server_times(glfw: Any) -> ServerTimes | None:
     """Server times of glfw's connection; None where it has none, or where the server counts another clock."""
     if glfw.get_platform() != glfw.PLATFORM_X11:
         return None
-    x = _xlib()
+    x = load_xlib()
     if x is None or not _same_clock(x):
         return None
     return ServerTimes(x, int(ctypes.cast(glfw.get_x11_display(), ctypes.c_void_p).value or 0))
-
-
-def _xlib() -> Any:
-    name = ctypes.util.find_library("X11") or "libX11.so.6"
-    try:
-        x = ctypes.CDLL(name)
-    except OSError:
-        return None
-    pointer, number = ctypes.c_void_p, ctypes.c_ulong
-    x.XOpenDisplay.restype, x.XOpenDisplay.argtypes = pointer, [ctypes.c_char_p]
-    x.XDefaultRootWindow.restype, x.XDefaultRootWindow.argtypes = number, [pointer]
-    x.XCreateWindow.restype = number
-    x.XCreateWindow.argtypes = [
-        pointer, number, *[ctypes.c_int] * 2, *[ctypes.c_uint] * 3, ctypes.c_int, ctypes.c_uint,
-        pointer, number, pointer,
-    ]  # fmt: skip
-    x.XSelectInput.argtypes = [pointer, number, ctypes.c_long]
-    x.XChangeProperty.argtypes = [pointer, number, number, number, ctypes.c_int, ctypes.c_int, pointer, ctypes.c_int]
-    x.XWindowEvent.argtypes = [pointer, number, ctypes.c_long, pointer]
-    x.XCloseDisplay.argtypes = x.XConnectionNumber.argtypes = [pointer]
-    x.XEventsQueued.argtypes = [pointer, ctypes.c_int]
-    x.XCheckIfEvent.argtypes = [pointer, pointer, _Predicate, pointer]
-    return x
 
 
 def _same_clock(x: Any) -> bool:

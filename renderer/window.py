@@ -15,6 +15,7 @@ frame.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
@@ -27,6 +28,7 @@ from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Size,
 from renderer.pacing import OWN_CLOCK_HZ, Pacing, find_pacing, next_flip
 from renderer.screen import RGB, Drawing, Picture, Screen
 from renderer.server_times import server_times
+from renderer.xlib import when_server_is_lost
 
 _TRIAL_SWAPS, _WARM_UP = 40, 10
 _SPIN_S = 0.001
@@ -95,6 +97,11 @@ class Window:
             "gl_version": self.gl.info["GL_VERSION"],
             "glfw": _text(self._glfw.get_version_string()),
         }
+
+    def when_lost(self, leave: Callable[[], None]) -> None:
+        """Have a function called when the display is gone (X11); it has to end the process, which can show nothing."""
+        if self._glfw.get_platform() == self._glfw.PLATFORM_X11:
+            when_server_is_lost(leave)
 
     # Time
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from renderer.window import Window
     from study.apps.player.loop import Outcome
     from study.apps.player.pages import Look
+    from study.apps.player.store import Store
     from study.experiment.plan import Plan
     from study.experiment.protocol import Protocol
     from study.experiment.responses import Responses
@@ -134,7 +137,16 @@ def _sit(
         protocol.title, full_screen=size is None, size=size or (1280, 800), monitor=place.monitor
     ) as window:
         _tell_of_timing(window)
+        window.when_lost(lambda: _leave_a_lost_display(store))
         return play(window, session, stimuli.stimulus, store, look, fill=place.fill, say=say), window.describe()
+
+
+def _leave_a_lost_display(store: Store) -> None:
+    """Nothing can be shown or asked any more: say so, and end at once."""
+    with suppress(Exception):  # what can be written down is
+        store.event("display lost")
+    say("segue: The display is gone. Every answer that was given is stored; the same command goes on from there.")
+    os._exit(2)
 
 
 def page_look(stimuli: StimulusSet, session: Session, font: Path | None) -> Look:

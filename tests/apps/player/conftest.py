@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
+from playing import Playing
 
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol import Protocol, parse_protocol
@@ -160,3 +162,24 @@ def store() -> ListStore:
 def texts() -> dict[str, str]:
     """The pieces of TOML that tests put together, by name."""
     return {"small": SMALL, "rating": RATING, "about_you": ABOUT_YOU}
+
+
+@pytest.fixture
+def start(virtual_display: str) -> Iterator[Callable[..., Playing]]:
+    """`start(arguments ...)`: a `segue play` on the virtual display, which never outlives its test."""
+    started: list[Playing] = []
+
+    def begin(*arguments: object, display: str = virtual_display) -> Playing:
+        started.append(Playing(display, *arguments))
+        return started[-1]
+
+    yield begin
+    for playing in started:
+        playing.kill()
+
+
+@pytest.fixture
+def protocol_file(tmp_path: Path, texts: Any) -> Path:
+    file = tmp_path / "small.toml"
+    file.write_text(texts["small"] + texts["rating"])
+    return file
