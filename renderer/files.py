@@ -1,9 +1,14 @@
-"""Files that are whole or not there: written under a temporary name in the same folder, then renamed."""
+"""Files that are whole or not there: written under a temporary name in the same folder, then renamed. Scratch folders.
+
+What a killed process left behind, under either kind of name, the next one clears away.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -43,6 +48,18 @@ def discard_unfinished(target: Path) -> None:
             continue
         with suppress(OSError):
             left.unlink()
+
+
+@contextmanager
+def scratch_folder(kind: str) -> Iterator[Path]:
+    """A folder in the system's temporary one for this process alone; gone at the end."""
+    for left in Path(tempfile.gettempdir()).glob(f"{kind}-*-*"):
+        owner = left.name.removeprefix(f"{kind}-").partition("-")[0]
+        with suppress(OSError):
+            if owner.isdigit() and not _alive(int(owner)):
+                shutil.rmtree(left)
+    with tempfile.TemporaryDirectory(prefix=f"{kind}-{os.getpid()}-", ignore_cleanup_errors=True) as name:
+        yield Path(name)
 
 
 def _alive(process: int) -> bool:

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from multiprocessing import get_context
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,7 @@ from renderer.camera import Camera
 from renderer.capsules import Figure
 from renderer.context import os_environ_defaults
 from renderer.errors import RendererError
-from renderer.files import discard_unfinished
+from renderer.files import discard_unfinished, scratch_folder
 from renderer.video import CRF, PRESET, VideoInfo, render_video
 
 
@@ -172,27 +171,26 @@ def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[Vi
     finished = False
     # Workers read jobs from files. Sent through the pool's queue a job is larger than its pipe: when workers end early
     # the thread that feeds the pipe waits for a reader for ever, and so does the interpreter at its exit.
-    folder = TemporaryDirectory(prefix="segue-jobs-", ignore_cleanup_errors=True)
-    try:
-        waiting: dict[Future[VideoInfo], int] = {
-            pool.submit(_run_stored, _store(jobs[i], Path(folder.name) / f"{i}.job")): i for i in order
-        }
-        while waiting:
-            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                done[waiting.pop(future)] = tell(future.result())
-        finished = True
-    except BrokenProcessPool as error:
-        raise RendererError(
-            "A rendering process ended before its time: killed for memory, or started from a script without "
-            "`if __name__ == '__main__':` around its work. Try fewer workers, or workers=1."
-        ) from error
-    finally:
-        _stop(pool, finished)
-        folder.cleanup()
-        if not finished:
-            for job in jobs:
-                with suppress(OSError):
-                    discard_unfinished(Path(job.path))
+    with scratch_folder("segue-jobs") as folder:
+        try:
+            waiting: dict[Future[VideoInfo], int] = {
+                pool.submit(_run_stored, _store(jobs[i], folder / f"{i}.job")): i for i in order
+            }
+            while waiting:
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    done[waiting.pop(future)] = tell(future.result())
+            finished = True
+        except BrokenProcessPool as error:
+            raise RendererError(
+                "A rendering process ended before its time: killed for memory, or started from a script without "
+                "`if __name__ == '__main__':` around its work. Try fewer workers, or workers=1."
+            ) from error
+        finally:
+            _stop(pool, finished)
+            if not finished:
+                for job in jobs:
+                    with suppress(OSError):
+                        discard_unfinished(Path(job.path))
     return [done[i] for i in range(len(jobs))]
 
 
