@@ -1,4 +1,4 @@
-"""Recruiting, withdrawal and the researcher's page."""
+"""Recruiting, withdrawal and the researcher's page; in both databases, since they read and change most tables."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 from datetime import timedelta
 
 import pytest
-from serving import TOKEN, Person, make_host, unfilmed
+from serving import TOKEN, Person, answer_to, make_host, unfilmed
 from starlette.testclient import TestClient
 
 from study.apps.server.web import make_app
@@ -20,8 +20,8 @@ def stimuli(tmp_path_factory):
 
 
 @pytest.fixture
-def responses(tmp_path):
-    with open_responses(tmp_path) as opened:
+def responses(database):
+    with open_responses(database) as opened:
         yield opened
 
 
@@ -168,3 +168,22 @@ def test_nothing_that_a_participant_typed_is_run(serve):
     overview = serving.ask("overview")
     assert overview.headers["content-type"] == "application/json"
     assert overview.json()["sessions"][0]["parameters"]["PROLIFIC_PID"] == typed
+
+
+def test_two_servers_on_one_database_share_places_and_count_an_answer_once(stimuli, database):
+    """As behind a proxy that spreads the load, or while one server takes another's place."""
+    with open_responses(database) as one, open_responses(database) as other:
+        hosts = [make_host(stimuli, responses, most_participants=1) for responses in (one, other)]
+        with TestClient(make_app(hosts[0])) as first, TestClient(make_app(hosts[1])) as second:
+            person, again = Person(first), Person(second)
+            view = person.until(person.begin(), "trial")
+            again.client.cookies.update(first.cookies)
+            assert again.begin(page="another-page", force=True)["kind"] == "instructions"
+            assert Person(TestClient(second.app)).begin()["kind"] == "full"
+            message = answer_to(view)
+            values = [option["value"] for option in view["question"]["options"]]
+            assert person.post("/api/answer", message).json()["counted"]
+            # The other server has the session in memory as it was before.
+            assert again.post("/api/answer", {**message, "value": values[1]}).json()["counted"] is False
+            assert again.post("/api/answer", message).json()["counted"] is True
+        assert len(answers_frame(one, roles=("trial", "practice", "check"))) == 1
