@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from study.report import tables, words
-from study.report.drawing import BLUE, FAINT, ORANGE, TEAL, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import BLUE, FAINT, add_mark, new_figure, quiet_grid, style, to_svg
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,31 +60,30 @@ def _course(study: str, task: str, part: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def learning_figure(table: tables.Table, name: str, mark: str) -> str | None:
-    """The table as lines; None where there is nothing to draw."""
+    """Draw the table, one panel a study; None where there is nothing to draw."""
     if not table.rows:
         return None
     studies = list(dict.fromkeys(str(row["study"]) for row in table.rows))
+    columns = min(len(studies), 4)
+    lines = -(-len(studies) // columns)
     with style():
-        figure, axes = new_figure(7.2, 2.6)
-        axes.axhline(50, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
-        for place, study in enumerate(studies):
+        figure, grid = new_figure(7.2, 2.0 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)
+        spoken = []
+        for axes, study in zip(grid.flat, studies, strict=False):
             own = [row for row in table.rows if row["study"] == study]
-            x = [row["part"] + 0.06 * (place - (len(studies) - 1) / 2) for row in own]
+            across, up = [row["part"] for row in own], [row["percent"] for row in own]
             errors = [row["standard_error"] or 0.0 for row in own]
-            colour = (BLUE, ORANGE, TEAL)[place % 3]
-            label = f"{words.readable(study)}: {own[0]['what']}"
-            axes.errorbar(x, [row["percent"] for row in own], yerr=errors, color=colour, marker="o", markersize=4,
-                          linewidth=1.3, elinewidth=1, label=label)  # fmt: skip
-        axes.set_xticks(range(1, PARTS + 1))
-        axes.set_xlabel("sixth of the study")
-        axes.set_ylim(0, 100)
-        axes.set_title("percent")
-        quiet_grid(axes)
-        axes.legend(loc="lower right", fontsize=8.5)
+            axes.axhline(50, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+            axes.errorbar(across, up, yerr=errors, color=BLUE, marker="o", markersize=3.5, linewidth=1.3, elinewidth=1)
+            axes.set_title(f"{words.readable(study)}:\n{own[0]['what']}", fontsize=8.5)
+            axes.set_ylim(-3, 103)
+            axes.set_yticks([0, 50, 100], ["0", "50", "100%"])
+            axes.set_xticks(range(1, PARTS + 1))
+            quiet_grid(axes)
+            spoken.append(f"{words.readable(study)}, {own[0]['what']}: " + ", ".join(f"{value:.0f}%" for value in up))
+        for axes in grid.flat[len(studies) :]:
+            axes.set_axis_off()
+        for axes in grid[-1]:
+            axes.set_xlabel("sixth of the study")
         add_mark(figure, mark)
-        spoken = "; ".join(
-            f"{words.readable(study)} from {own[0]['percent']:.0f}% to {own[-1]['percent']:.0f}%"
-            for study in studies
-            if (own := [row for row in table.rows if row["study"] == study])
-        )
-        return to_svg(figure, name, "Answers over the course of each study", spoken)
+        return to_svg(figure, name, "Answers over the course of each study", "; ".join(spoken))

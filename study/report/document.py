@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.errors import AnalysisError
-from study.report import tables
+from study.report import tables, words
 from study.report.material import gather
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ Result = Mapping[str, Any]
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def write_report(results_folder: str | Path, *, resamples: int = 1000) -> Path:
+def write_report(results_folder: str | Path, *, database: str | None = None, resamples: int = 1000) -> Path:
     """Write `report.html`, `tables/` and `figures/` into a results folder.
 
     Parameters
@@ -32,6 +32,8 @@ def write_report(results_folder: str | Path, *, resamples: int = 1000) -> Path:
     results_folder
         With `protocol.toml`, `manifest.json` and `responses.sqlite`; what `segue power --json` printed, as
         `power*.json`, is shown too.
+    database
+        Where the answers are, if not in the folder: a file, or a URL.
     resamples
         Bootstrap samples behind standard errors.
 
@@ -53,7 +55,7 @@ def write_report(results_folder: str | Path, *, resamples: int = 1000) -> Path:
     from study.report.page import compose
 
     folder = Path(results_folder)
-    material = gather(folder)
+    material = gather(folder, database)
     settings = material.protocol.analysis
     # Decoding and packing pictures lets other threads run, so it takes place beside the analysis.
     with ThreadPoolExecutor(max_workers=1) as beside:
@@ -102,6 +104,7 @@ def to_html(page: Page) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["unbroken"] = words.unbroken
     markup: Callable[[str], Markup] = Markup
     styles = (TEMPLATES / "report.css").read_text(encoding="utf-8")
     return environment.get_template("report.html.jinja").render(page=page, styles=markup(styles), markup=markup)

@@ -9,11 +9,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from study.report.drawing import BLUE, FAINT, INK, ORANGE, RULE, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import (
+    BLUE,
+    FAINT,
+    INK,
+    ORANGE,
+    RULE,
+    SOFT,
+    TEAL,
+    add_mark,
+    new_figure,
+    quiet_grid,
+    style,
+    to_svg,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Result = Mapping[str, Any]
 SIGNS = {"shorter": -1.0, "longer": 1.0}
@@ -196,13 +210,16 @@ def preference_figure(comparison: Result, name: str, mark: str) -> str:
         for row, motion in enumerate(motions):
             axes.plot([motion["low"], motion["high"]], [-row, -row], color=INK, linewidth=1.4)
             axes.plot([motion["percent"]], [-row], "o", color=INK, markersize=4.5)
+            _at_the_right(axes, -row, f"{motion['favouring']} / {motion['answers']}")
         foot = -len(motions) - 0.3
         low, high = 100 * pooled["interval"]["low"], 100 * pooled["interval"]["high"]
         axes.plot([low, high], [foot, foot], color=INK, linewidth=2.4)
         axes.plot([pooled["percent"]], [foot], "o", color=INK, markersize=6)
+        _at_the_right(axes, foot, f"{pooled['favouring']} / {pooled['answers']}")
         if people["low"] is not None:
             axes.plot([people["low"], people["high"]], [foot - 1, foot - 1], color=BLUE, linewidth=2.4)
         axes.plot([people["mean_percent"]], [foot - 1], "s", color=BLUE, markersize=6)
+        _at_the_right(axes, foot - 1, f"{people['mean_percent']:.1f}%", BLUE)
         axes.axhline(-len(motions) + 0.35, color=RULE, linewidth=0.9)
         places = [*(-row for row in range(len(motions))), foot, foot - 1]
         axes.set_yticks(places, [*labels, "all answers", "all, over participants"])
@@ -218,6 +235,12 @@ def preference_figure(comparison: Result, name: str, mark: str) -> str:
         return to_svg(figure, name, f"Percent favouring {a} over {b}", spoken)
 
 
+def _at_the_right(axes: Axes, height: float, text: str, colour: str = INK) -> None:
+    """A number in a column beside the axes."""
+    axes.annotate(text, (1.0, height), xycoords=("axes fraction", "data"), xytext=(52, 0), textcoords="offset points",
+                  ha="right", va="center", fontsize=8.5, color=colour)  # fmt: skip
+
+
 def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
     """Response times: how they are distributed, and how they change over the session; None without times."""
     import numpy as np
@@ -229,7 +252,10 @@ def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
     with style():
         figure, (left, right) = new_figure(7.2, 2.5, 1, 2, width_ratios=(1, 1.25))
         left.hist(times, bins=np.linspace(0, max(float(times.max()), 1.0), 31).tolist(), color=FAINT, edgecolor="white")
-        left.axvline(float(np.median(times)), color=BLUE, linewidth=1.6)
+        middle = float(np.median(times))
+        left.axvline(middle, color=BLUE, linewidth=1.6)
+        left.annotate(f"median {middle:.2f} s", (middle, 0.98), xycoords=("data", "axes fraction"), xytext=(5, 0),
+                      textcoords="offset points", color=BLUE, fontsize=8.5, va="top")  # fmt: skip
         left.set_xlabel("response time, s")
         left.set_title("answers")
         quiet_grid(left)
@@ -245,7 +271,7 @@ def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
         else:
             right.set_axis_off()
         add_mark(figure, mark)
-        spoken = f"median {np.median(times):.2f} s, from {times.min():.2f} to {times.max():.2f} s"
+        spoken = f"median {middle:.2f} s, from {times.min():.2f} to {times.max():.2f} s"
         return to_svg(figure, name, "Response times", spoken)
 
 
@@ -268,3 +294,56 @@ def ratings_figure(rows: Sequence[Result], name: str, mark: str, points: int) ->
         add_mark(figure, mark)
         spoken = "; ".join(f"{label}: {row['mean']:.2f}" for label, row in zip(labels, rows, strict=True))
         return to_svg(figure, name, "Mean ratings", spoken)
+
+
+def cells_figure(cells: Sequence[Result], name: str, mark: str, points: int) -> str:
+    """Mean ratings by method and by which was seen first: a panel a question, a line an order (2003 section 4.2)."""
+    items = list(dict.fromkeys(row["item"] for row in cells))
+    methods = list(dict.fromkeys(row["method"] for row in cells))
+    orders = list(dict.fromkeys(row["order"] for row in cells))
+    columns = min(len(items), 3)
+    lines = -(-len(items) // columns)
+    with style():
+        figure, grid = new_figure(7.2, 2.3 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)
+        for axes, item in zip(grid.flat, items, strict=False):
+            for place, order in enumerate(orders):
+                own = [row for row in cells if row["item"] == item and row["order"] == order]
+                _cell_line(axes, own, methods, place, len(orders))
+            axes.set_title(_readable(item))
+            axes.set_xticks(range(len(methods)), [_readable(method) for method in methods])
+            axes.set_xlim(-0.4, len(methods) - 0.3)
+            axes.set_ylim(-0.1, points - 0.9)
+            quiet_grid(axes)
+        for axes in grid.flat[len(items) :]:
+            axes.set_axis_off()
+        _cells_key(figure, orders)
+        add_mark(figure, mark)
+        spoken = "; ".join(
+            _readable(f"{row['item']} {row['method']}, {row['order']} seen first: {row['mean']:.2f}") for row in cells
+        )
+        return to_svg(figure, name, "Mean ratings by method and order of presentation", spoken)
+
+
+def _order_style(place: int) -> dict[str, Any]:
+    """Colour and marker together, so that neither is needed alone."""
+    return {"color": (BLUE, ORANGE, TEAL)[place % 3], "marker": "so^"[place % 3]}
+
+
+def _cell_line(axes: Axes, own: Sequence[Result], methods: Sequence[str], place: int, orders: int) -> None:
+    """One order's means, with their intervals, a little to the side of the other's."""
+    across = [methods.index(row["method"]) + 0.08 * (place - (orders - 1) / 2) for row in own]
+    look = _order_style(place)
+    axes.plot(across, [row["mean"] for row in own], linewidth=1.2, markersize=4.5, **look)
+    for at, row in zip(across, own, strict=True):
+        if row["low"] is not None:
+            axes.plot([at, at], [row["low"], row["high"]], color=look["color"], linewidth=1.2)
+
+
+def _cells_key(figure: Figure, orders: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], markersize=4.5, label=f"{_readable(order)} seen first", **_order_style(place))
+        for place, order in enumerate(orders)
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(orders), fontsize=8.5, labelcolor=SOFT)

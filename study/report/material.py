@@ -51,8 +51,8 @@ class Material:
     power: tuple[Result, ...]
 
 
-def gather(folder: Path) -> Material:
-    """Read a results folder.
+def gather(folder: Path, database: str | None = None) -> Material:
+    """Read a results folder; answers from another database where one is named (a file, or a URL).
 
     Raises
     ------
@@ -62,16 +62,12 @@ def gather(folder: Path) -> Material:
         When a part of the folder is missing or can't be read.
     """
     from study.experiment.protocol import load_protocol
-    from study.experiment.rendering import ANSWERS, PROTOCOL, read_manifest
+    from study.experiment.rendering import PROTOCOL, read_manifest
     from study.experiment.response_tables import presentations, withdrawals
-    from study.experiment.responses import answers_frame, open_responses, session_table
+    from study.experiment.responses import answers_frame, open_answers, session_table
 
-    protocol, manifest, database = load_protocol(folder / PROTOCOL), read_manifest(folder), folder / ANSWERS
-    if not database.is_file():
-        raise AnalysisError(
-            f"{database}: expected answers, found no database; collect or simulate sessions for this folder first"
-        )
-    with open_responses(database) as responses:
+    protocol, manifest = load_protocol(folder / PROTOCOL), read_manifest(folder)
+    with open_answers(folder, database) as responses:
         material = Material(
             protocol=protocol,
             manifest=manifest,
@@ -84,7 +80,9 @@ def gather(folder: Path) -> Material:
         )
     if material.answers.empty:
         gone = f" ({material.withdrawn} withdrawn)" if material.withdrawn else ""
-        raise AnalysisError(f"{database}: expected answers, found none{gone}; collect or simulate sessions first")
+        raise AnalysisError(
+            f"{responses.place}: expected answers, found none{gone}; collect or simulate sessions first"
+        )
     return material
 
 
@@ -95,5 +93,5 @@ def _table(responses: Responses, table: sa.Table) -> pd.DataFrame:
 
     columns = [column for column in table.c if column.name != "detail_json"]
     with responses.engine.connect() as connection:
-        rows = connection.execute(sa.select(*columns)).mappings().all()
+        rows = connection.execute(sa.select(*columns).order_by(*table.primary_key)).mappings().all()
     return pd.DataFrame([dict(row) for row in rows], columns=[column.name for column in columns])

@@ -95,7 +95,8 @@ def _caption(record: StimulusRecord) -> str:
     how = (
         f"{record.method}{added}: {record.blend_frames} frames" if record.blend_frames else f"{record.method}, no blend"
     )
-    return f"{record.transition.replace('_', ' ')}, {how}"
+    synthetic = " (synthetic motions)" if record.synthetic else ""
+    return f"{record.transition.replace('_', ' ')}, {how}{synthetic}"
 
 
 def embed_strips(manifest: Manifest, most: int = MOST_STRIPS) -> list[Preview]:

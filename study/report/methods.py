@@ -52,22 +52,22 @@ REFERENCES = {
 }
 
 BLENDS = {
-    "fixed": "a fixed length",
-    "geodesic": "the geodesic distance of 2004",
-    "velocity": "the joint velocities of 2004",
-    "timewarp": "time-warped blends of 2004",
-    "cut": "a cut",
-    "cut-lee2002": "the cut of least cost under the weights of Lee et al. 2002",
-    "cut-wang2003": "the cut of least cost under the optimised weights of 2003",
-    "cut-pointcloud": "the cut of least cost between point clouds",
-    "one-hop": "the optimal one-hop transition of 2019",
+    "fixed": "blends of a fixed length",
+    "geodesic": "blends as long as the geodesic distance gives (2004)",
+    "velocity": "blends as long as joint velocities give (2004)",
+    "timewarp": "time-warped blends (2004)",
+    "cut": "cuts",
+    "cut-lee2002": "cuts of least cost under the weights of Lee et al. (2002)",
+    "cut-wang2003": "cuts of least cost under the optimised weights of 2003",
+    "cut-pointcloud": "cuts of least cost between point clouds",
+    "one-hop": "optimal one-hop transitions (2019)",
 }
 
 ORDERS = {
-    "both": "each pair in both orders",
-    "random": "the order within pairs at random",
-    "balanced": "half of the pairs in each order",
-    "by-group": "the order by the participant’s group",
+    "both": "Each pair was shown in both orders",
+    "random": "The order within each pair was drawn at random",
+    "balanced": "Half of the pairs were shown in each order",
+    "by-group": "The order followed from the participant’s group",
 }
 
 
@@ -113,42 +113,41 @@ def references(protocol: Protocol, analysis: Result) -> list[str]:
 
 
 def _design(protocol: Protocol, analysis: Result, who: str) -> str:
-    studies = words.joined([_study(study) for study in protocol.studies])
-    text = (
-        f"{words.sentence(who)} took part in one sitting of {words.number(len(protocol.studies), 'study', 'studies')}: "
-        f"{studies}. "
-    )
+    studies = words.number(len(protocol.studies), "study", "studies")
     asked = analysis["quality"]
     each = asked["trials"] / max(asked["participants"], 1)
-    return text + (
-        f"Pairs came in random order, drawn anew for every participant (seed {protocol.seed}); a participant answered "
-        f"{each:.0f} questions on average."
+    return (
+        f"{words.sentence(who)} took part in one sitting of {studies}. "
+        f"{' '.join(_study(study) for study in protocol.studies)} Trials came in an order drawn anew for every "
+        f"participant (seed {protocol.seed}); a participant was asked {each:.0f} questions on average."
     )
 
 
 def _study(study: StudySpec) -> str:
     title = words.readable(study.title or study.name)
-    repeated = f", {study.repeats} times" if study.repeats > 1 else ""
     if study.task == "same-different":
         levels = ", ".join(f"{value:+d}".replace("-", "−") if value else "0" for value in study.differences_frames)
-        what = f"same or different, blends of {BLENDS[study.reference]} against others longer by {levels} frames"
+        what = (
+            f"participants judged whether two transitions were the same or different: "
+            f"{_blends(study, study.reference)}, "
+            f"against blends longer by {levels} frames"
+        )
     elif study.task == "preference":
-        what = f"which is more natural, {_against(study)}"
+        what = f"participants chose the more natural of two transitions, {_against(study)}"
     else:
         asked = words.number(len(study.items), "question")
-        what = f"ratings on a scale of 0 to {study.scale_points - 1}, {asked}, {_against(study)}"
-    return f"{title} ({what}; {ORDERS[study.order]}{repeated})"
+        what = f"participants rated {_against(study)} on a scale of 0 to {study.scale_points - 1} in {asked}"
+    repeated = f", {study.repeats} times" if study.repeats > 1 else ""
+    return f"In “{title}”, {what}. {ORDERS[study.order]}{repeated}."
 
 
 def _against(study: StudySpec) -> str:
-    first = BLENDS[study.reference] + _frames_of(study, study.reference)
-    if study.comparison is None:
-        return first
-    return f"{first} against {BLENDS[study.comparison]}{_frames_of(study, study.comparison)}"
+    first = _blends(study, study.reference)
+    return first if study.comparison is None else f"{first} and {_blends(study, study.comparison)}"
 
 
-def _frames_of(study: StudySpec, method: str) -> str:
-    return f" of {words.number(study.fixed_frames, 'frame')}" if method == "fixed" else ""
+def _blends(study: StudySpec, method: str) -> str:
+    return f"blends of {words.number(study.fixed_frames, 'frame')}" if method == "fixed" else BLENDS[method]
 
 
 def _stimuli(protocol: Protocol, manifest: Manifest) -> str:

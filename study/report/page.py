@@ -22,7 +22,7 @@ from study.report import (
 )
 from study.report.material import Material
 from study.report.media import Pictures
-from study.report.sections import Drawing, Section, readings_table
+from study.report.sections import Drawing, Headline, Section, readings_table
 from study.report.tables import Table
 
 Result = Mapping[str, Any]
@@ -52,8 +52,6 @@ class Page:
         One a study, in the protocol's order.
     power, conduct, stimuli
         Participants needed; how the sessions went; what was shown.
-    flags
-        Rules by which participants are flagged.
     pictures
         Strips and videos.
     methods, references, versions, acknowledgement
@@ -68,7 +66,6 @@ class Page:
     sections: tuple[Section, ...]
     power: Part
     conduct: Part
-    flags: tuple[str, ...]
     stimuli: Part
     pictures: Pictures
     methods: tuple[tuple[str, str], ...]
@@ -108,7 +105,6 @@ def compose(material: Material, analysis: Result, pictures: Pictures) -> Page:
         sections=found,
         power=_power(material, quality["participants"]),
         conduct=_conduct(material, analysis, mark),
-        flags=tuple(quality["rules"]),
         stimuli=Part(
             sentences=(_shown_sentence(material),),
             folded=(shown.stimulus_table(manifest), shown.motion_table(manifest)),
@@ -147,10 +143,17 @@ def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
                 name, title, comparisons, mark=mark, strengths=analysis["bradley_terry"].get(name)
             )
         elif analysis["ratings"].get(name):
+            compared, cells = analysis["rating_anova"].get(name, ()), analysis["rating_cells"].get(name, ())
             made = ratings_section.ratings_section(
-                name, title, analysis["ratings"][name], analysis["rating_anova"].get(name, ()), mark=mark,
-                points=study.scale_points, alpha=float(analysis["alpha"]),
-            )  # fmt: skip
+                name,
+                title,
+                analysis["ratings"][name],
+                compared,
+                cells,
+                mark=mark,
+                points=study.scale_points,
+                alpha=float(analysis["alpha"]),
+            )
         else:
             made = _without_answers(material, name, title)
         found.append(made)
@@ -158,15 +161,18 @@ def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
 
 
 def _without_answers(material: Material, name: str, title: str) -> Section:
-    from study.report.sections import Headline
-
-    asked = int((material.answers["study"] == name).sum())
-    why = (
-        f"none of its {words.number(asked, 'question')} was answered in time, or all answers were left out"
-        if asked
-        else "nobody has come to it yet"
-    )
-    return Section(f"study-{name}", title, (Headline(f"{title}: there is nothing to say, for {why}.", ""),))
+    asked = material.answers[material.answers["study"] == name]
+    missed = int(asked["answer"].isna().sum())
+    if asked.empty:
+        why = "nobody has come to it yet"
+    elif missed == len(asked):
+        why = f"all {words.number(missed, 'question')} were missed"
+    elif not missed:
+        why = f"all {words.number(len(asked), 'answer')} are left out by the rules of exclusion"
+    else:
+        rest = words.number(len(asked) - missed, "answer")
+        why = f"{missed:,} of {words.number(len(asked), 'question')} were missed and {rest} left out by rules"
+    return Section(f"study-{name}", title, (Headline(f"{title}: there is no result, for {why}.", ""),))
 
 
 def _in_order(result: Result, names: Sequence[str]) -> Result:
@@ -242,7 +248,10 @@ def _quality_sentence(quality: Result) -> str:
     if quality["shown_badly"]:
         text += f" {words.number(quality['shown_badly'], 'answer')} followed a stimulus that stalled or was hidden."
     flagged = words.number(quality["flagged"], "participant")
-    return text + f" {flagged} {'is' if quality['flagged'] == 1 else 'are'} flagged."
+    return text + (
+        f" {flagged} {'is' if quality['flagged'] == 1 else 'are'} flagged, which alone leaves nobody out, for one of "
+        f"these: {'; '.join(quality['rules'])}."
+    )
 
 
 def _sessions_sentence(material: Material) -> str:

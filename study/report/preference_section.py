@@ -49,14 +49,15 @@ def preference_section(
         tables=tuple(shown),
         notes=tuple(notes),
         folded=tuple(folded),
-        readings=tuple(_reading(title, comparison) for comparison in comparisons),
+        readings=tuple(_reading(comparison) for comparison in comparisons),
     )
 
 
 def _drawing(name: str, comparison: Result, mark: str) -> Drawing:
     caption = (
         "Answers that favoured the first method, for every motion pair with Wilson’s 95% interval; below, all answers "
-        "as if independent (Wilson), and the mean over participants (Student’s t)."
+        "as if independent (Wilson), and the mean over participants (Student’s t). At the right, how many favoured it "
+        "of how many answers."
     )
     return Drawing(name, figures.preference_figure(comparison, f"study-{name}", mark), caption)
 
@@ -88,7 +89,7 @@ def headline(comparison: Result) -> Headline:
     return Headline(words.readable(comparison["answer"]), " ".join(parts))
 
 
-def _reading(title: str, comparison: Result) -> dict[str, Any]:
+def _reading(comparison: Result) -> dict[str, Any]:
     published, people = comparison["published"], comparison["participants"]
     first, second = methods_of(comparison)
     pooled, corrected = "no answers", "no answers"
@@ -104,7 +105,7 @@ def _reading(title: str, comparison: Result) -> dict[str, Any]:
             corrected += f"; t({people['degrees_of_freedom']}) = {words.decimals(people['t'], 2)}"
         if people["p_value"] is not None:
             corrected += f"{', ' if people['t'] is not None else '; sign test '}{words.p(people['p_value'])}"
-    return {"result": f"{title}: {first} over {second}", "published": pooled, "corrected": corrected}
+    return {"result": f"{first} over {second}", "published": pooled, "corrected": corrected}
 
 
 def _notes(comparison: Result) -> list[str]:

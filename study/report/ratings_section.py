@@ -1,12 +1,12 @@
 """A rating study on the page: `rating_table` and `rating_anova` in, headline, figure, tables and notes out.
 
 2003 section 4.2: a two-way analysis of variance, method by order of presentation; beside it each participant's own
-difference between the methods.
+difference between the methods, the mixed design, ranks, and an ordinal model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from study.report import figures, tables, words
@@ -21,6 +21,7 @@ def ratings_section(
     title: str,
     rows: Sequence[Result],
     variance: Sequence[Result] = (),
+    cells: Sequence[Result] = (),
     *,
     mark: str,
     points: int,
@@ -32,8 +33,8 @@ def ratings_section(
     ----------
     name, title
         Of the study.
-    rows, variance
-        From `rating_table` and `rating_anova`.
+    rows, variance, cells
+        From `rating_table`, `rating_anova` and `rating_cells`.
     mark
         What every figure says about its data.
     points
@@ -41,27 +42,43 @@ def ratings_section(
     alpha
         Level of significance.
     """
-    drawing = Drawing(
-        f"{name}_ratings",
-        figures.ratings_figure(rows, f"study-{name}-ratings", mark, points),
-        f"Mean ratings on a scale of 0 to {points - 1} with 95% intervals over participants (Student’s t).",
-    )
-    compared = (_variance_table(name, variance), _difference_table(name, variance)) if variance else ()
     return Section(
         anchor=f"study-{name}",
         title=title,
         headlines=(_headline(title, rows, variance, points, alpha),),
-        drawings=(drawing,) if rows else (),
-        tables=(_means_table(name, rows), *compared),
-        notes=tuple(dict.fromkeys(question["note"] for question in variance if question["note"])),
-        readings=tuple(_readings(title, variance)),
+        drawings=tuple(_drawings(name, rows, cells, mark, points)),
+        tables=(
+            means_table(name, rows),
+            *((variance_table(name, variance), difference_table(name, variance)) if variance else ()),
+        ),
+        notes=tuple(dict.fromkeys(note for question in variance for note in _notes(question))),
+        folded=tuple(_folded(name, variance, cells)),
+        readings=tuple(_readings(variance)),
     )
+
+
+def _drawings(name: str, rows: Sequence[Result], cells: Sequence[Result], mark: str, points: int) -> list[Drawing]:
+    if not rows:
+        return []
+    scale = f"on a scale of 0 to {points - 1} with 95% intervals over participants (Student’s t)"
+    place = f"study-{name}-ratings"
+    drawings = [Drawing(f"{name}_ratings", figures.ratings_figure(rows, place, mark, points), f"Mean ratings {scale}.")]
+    if cells:
+        svg = figures.cells_figure(cells, f"study-{name}-cells", mark, points)
+        drawings.append(Drawing(f"{name}_cells", svg, f"Mean ratings by method and by which was seen first, {scale}."))
+    return drawings
+
+
+# In words
 
 
 def _headline(title: str, rows: Sequence[Result], variance: Sequence[Result], points: int, alpha: float) -> Headline:
     if not rows:
         return Headline(f"{title}: there are no ratings.", "")
-    return _compared(variance, alpha) or _highest(rows, points)
+    known = [question for question in variance if question["difference"] and question["difference"]["mean"] is not None]
+    if not known:
+        return _highest(rows, points)
+    return _of_one(known[0], points, alpha) if len(known) == 1 else _of_several(known, alpha)
 
 
 def _highest(rows: Sequence[Result], points: int) -> Headline:
@@ -69,39 +86,58 @@ def _highest(rows: Sequence[Result], points: int) -> Headline:
     top = max(row["mean"] for row in rows)
     best = [row for row in rows if row["mean"] == top]
     what = words.joined([words.readable(": ".join(filter(None, (row["item"], row["method"])))) for row in best])
-    if len(rows) == 1:
-        statement = f"{words.sentence(what)} was rated {top:.2f} on average, on a scale of 0 to {points - 1}."
-    elif len(best) > 1:
-        statement = f"{words.sentence(what)} were rated alike, {top:.2f} on average, on a scale of 0 to {points - 1}."
-    else:
-        statement = f"{words.sentence(what)} was rated highest, {top:.2f} on average, on a scale of 0 to {points - 1}."
+    verb = "were rated alike," if len(best) > 1 else "was rated" if len(rows) == 1 else "was rated highest,"
     row = best[0]
     size = f"{words.number(row['answers'], 'answer')} of {words.number(row['participants'], 'participant')}"
-    return Headline(statement, f"{size}; 95% interval over participants {words.interval(row['low'], row['high'], 2)}.")
+    return Headline(
+        f"{words.sentence(what)} {verb} {top:.2f} on average, on a scale of 0 to {points - 1}.",
+        f"{size}; 95% interval over participants {words.interval(row['low'], row['high'], 2)}.",
+    )
 
 
-def _compared(questions: Sequence[Result], alpha: float) -> Headline | None:
-    """In how many questions one method was rated higher, and its F; None where there is no pair of methods."""
-    known = [
-        question for question in questions if question["difference"] and question["difference"]["mean"] is not None
-    ]
-    if not known:
-        return None
-    # "a minus b", as `rating_anova` names it.
-    first, _, second = str(known[0]["difference"]["of"]).partition(" minus ")
+def _of_one(question: Result, points: int, alpha: float) -> Headline:
+    """By how much one method was rated higher than the other."""
+    difference = question["difference"]
+    first, second = _methods(question)
+    if difference["mean"] < 0:
+        first, second = second, first
+    size = f"{words.number(question['answers'], 'answer')} of {words.number(question['participants'], 'participant')}"
+    if difference["mean"] == 0:
+        statement = f"{words.sentence(first)} and {second} were rated alike on average, on a scale of 0 to {points - 1}"
+    else:
+        statement = (
+            f"{words.sentence(first)} was rated {abs(difference['mean']):.2f} points higher than {second} on "
+            "average, on "
+            f"a scale of 0 to {points - 1}"
+        )
+    if difference["p_value"] is not None:
+        told = "this is not chance" if difference["p_value"] < alpha else "this can’t be told from chance"
+        statement += f"; across participants {told} ({words.p(difference['p_value'])})"
+    return Headline(f"{statement}.", f"{size}. {_tests([question])}")
+
+
+def _of_several(known: Sequence[Result], alpha: float) -> Headline:
+    """In how many questions one method was rated higher."""
+    first, second = _methods(known[0])
     up = [question for question in known if question["difference"]["mean"] > 0]
     down = [question for question in known if question["difference"]["mean"] < 0]
     if len(down) > len(up):
         first, second, up = second, first, down
-    first, second = words.readable(first), words.readable(second)
     if not up:
         return Headline(f"{words.sentence(first)} and {second} were rated alike on average.", _tests(known))
-    clear = [question for question in up if _significant(question, alpha)]
-    statement = (
+    clear = sum(1 for question in up if _significant(question, alpha))
+    return Headline(
         f"{words.sentence(first)} was rated higher than {second} in {len(up)} of "
-        f"{words.number(len(known), 'question')}, in {len(clear)} significantly at {alpha:g}."
+        f"{words.number(len(known), 'question')}, in {clear or 'none'} of them significantly at {alpha:g} across "
+        f"{words.number(known[0]['participants'], 'participant')}.",
+        _tests(known),
     )
-    return Headline(statement, _tests(known))
+
+
+def _methods(question: Result) -> tuple[str, str]:
+    """The two methods of a difference, which `rating_anova` names as "a minus b"."""
+    first, _, second = str(question["difference"]["of"]).partition(" minus ")
+    return words.readable(first), words.readable(second)
 
 
 def _significant(question: Result, alpha: float) -> bool:
@@ -114,77 +150,154 @@ def _tests(questions: Sequence[Result]) -> str:
     """Both tests of every question: as published and over participants."""
     parts = []
     for question in questions:
-        text = words.sentence(words.readable(question["item"]) or "rating") + ": "
         found = [f"as published {_f(question['anova'][0])}"] if question["anova"] else []
-        difference = question["difference"]
-        if difference["t"] is not None:
-            found.append(f"over participants {_t(difference)}")
-        parts.append(text + ("; ".join(found) or "no test") + ".")
+        if question["difference"]["t"] is not None:
+            found.append(f"over participants {_difference(question['difference'])}")
+        name = words.sentence(words.readable(question["item"]) or "rating")
+        parts.append(f"{name}: {'; '.join(found) or 'no test can be made'}.")
     return " ".join(parts)
 
 
 def _f(row: Result) -> str:
     if row["f"] is None:
-        return "no F (no spread)"
+        return "no F, for the ratings do not vary"
     degrees = f"{row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}"
     return f"F({degrees}) = {row['f']:.2f}, {words.p(row['p_value'])}"
 
 
-def _t(difference: Result) -> str:
-    return (
-        f"t({difference['degrees_of_freedom']}) = {words.decimals(difference['t'], 2)}, "
-        f"{words.p(difference['p_value'])}"
-    )
+def _difference(found: Result) -> str:
+    text = f"{words.decimals(found['mean'], 2)} [{words.bare_interval(found, 2)}]"
+    if found["t"] is None:
+        return text
+    return f"{text}, t({found['degrees_of_freedom']}) = {words.decimals(found['t'], 2)}, {words.p(found['p_value'])}"
 
 
-def _readings(title: str, variance: Sequence[Result]) -> list[dict[str, Any]]:
+def _notes(question: Result) -> list[str]:
+    """Why something could not be had."""
+    parts = [
+        question["note"],
+        *(question[key]["note"] for key in ("mixed_design", "ranks", "ordinal") if question[key]),
+    ]
+    return [f"{words.sentence(note)}." for note in parts if note]
+
+
+def _readings(variance: Sequence[Result]) -> list[dict[str, Any]]:
     rows = []
     for question in variance:
         difference = question["difference"]
+        known = difference and difference["mean"] is not None
         item = words.readable(question["item"]) or "rating"
-        corrected = "–"
-        if difference and difference["mean"] is not None:
-            corrected = f"{words.decimals(difference['mean'], 2)} [{words.bare_interval(difference, 2)}]"
-            corrected += f"; {_t(difference)}" if difference["t"] is not None else ""
         rows.append(
             {
-                "result": f"{title}: {item}, {words.readable(difference['of']) if difference else 'methods'}",
+                "result": f"{item}: {words.readable(difference['of']) if difference else 'methods'}",
                 "published": _f(question["anova"][0]) if question["anova"] else "–",
-                "corrected": corrected,
+                "corrected": _difference(difference) if known else "–",
             }
         )
     return rows
 
 
-def _means_table(name: str, rows: Sequence[Result]) -> Table:
+# Tables
+
+
+def means_table(name: str, rows: Sequence[Result]) -> Table:
+    """Return mean ratings by question and method."""
     return tables.make(
         f"{name}_ratings",
-        "Ratings: mean over participants of their means, with its standard error and 95% interval (Student’s t), and "
-        "standard deviation and median of all answers.",
+        "Ratings by question and method. Mean over participants of their means, with its standard error and 95% "
+        "interval (Student’s t); standard deviation and median of all answers.",
         "item method answers participants mean standard_error low high standard_deviation median",
         [{**row, "item": words.readable(row["item"]), "method": words.readable(row["method"])} for row in rows],
     )
 
 
-def _variance_table(name: str, questions: Sequence[Result]) -> Table:
+_VARIANCE = "item source degrees_of_freedom error_degrees_of_freedom"
+_EFFECT = "partial_eta_squared partial_omega_squared effect_low effect_high"
+
+
+def _by_question(questions: Sequence[Result], rows_of: Callable[[Result], Sequence[Result]]) -> list[dict[str, Any]]:
+    return [{**row, "item": words.readable(question["item"])} for question in questions for row in rows_of(question)]
+
+
+def variance_table(name: str, questions: Sequence[Result]) -> Table:
+    """Return the analysis of variance as published."""
     return tables.make(
         f"{name}_anova",
-        "As published: two-way between-subjects analysis of variance, method by order of presentation (2003 section "
-        "4.2). It takes the ratings of one participant for independent; the next table does not.",
-        "item source degrees_of_freedom error_degrees_of_freedom sum_of_squares mean_square f p_value "
-        "partial_eta_squared",
-        [{**row, "item": words.readable(question["item"])} for question in questions for row in question["anova"]],
+        "As published: two-way analysis of variance between subjects, method by order of presentation. 2003 section "
+        "4.2, "
+        "type III sums of squares. It takes the ratings of one participant for independent; the next table does not. "
+        "Effect sizes with 90% intervals where the level is 5%.",
+        f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
+        _by_question(questions, lambda question: question["anova"]),
     )
 
 
-def _difference_table(name: str, questions: Sequence[Result]) -> Table:
+def difference_table(name: str, questions: Sequence[Result]) -> Table:
+    """Return the difference of the methods over participants."""
     return tables.make(
         f"{name}_differences",
-        "Corrected: difference of each participant’s own ratings of the two methods, mean, 95% interval, and t test.",
+        "Corrected: difference of each participant’s own ratings of the two methods. Mean, 95% interval, and t test.",
         "item of mean low high t degrees_of_freedom p_value",
-        [
-            {**question["difference"], "item": words.readable(question["item"])}
-            for question in questions
-            if question["difference"]
-        ],
+        _by_question(questions, lambda question: [question["difference"]] if question["difference"] else []),
     )
+
+
+def _folded(name: str, variance: Sequence[Result], cells: Sequence[Result]) -> list[Table]:
+    """The cells of the design, and whatever other analyses could be made; those without a row are left out."""
+    cells_table = tables.make(
+        f"{name}_cells",
+        "Ratings by method and by order of presentation. Order: the method that a participant saw first. Means over "
+        "participants with standard errors and 95% intervals (Student’s t).",
+        "item method order answers participants mean standard_error low high",
+        [{**row, **{key: words.readable(row[key]) for key in ("item", "method", "order")}} for row in cells],
+    )
+    type_ii = tables.make(
+        f"{name}_anova_type_ii",
+        "The published analysis by type II sums of squares. It differs where the cells hold unequal numbers of "
+        "answers.",
+        f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
+        _by_question(variance, lambda question: question["type_ii"] or []),
+    )
+    mixed = tables.make(
+        f"{name}_mixed_design",
+        "Mixed design: participants as random. Methods (and motions, where everybody rated all) vary within "
+        "participants, the order between them; p corrected by Greenhouse and Geisser’s epsilon.",
+        f"{_VARIANCE} f p_value epsilon corrected_p_value generalized_eta_squared {_EFFECT}",
+        _by_question(variance, lambda question: question["mixed_design"]["effects"]),
+    )
+    ranks = tables.make(
+        f"{name}_ranks",
+        "The same on ranks. The published design by ANOVA-type statistics, and the methods over participants.",
+        "item source test f chi_square degrees_of_freedom error_degrees_of_freedom p_value",
+        _by_question(variance, _rank_rows),
+        headings={"source": "effect"},
+    )
+    ordinal = tables.make(
+        f"{name}_ordinal",
+        "Ordinal mixed model. Points of the scale as ordered only, participants as random: effects in logits (above 0: "
+        "rated higher), as odds ratios, with 95% intervals.",
+        "item effect value standard_error low high odds_ratio p_value",
+        _by_question(variance, lambda question: _ordinal_rows(question["ordinal"] or {})),
+        headings={"value": "logits"},
+    )
+    return [table for table in (cells_table, type_ii, mixed, ranks, ordinal) if table.rows]
+
+
+def _rank_rows(question: Result) -> list[dict[str, Any]]:
+    ranks = question["ranks"]
+    rows = [{**row, "test": "ANOVA-type"} for row in ranks["between"]]
+    return [
+        *rows,
+        *([{"source": "method, over participants", **ranks["participants"]}] if ranks["participants"] else []),
+    ]
+
+
+def _ordinal_rows(ordinal: Result) -> list[dict[str, Any]]:
+    return [
+        {
+            **effect,
+            "effect": words.readable(effect["name"]),
+            **{end: effect["interval"][end] for end in ("low", "high")},
+        }
+        for effect in ordinal.get("effects", ())
+    ]

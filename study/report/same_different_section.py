@@ -55,7 +55,7 @@ def same_different_section(
             *([motion_table(name, result, fps)] if several else []),
             d_prime_table(name, result),
         ),
-        readings=tuple(_readings(title, result)),
+        readings=tuple(_readings(result)),
     )
 
 
@@ -92,55 +92,73 @@ def _drawings(name: str, result: Result, mark: str, known: Result | None) -> lis
 
 def headline(result: Result, fps: float, data: str) -> Headline:
     """Return the just noticeable difference as a statement and what it rests on."""
-    who = SUBJECTS[data](result["participants"])
-    percent = f"{100 * result['level']:.0f}%"
     if not result["answers"]:
-        return Headline(f"No just noticeable difference can be given: {_missed_all(result)}", "")
-    model = result["model"]
-    chosen = model["jnd"] if model else result["published"]
-    reached = [side for side, _ in SIDES if chosen.get(side) and chosen[side]["frames"] is not None]
-    if not reached:
-        statement = f"No just noticeable difference can be given within the differences that were shown to {who}."
-    else:
-        places = words.joined([_place(chosen[side], side, fps) for side in reached])
-        statement = f"{words.sentence(who)} called {percent} of pairs different where the blend was {places}."
+        missed = result["missed"]
+        why = f"all {words.number(missed, 'question')} were missed" if missed else "there are no answers"
+        return Headline(f"No just noticeable difference can be given: {why}.", "")
+    who = SUBJECTS[data](result["participants"])
+    percent = f"{100 * result['level']:.0f}% “different”"
+    chosen = result["model"]["jnd"] if result["model"] else result["published"]
+    places = [place for side, _ in SIDES if (place := _place(result, chosen, side, fps))]
+    if not places:
+        return Headline(
+            f"No just noticeable difference can be given from the answers of {who}.", _detail(result, chosen)
+        )
+    statement = f"The just noticeable difference of {who} is estimated at {' and '.join(places)} ({percent})."
     return Headline(statement, _detail(result, chosen))
 
 
-def _missed_all(result: Result) -> str:
-    missed = result["missed"]
-    return f"all {words.number(missed, 'question')} were missed." if missed else "there are no answers."
-
-
-def _place(threshold: Result, side: str, fps: float) -> str:
-    return f"{threshold['frames']:.1f} frames ({threshold['frames'] / fps:.2f} s) {side}"
+def _place(result: Result, chosen: Result, side: str, fps: float) -> str:
+    """Where the threshold is, or beyond which level it lies; empty where neither can be told."""
+    found = chosen.get(side)
+    if found is not None and found["frames"] is not None:
+        return f"{found['frames']:.1f} frames ({found['frames'] / fps:.2f} s) {side}"
+    sign = 1 if side == "longer" else -1
+    levels = sorted(
+        (row for row in result["percent_different"] if sign * row["difference_frames"] > 0),
+        key=lambda row: abs(row["difference_frames"]),
+    )
+    # Wilson's interval has to agree: a single answer is no evidence.
+    if levels and levels[0]["low"] is not None and levels[0]["low"] > 100 * result["level"]:
+        return f"less than {abs(levels[0]['difference_frames']):g} frames {side}"
+    if levels and all(row["high"] is not None and row["high"] < 100 * result["level"] for row in levels):
+        return f"more than {abs(levels[-1]['difference_frames']):g} frames {side}"
+    return ""
 
 
 def _detail(result: Result, chosen: Result) -> str:
     size = f"{words.number(result['answers'], 'answer')} of {words.number(result['participants'], 'participant')}"
     parts = []
     if result["model"]:
-        ends = [f"{_ends(chosen[side])} {side}" for side, _ in SIDES if chosen.get(side)]
-        parts.append(f"Differencing model, {size}; 95% intervals over participants: {words.joined(ends)} (frames).")
+        ends = [f"{_ends(found)} {side}" for side, _ in SIDES if (found := chosen.get(side)) and _closed(found)]
+        over = "over participants" if result["participants"] > 1 else "of one participant’s answers as independent"
+        parts.append(
+            f"Differencing model, {size}" + (f"; 95% intervals {over}: {words.joined(ends)}." if ends else ".")
+        )
     else:
         parts.append(f"Straight lines between the levels, {size}. No model was fitted: {result['model_note']}.")
     absent = [side for side, _ in SIDES if chosen.get(side) and chosen[side]["frames"] is None]
     parts += [f"Where the blend was {side}: {chosen[side]['note']}." for side in absent]
     if result["model"]:
-        places = [f"k {sign} {_frames(result['published'][side])}" for side, sign in SIDES]
+        published = result["published"]
+        places = [f"k {sign} {_frames(published[side])}" for side, sign in SIDES if side in published]
         parts.append(f"Straight lines between the levels, as published in 2004: {words.joined(places)} frames.")
     return " ".join(parts)
 
 
+def _closed(threshold: Result) -> bool:
+    return any(threshold["interval"][end] is not None for end in ("low", "high"))
+
+
 def _ends(threshold: Result) -> str:
-    return words.interval(threshold["interval"]["low"], threshold["interval"]["high"])
+    return words.interval(threshold["interval"]["low"], threshold["interval"]["high"], unit=" frames")
 
 
 def _frames(threshold: Result) -> str:
     return f"{threshold['frames']:.1f}" if threshold["frames"] is not None else f"({threshold['note']})"
 
 
-def _readings(title: str, result: Result) -> list[dict[str, Any]]:
+def _readings(result: Result) -> list[dict[str, Any]]:
     model = result["model"]["jnd"] if result["model"] else {}
     rows = []
     for side, sign in SIDES:
@@ -148,7 +166,7 @@ def _readings(title: str, result: Result) -> list[dict[str, Any]]:
         published = result["published"].get(side)
         rows.append(
             {
-                "result": f"{title}: just noticeable difference, {side}",
+                "result": f"just noticeable difference, {side}",
                 "published": f"{_with_interval(published, sign)}; straight lines" if published else "–",
                 "corrected": f"{corrected}; differencing model" if side in model else corrected,
             }
@@ -167,6 +185,10 @@ def _notes(result: Result) -> list[str]:
     notes = []
     if result["model"]:
         notes += _model_notes(result["model"])
+    if result.get("mixed"):
+        notes.append(_mixed_note(result["mixed"]))
+    elif result.get("mixed_note"):
+        notes.append(f"No mixed model was fitted: {result['mixed_note']}.")
     if result["rules"].get("independent"):
         notes.append(result["rules"]["answer"])
     order = result["order_test"]
@@ -208,6 +230,16 @@ def _model_notes(model: Result) -> list[str]:
     return notes
 
 
+def _mixed_note(mixed: Result) -> str:
+    """How people differ, by the mixed model."""
+    text = (
+        "By the mixed model, participants’ logarithms of sensitivity and criterion have standard deviations of "
+        f"{mixed['sensitivity_spread']:.2f} and {mixed['criterion_spread']:.2f}; that they are alike has "
+        f"{words.p(mixed['alike_p_value'])} (likelihood ratio)."
+    )
+    return f"{text} Caution: {mixed['note']}." if mixed["note"] else text
+
+
 def _equal_slopes(test: Result) -> str:
     people = test["p_value_participants_independent"]
     text = (
@@ -236,16 +268,17 @@ def _across_motions(test: Result) -> str:
 
 def _threshold_rows(entry: Result, fps: float) -> list[dict[str, Any]]:
     """Every reading of the thresholds of all motions together, or of one."""
-    kinds = [("straight lines (as published)", "Fieller", entry["published"])]
-    if entry["model"]:
-        kinds.append(("model", "jackknife", entry["model"]["jnd"]))
-        kinds.append(("model", "profile likelihood", _profiled(entry)))
-        kinds.append(("model, best criterion", "jackknife", entry["model"]["corrected"]))
-        kinds.append(("model, Abbott’s correction", "jackknife", entry["model"]["guess_corrected"]))
+    kinds = [("straight lines (as published)", entry["published"])]
+    if model := entry["model"]:
+        kinds += [("model", model["jnd"]), ("model", _profiled(entry))]
+        kinds += [("model, best criterion", model["corrected"])]
+        kinds += [("model, Abbott’s correction", model["guess_corrected"])]
+    if mixed := entry.get("mixed"):
+        kinds += [("mixed model, median observer", mixed["typical"]), ("mixed model, group", mixed["population"])]
     return [
         {
             "estimate": label,
-            "interval": method,
+            "interval": _interval_by(found),
             "side": side,
             "frames": found["frames"],
             "seconds": found["frames"] / fps if found["frames"] is not None else None,
@@ -254,16 +287,33 @@ def _threshold_rows(entry: Result, fps: float) -> list[dict[str, Any]]:
             "high": found["interval"]["high"],
             "remark": found["note"],
         }
-        for label, method, thresholds in kinds
+        for label, thresholds in kinds
         for side, _ in SIDES
         if (found := thresholds.get(side))
     ]
 
 
+def _interval_by(threshold: Result) -> str:
+    """What made the interval, as far as the method names it."""
+    names = {
+        "Fieller": "Fieller",
+        "jackknife": "jackknife",
+        "one participant": "one participant",
+        "profile": "profile likelihood",
+    }
+    return next((name for part, name in names.items() if part in threshold["method"]), "curvature")
+
+
 def _profiled(entry: Result) -> dict[str, Any]:
     """The model's thresholds with intervals by profile likelihood; none for single motions."""
     return {
-        side: {**entry["model"]["jnd"][side], "interval": found, "standard_error": None, "note": ""}
+        side: {
+            **entry["model"]["jnd"][side],
+            "interval": found,
+            "standard_error": None,
+            "note": "",
+            "method": "profile",
+        }
         for side, found in entry.get("profile", {}).items()
         if side in entry["model"]["jnd"]
     }
@@ -282,9 +332,12 @@ def threshold_table(name: str, result: Result, fps: float) -> Table:
         "are “different”, read off between the levels; this moves with the rate of false alarms and cuts the corners "
         f"of the curve. Model: the same {percent} on the fitted curve. Best criterion: the difference at which an "
         f"observer with the best criterion would be right in {percent} of same and different pairs, whatever the "
-        "criterion people took. Abbott: after taking false alarms for guesses. Fieller’s and the jackknife’s intervals "
-        "are over participants; profile likelihood takes all answers for independent and is too narrow where "
-        "participants differ. A dash where an interval reaches beyond the levels shown.",
+        "criterion people took. Abbott: after taking false alarms for guesses. Mixed model: participants with "
+        "sensitivities and criteria of their own, the median one of them, and the mean of all. Fieller’s and the "
+        "jackknife’s intervals are over participants, the curvature’s rest on the mixed model; profile likelihood "
+        "takes "
+        "all answers for independent and is too narrow where participants differ. A dash where an interval reaches "
+        "beyond the levels shown.",
         _THRESHOLDS,
         rows,
         headings={"interval": "interval by"},

@@ -60,9 +60,14 @@ def readings_table(sections: Sequence[Section]) -> Table | None:
     rows = [row for section in sections for row in section.readings]
     if not rows:
         return None
+    names = [row["result"] for row in rows]
+    if len(set(names)) < len(names):
+        rows = [
+            {**row, "result": f"{section.title}: {row['result']}"} for section in sections for row in section.readings
+        ]
     return tables.make(
         "results",
-        "Every result as published and corrected, with 95% intervals in brackets. As published: the statistics of the "
+        "Every result as published and corrected, with 95% intervals in brackets. Published: the statistics of the "
         "papers, which take all answers for independent or read thresholds off straight lines. Corrected: the "
         "participant is the unit, and thresholds come from a model of the task.",
         "result published corrected",

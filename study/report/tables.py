@@ -13,7 +13,7 @@ from typing import Any, Literal, cast, get_args
 LONGEST_SHORT = 30
 """Longer text may break into lines. [characters]"""
 
-WIDTH_OF_TEXT = 100
+WIDTH_OF_TEXT = 88
 """Characters that a table may take in a row before it stands out into the margins."""
 
 Kind = Literal["text", "count", "one", "two", "three", "percent", "p", "short"]
@@ -66,7 +66,16 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "holm_p_value": ("Holm p", "p"),
     "sum_of_squares": ("SS", "two"),
     "mean_square": ("MS", "two"),
-    "partial_eta_squared": ("partial eta squared", "two"),
+    "partial_eta_squared": ("partial η²", "two"),
+    "partial_omega_squared": ("partial ω²", "two"),
+    "effect_low": ("η² from", "two"),
+    "effect_high": ("to", "two"),
+    "generalized_eta_squared": ("generalised η²", "two"),
+    "epsilon": ("ε", "two"),
+    "corrected_p_value": ("corrected p", "p"),
+    "effect": ("effect", "text"),
+    "odds_ratio": ("odds ratio", "two"),
+    "order": ("seen first", "text"),
     "of": ("difference", "text"),
     "published": ("as published", "text"),
     "corrected": ("corrected", "text"),
@@ -150,12 +159,22 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table with a name (of its files) and a caption."""
+    """A table with a name (of its files) and a caption, whose first sentence is the title."""
 
     name: str
     caption: str
     columns: tuple[Column, ...]
     rows: tuple[Mapping[str, Any], ...]
+
+    @property
+    def title(self) -> str:
+        """The caption's first sentence, which stands above the table."""
+        return self.caption.partition(". ")[0].removesuffix(".")
+
+    @property
+    def note(self) -> str:
+        """The rest of the caption, which stands below."""
+        return self.caption.partition(". ")[2]
 
     @property
     def shown(self) -> tuple[Column, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -35,6 +36,12 @@ def joined(parts: Sequence[str]) -> str:
 def number(count: int, singular: str, plural: str | None = None) -> str:
     """Return a count with its noun."""
     return f"{count:,} {singular if count == 1 else plural or singular + 's'}"
+
+
+def unbroken(text: str) -> str:
+    """Return a text in which no line ends within "p < .001", "N = 280", "t(34) = 5.01" or "k + 7.1"."""
+    text = re.sub(r"(?<=\S) ([=<+−±]) (?=[\d.−(])", "\u00a0\\1\u00a0", text)
+    return re.sub(r"\((\d+), (?=\d|N\b)", "(\\1,\u00a0", text)
 
 
 def mark_of(data: str, synthetic: bool) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,8 @@ from study.experiment.protocol import Protocol, load_protocol
 from study.experiment.rendering import read_manifest
 from study.experiment.responses import open_responses
 from study.experiment.stimulus_set import MotionUse, StimulusRecord
+
+sys.path.insert(0, str(Path(__file__).parent))  # tests are imported by path, without packages
 
 PROTOCOL = """
 name = "small"
@@ -125,41 +129,58 @@ def _pairs(protocol: Protocol, record: Callable[[str, str, int], StimulusRecord]
     return pairs
 
 
+def make_results(
+    folder: Path,
+    participants: int = 4,
+    *,
+    synthetic: bool = True,
+    title: str = "A small study",
+    videos: int = 2,
+    edit: Callable[[str], str] = str,
+) -> Path:
+    """Make a results folder, with as many simulated participants as asked for; `edit` changes the protocol's text."""
+    (folder / "stimuli").mkdir(parents=True)
+    text = edit(PROTOCOL.replace("A small study", title))
+    (folder / "protocol.toml").write_text(text, encoding="utf-8")
+    protocol = load_protocol(folder / "protocol.toml")
+    records: dict[str, StimulusRecord] = {}
+
+    def record(transition: str, method: str, difference: int) -> StimulusRecord:
+        made = _record(transition, method, difference, synthetic)
+        return records.setdefault(made.id, made)
+
+    pairs = _pairs(protocol, record)
+    stimuli: list[dict[str, Any]] = []
+    for place, entry in enumerate(records.values()):
+        video = None
+        if place < videos or (entry.difference_frames == 20 and videos):
+            name = f"stimuli/{entry.id}.mp4"
+            write_video(folder / name)
+            video = {"file": name, "frames": 40, "frames_sha256": "0", "file_sha256": "0", "bytes": 1}
+        stimuli.append({**asdict(entry), "video": video})
+    manifest = {
+        "version": 1, "protocol": protocol.name, "title": protocol.title, "protocol_sha256": protocol.sha256,
+        "library": "synthetic" if synthetic else "cmu", "synthetic": synthetic,
+        "acknowledgement": "" if synthetic else "The data used in this project was obtained from mocap.cs.cmu.edu.",
+        "fps": 30.0, "size": [160, 120], "style": "mannequin", "versions": {"segue": "0.1.0", "numpy": "2.0"},
+        "cameras": {}, "pairs": [asdict(pair) for pair in pairs], "stimuli": stimuli,
+    }  # fmt: skip
+    (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    with open_responses(folder) as responses:
+        if participants:
+            simulate(protocol, read_manifest(folder), responses, participants, seed=3)
+    return folder
+
+
 @pytest.fixture
 def results_folder(tmp_path: Path) -> Callable[..., Path]:
-    """A function that makes a results folder, with as many simulated participants as asked for."""
+    """A function that makes a results folder, see `make_results`."""
+    return partial(make_results, tmp_path / "small")
 
-    def make(participants: int = 4, *, synthetic: bool = True, title: str = "A small study", videos: int = 2) -> Path:
-        folder = tmp_path / "small"
-        (folder / "stimuli").mkdir(parents=True)
-        (folder / "protocol.toml").write_text(PROTOCOL.replace("A small study", title), encoding="utf-8")
-        protocol = load_protocol(folder / "protocol.toml")
-        records: dict[str, StimulusRecord] = {}
 
-        def record(transition: str, method: str, difference: int) -> StimulusRecord:
-            made = _record(transition, method, difference, synthetic)
-            return records.setdefault(made.id, made)
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of four simulated participants, for tests that only read it."""
+    from study.report.document import write_report
 
-        pairs = _pairs(protocol, record)
-        stimuli: list[dict[str, Any]] = []
-        for place, entry in enumerate(records.values()):
-            video = None
-            if place < videos or (entry.difference_frames == 20 and videos):
-                name = f"stimuli/{entry.id}.mp4"
-                write_video(folder / name)
-                video = {"file": name, "frames": 40, "frames_sha256": "0", "file_sha256": "0", "bytes": 1}
-            stimuli.append({**asdict(entry), "video": video})
-        manifest = {
-            "version": 1, "protocol": protocol.name, "title": protocol.title, "protocol_sha256": protocol.sha256,
-            "library": "synthetic" if synthetic else "cmu", "synthetic": synthetic,
-            "acknowledgement": "" if synthetic else "The data used in this project was obtained from mocap.cs.cmu.edu.",
-            "fps": 30.0, "size": [160, 120], "style": "mannequin", "versions": {"segue": "0.1.0", "numpy": "2.0"},
-            "cameras": {}, "pairs": [asdict(pair) for pair in pairs], "stimuli": stimuli,
-        }  # fmt: skip
-        (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
-        with open_responses(folder) as responses:
-            if participants:
-                simulate(protocol, read_manifest(folder), responses, participants, seed=3)
-        return folder
-
-    return make
+    return write_report(make_results(tmp_path_factory.mktemp("written") / "small"), resamples=50)

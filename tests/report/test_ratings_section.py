@@ -13,7 +13,9 @@ def question(item: str, mean: float, f: float, p: float) -> dict[str, Any]:
     rest = {"source": "residual", "degrees_of_freedom": 48, "sum_of_squares": 48.0, "mean_square": 1.0}
     difference = {"of": "cut-wang2003 minus cut-lee2002", "mean": mean, "low": 0.0, "high": 1.0, "t": 2.0}
     difference |= {"degrees_of_freedom": 25, "p_value": p}
-    return {"item": item, "anova": [effect, rest], "difference": difference, "note": ""}
+    nothing = {"type_ii": None, "ordinal": None, "participants": 26, "answers": 52, "note": ""}
+    nothing |= {"mixed_design": {"effects": [], "note": ""}, "ranks": {"between": [], "participants": None, "note": ""}}
+    return {"item": item, "anova": [effect, rest], "difference": difference, **nothing}
 
 
 ROWS = [
@@ -28,8 +30,9 @@ def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
     section = ratings_section("cuts", "Cuts", ROWS, variance, mark="", points=5, alpha=0.05)
     (headline,) = section.headlines
     assert "was rated higher than" in headline.statement
-    assert "in 2 of 2 questions, in 1 significantly at 0.05" in headline.statement
-    assert headline.detail.startswith("Natural: as published F(1, 48) = 6.39, p = .015; over participants t(25) = ")
+    assert "in 2 of 2 questions, in 1 of them significantly at 0.05 across 26 participants" in headline.statement
+    start = "Natural: as published F(1, 48) = 6.39, p = .015; over participants 0.70 [0.00, 1.00], t(25) = "
+    assert headline.detail.startswith(start)
     assert "Smooth: as published F(1, 48) = 1.20, p = .28" in headline.detail
     assert [table.name for table in section.tables] == ["cuts_ratings", "cuts_anova", "cuts_differences"]
     assert {"degrees_of_freedom", "error_degrees_of_freedom"} <= {column.key for column in section.tables[1].columns}
@@ -38,7 +41,11 @@ def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
 def test_the_worse_method_is_not_called_better() -> None:
     variance = [question("natural", -0.7, 6.39, 0.0148)]
     (headline,) = ratings_section("cuts", "Cuts", ROWS, variance, mark="", points=5).headlines
-    assert headline.statement.startswith("Cut-lee2002 was rated higher than cut-wang2003 in 1 of 1 question")
+    assert headline.statement == (
+        "Cut-lee2002 was rated 0.70 points higher than cut-wang2003 on average, on a scale of 0 to 4; across "
+        "participants "
+        "this is not chance (p = .015)."
+    )
 
 
 def test_a_single_method_has_no_comparison() -> None:

@@ -52,9 +52,9 @@ def test_files_have_all_columns_and_full_numbers() -> None:
 
 
 def threshold(side: str, frames: float | None, note: str = "") -> dict[str, Any]:
-    return {
-        "side": side, "frames": frames, "standard_error": None, "interval": {"low": None, "high": None}, "note": note,
-    }  # fmt: skip
+    ends = {"low": None, "high": None}
+    how = {"standard_error": None, "interval": ends, "method": "straight lines (Fieller)", "note": note}
+    return {"side": side, "frames": frames, **how}
 
 
 def test_a_threshold_that_is_not_reached_is_said_to_be_so() -> None:
@@ -63,19 +63,40 @@ def test_a_threshold_that_is_not_reached_is_said_to_be_so() -> None:
         "shorter": threshold("shorter", 8.0),
     }
     result = {"model": None, "model_note": "every answer was “same”", "published": published, "level": 0.75}
-    result |= {"answers": 84, "participants": 2, "missed": 0}
+    result |= {"answers": 84, "participants": 2, "missed": 0, "percent_different": []}
     said = headline(result, 30.0, "collected")
-    assert said.statement == "2 people called 75% of pairs different where the blend was 8.0 frames (0.27 s) shorter."
+    assert said.statement == (
+        "The just noticeable difference of 2 people is estimated at 8.0 frames (0.27 s) shorter (75% “different”)."
+    )
     assert "Where the blend was longer: not reached within the levels shown" in said.detail
     assert "84 answers of 2 participants. No model was fitted: every answer was “same”." in said.detail
 
 
-def test_no_threshold_at_all_is_said_to_be_none() -> None:
+def level(frames: float, percent: float, low: float, high: float) -> dict[str, float]:
+    return {"difference_frames": frames, "percent": percent, "low": low, "high": high}
+
+
+@pytest.mark.parametrize(
+    ("levels", "expected"),
+    [
+        # Enough answers to tell that the threshold lies below the smallest difference, or beyond the largest.
+        ([level(5, 100, 83, 100), level(-5, 0, 0, 17)], "less than 5 frames longer and more than 5 frames shorter"),
+        ([level(5, 100, 83, 100), level(10, 100, 83, 100)], "less than 5 frames longer (75%"),
+    ],
+)
+def test_a_threshold_outside_the_levels_is_bounded_by_them(levels: list[dict[str, float]], expected: str) -> None:
+    nowhere = {side: threshold(side, None, "not reached") for side in ("longer", "shorter")}
+    result = {"model": None, "model_note": "no", "published": nowhere, "level": 0.75, "percent_different": levels}
+    result |= {"answers": 42, "participants": 1, "missed": 0}
+    assert expected in headline(result, 30.0, "collected").statement
+
+
+def test_one_answer_is_no_evidence_for_a_bound() -> None:
     nowhere = {side: threshold(side, None, "not reached") for side in ("longer", "shorter")}
     result = {"model": None, "model_note": "no", "published": nowhere, "level": 0.75}
-    result |= {"answers": 42, "participants": 1, "missed": 0}
-    assert headline(result, 30.0, "collected").statement.startswith("No just noticeable difference can be given")
-    assert "1 person" in headline(result, 30.0, "collected").statement
+    result |= {"answers": 1, "participants": 1, "missed": 0, "percent_different": [level(5, 100, 20, 100)]}
+    said = headline(result, 30.0, "collected").statement
+    assert said == "No just noticeable difference can be given from the answers of 1 person."
     missed = {**result, "answers": 0, "participants": 0, "missed": 42}
     assert "all 42 questions were missed" in headline(missed, 30.0, "collected").statement
 

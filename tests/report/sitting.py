@@ -1,0 +1,111 @@
+"""Sessions of participants who do as they are told: they go through the real plan, state machine and database."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from study.experiment import session as sitting
+from study.experiment.plan import Trial, draw_plan
+from study.experiment.protocol import load_protocol
+from study.experiment.rendering import PROTOCOL, read_manifest
+from study.experiment.responses import Presentation, begin_session, open_responses, record_answer, record_event
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """An answer (None: missed), its time, and the longest gap between two frames of the stimuli before it."""
+
+    value: str | None
+    response_s: float = 1.2
+    gap_frames: float = 1.02
+
+
+Behaviour = Callable[[Trial, sitting.Step, np.random.Generator], Reaction]
+
+
+def attentive(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+    """Sees differences of ten frames, favours the first method in seven of ten pairs, rates at random."""
+    seconds = float(rng.uniform(0.6, 2.5))
+    if trial.role == "check":
+        return Reaction(trial.expected, seconds)
+    if trial.task == "same-different":
+        chance = 0.1 + 0.85 * min(abs(trial.difference_frames or 0) / 12, 1.0)
+        return Reaction("different" if rng.random() < chance else "same", seconds)
+    if trial.task == "preference":
+        for_a = rng.random() < 0.7
+        return Reaction("first" if for_a == trial.a_first else "second", seconds)
+    return Reaction(str(rng.choice(step.legal)), seconds)
+
+
+def missing(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+    """Never answers."""
+    del trial, step, rng
+    return Reaction(None)
+
+
+def stubborn(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+    """Always gives the first legal answer, far too soon, even where an attention check asks for another one."""
+    del rng
+    other = [value for value in step.legal if value != trial.expected]
+    return Reaction(other[0] if trial.role == "check" else step.legal[0], 0.1)
+
+
+def stuttering(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+    """Attentive, but every fifth showing stalls."""
+    reaction = attentive(trial, step, rng)
+    return Reaction(reaction.value, reaction.response_s, 4.0 if rng.random() < 0.2 else 1.02)
+
+
+def perfect(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+    """Sees every difference, always favours the first method, rates everything highest."""
+    del rng
+    if trial.role == "check":
+        return Reaction(trial.expected)
+    if trial.task == "same-different":
+        return Reaction("different" if trial.difference_frames else "same")
+    if trial.task == "preference":
+        return Reaction("first" if trial.a_first else "second")
+    return Reaction(step.legal[-1])
+
+
+def sit(
+    folder: Path, participant: str, behave: Behaviour, *, most_answers: int = 10_000, group: int = 0, seed: int = 0
+) -> int:
+    """Take one participant through a session, or through its first answers; the session's number comes back."""
+    protocol, manifest = load_protocol(folder / PROTOCOL), read_manifest(folder)
+    rng = np.random.default_rng([seed, *participant.encode()])
+    plan = draw_plan(protocol, manifest.pairs, participant, group=group)
+    with open_responses(folder) as responses:
+        record = begin_session(
+            responses, protocol, plan, library=manifest.library, library_synthetic=manifest.synthetic
+        )
+        state, given = sitting.open_session(protocol, plan, passed=("consent", "form")), 0
+        shown: list[Presentation] = []
+        while (step := sitting.current(state)).kind != "done" and given < most_answers:
+            if step.kind != "answer":
+                state = sitting.advanced(state)
+                continue
+            trial = plan.trial(step.trial)
+            reaction = behave(trial, step, rng)
+            shown_well = reaction.gap_frames <= 1.5
+            if reaction.value is None:
+                state, answer = sitting.missed(state, shown_well=shown_well)
+            else:
+                state, answer = sitting.answered(state, reaction.value, reaction.response_s, shown_well=shown_well)
+            shown = [
+                Presentation(
+                    trial.trial, step.attempt, place, stimulus, "requestVideoFrameCallback", 120,
+                    120 if shown_well else 117, reaction.gap_frames, shown_well,
+                )
+                for place, stimulus in (("first", trial.first), ("second", trial.second))
+                if stimulus
+            ]  # fmt: skip
+            record_answer(responses, record, answer, shown)
+            given += 1
+        if sitting.current(state).kind == "done":
+            record_event(responses, record, "finished")
+    return record.id
