@@ -90,7 +90,9 @@ class ObserverSettings:
     """All that a simulated participant is: how they judge, how fast, and how often they miss an answer.
 
     Response times are log-normal: median and standard deviation of the logarithm; those beyond the answer window are
-    missed, besides a proportion `missed` of inattention.
+    missed, besides a proportion `missed` of inattention. Of all showings a proportion `badly_shown` stalls, so that the
+    trial comes again, and a proportion `careless` of the participants looks at nothing: they answer at random and fast,
+    attention checks too. `truth` is of those who look.
     """
 
     same_different: SameDifferentObserver
@@ -99,6 +101,14 @@ class ObserverSettings:
     response_median_s: float = 1.2
     response_log_sd: float = 0.35
     missed: float = 0.005
+    badly_shown: float = 0.0
+    careless: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("missed", "badly_shown", "careless"):
+            share = getattr(self, name)
+            if not 0.0 <= share <= 1.0:
+                raise SessionError(f"Expected {name} as a share from 0 to 1, found {share:g}; change it.")
 
 
 def default_observer(shorter_frames: float = 8.0, longer_frames: float = 7.0) -> ObserverSettings:

@@ -50,6 +50,7 @@ __all__ = [
     "default_observer",
     "person",
     "respond",
+    "shown_well",
     "simulate",
     "truth",
 ]
@@ -64,6 +65,7 @@ class Person:
     settings: ObserverSettings
     lean: float
     leniency: float
+    careless: bool = False
 
 
 def person(settings: ObserverSettings, name: str, seed: int) -> Person:
@@ -84,7 +86,20 @@ def person(settings: ObserverSettings, name: str, seed: int) -> Person:
         replace(settings, same_different=own),
         settings.preference.participant_sd * float(leaning),
         settings.rating.participant_sd * float(leniency),
+        bool(generator(seed, "careless", name).random() < settings.careless),
     )
+
+
+_CARELESS_S = 0.25
+"""Median response time of those who do not look."""
+
+
+def shown_well(who: Person, trial: Trial, step: sitting.Step) -> bool:
+    """Whether a showing went well; by chance that depends on person, trial and attempt alone."""
+    if not who.settings.badly_shown:
+        return True
+    rng = generator(who.seed, "showing", who.name, trial.trial, step.attempt)
+    return bool(rng.random() >= who.settings.badly_shown)
 
 
 def respond(who: Person, trial: Trial, step: sitting.Step) -> tuple[str | None, float | None]:
@@ -96,7 +111,7 @@ def respond(who: Person, trial: Trial, step: sitting.Step) -> tuple[str | None, 
     rng = generator(who.seed, "answer", who.name, trial.trial, step.item, step.attempt)
     value, ease = _judge(who, trial, step, rng)
     # Near the threshold people take longer: up to half as long again.
-    median = who.settings.response_median_s * (1.5 - 0.5 * ease)
+    median = _CARELESS_S if who.careless else who.settings.response_median_s * (1.5 - 0.5 * ease)
     response_s = float(median * np.exp(who.settings.response_log_sd * rng.standard_normal()))
     inattentive = rng.random() < who.settings.missed
     if step.duration_s is not None and (inattentive or response_s > step.duration_s):
@@ -106,6 +121,8 @@ def respond(who: Person, trial: Trial, step: sitting.Step) -> tuple[str | None, 
 
 def _judge(who: Person, trial: Trial, step: sitting.Step, rng: np.random.Generator) -> tuple[str, float]:
     """The answer, and how easy it was from 0 to 1."""
+    if who.careless:
+        return str(rng.choice(step.legal)), 1.0
     if trial.role == "check":
         return trial.expected, 1.0
     if trial.task == "same-different":
@@ -206,7 +223,8 @@ def simulate(
             record_answer(responses, record, answer)
             made += 1
             if progress:
-                progress(found + made, total)
+                # Trials that come again are more than the plans ask for.
+                progress(found + made, max(total, found + made))
         record_event(responses, record, "finished")
     return SimulationSummary(participants, made, found, known)
 
@@ -239,9 +257,10 @@ def _answer(
     state: sitting.Session, who: Person, trial: Trial, step: sitting.Step
 ) -> tuple[sitting.Session, sitting.Answer]:
     value, response_s = respond(who, trial, step)
+    well = shown_well(who, trial, step)
     if value is None or response_s is None:
-        return sitting.missed(state)
-    return sitting.answered(state, value, response_s)
+        return sitting.missed(state, shown_well=well)
+    return sitting.answered(state, value, response_s, shown_well=well)
 
 
 def questions(protocol: Protocol, plan: Plan) -> int:

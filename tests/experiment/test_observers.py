@@ -23,6 +23,7 @@ from study.experiment.observer_models import (
     truth,
 )
 from study.experiment.observers import ObserverSettings, default_observer, person, simulate
+from study.experiment.protocol import parse_protocol
 from study.experiment.responses import all_sessions, answers_frame, has_event, open_responses
 from study.experiment.session import advanced, answered, current, missed, open_session
 
@@ -266,3 +267,57 @@ def test_front_ends_and_simulation_drive_the_same_session(toy_protocol, toy_stim
         simulate(toy_protocol, toy_stimuli, responses, 1, seed=3)
         table = answers_frame(responses)
     assert [a.value for a in asked] == [None if pd.isna(value) else value for value in table["answer"]]
+
+
+def test_showings_that_stall_come_again_and_bear_it(tmp_path, toy_protocol, toy_stimuli):
+    with open_responses(tmp_path) as responses:
+        settings = replace(default_observer(), badly_shown=0.3)
+        made = simulate(toy_protocol, toy_stimuli, responses, 40, seed=3, settings=settings).answers
+        every, last = (answers_frame(responses, all_attempts=all_attempts) for all_attempts in (True, False))
+    first = every[every["attempt"] == 1]
+    # 320 showings, four standard errors of a share of 0.3.
+    assert 1 - first["shown_well"].mean() == pytest.approx(0.3, abs=0.103)
+    assert len(every) == made == len(first) + (~first["shown_well"]).sum()
+    assert len(last) == 320
+    assert 1 - last["shown_well"].mean() == pytest.approx(0.09, abs=0.064)
+
+
+def test_the_careless_answer_at_random_and_are_found_by_the_rules(tmp_path, toy_protocol, make_stimuli):
+    from study.analysis.exclusions import Rules, exclude
+
+    text = toy_protocol.text.replace('order = "both"', 'order = "both"\nrepeats = 3\nattention_checks = 6')
+    protocol = parse_protocol(text)
+    with open_responses(tmp_path) as responses:
+        settings = replace(default_observer(), careless=0.3, missed=0.0)
+        simulate(protocol, make_stimuli(protocol), responses, 40, seed=3, settings=settings)
+        answers, checks = answers_frame(responses), answers_frame(responses, roles=("check",))
+    people = [person(settings, name, 3) for name in sorted(set(answers["participant"]))]
+    careless = {who.name for who in people if who.careless}
+    assert 5 <= len(careless) <= 20
+    kept = exclude(answers, Rules(most_failed_checks=0.1, most_too_fast=0.2), checks)
+    assert {row["participant"] for row in kept.participants} <= careless
+    # One in 64 passes all six checks by chance, and answers no slower for it.
+    assert len(kept.participants) >= len(careless) - 1
+
+
+def test_shares_of_what_goes_wrong_are_from_0_to_1():
+    with pytest.raises(SessionError, match=r"Expected badly_shown as a share from 0 to 1, found 1\.5"):
+        replace(default_observer(), badly_shown=1.5)
+
+
+@pytest.mark.parametrize("after", [3, 9, 20])
+def test_a_simulation_with_stalls_goes_on_as_it_would_have(tmp_path, toy_protocol, toy_stimuli, after):
+    settings = replace(default_observer(), badly_shown=0.4, missed=0.2, careless=0.2)
+    with open_responses(tmp_path / "whole.sqlite") as responses:
+        simulate(toy_protocol, toy_stimuli, responses, 3, seed=4, settings=settings)
+        whole = timeless(responses)
+
+    def stop(done, _total):
+        if done == after:
+            raise StopHereError
+
+    with open_responses(tmp_path / "parts.sqlite") as responses:
+        with pytest.raises(StopHereError):
+            simulate(toy_protocol, toy_stimuli, responses, 3, seed=4, progress=stop, settings=settings)
+        simulate(toy_protocol, toy_stimuli, responses, 3, seed=4, settings=settings)
+        pd.testing.assert_frame_equal(timeless(responses), whole)
