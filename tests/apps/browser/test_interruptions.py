@@ -126,7 +126,7 @@ def test_an_answer_survives_a_minute_without_network(make_site, make_tab, closed
         tab = make_tab(tab.context)
         tab.open(site.address)
         # Nobody could tell the server that the first tab was closed.
-        tab.wait(f"document.querySelector('main button') || (document.getElementById('main') && !({KEPT}))")
+        tab.wait(f"document.querySelector('main button') !== null || (document.getElementById('main') && !({KEPT}))")
         tab.try_click("Go on here instead")
     else:
         tab.reload()
