@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import click
@@ -37,6 +38,7 @@ from study.apps.study_commands import (
     "--researcher-token", envvar="SEGUE_RESEARCHER_TOKEN", help="Made up unless given; 16 characters or more."
 )
 @click.option("--behind-proxy", is_flag=True, help="Believe the proxy on this machine about https and addresses.")
+@click.option("--root-path", default="", metavar="PATH", help="Where the proxy shows this study, such as /study.")
 def serve(
     protocol: str,
     library: str | None,
@@ -52,6 +54,7 @@ def serve(
     completion_url: str,
     researcher_token: str | None,
     behind_proxy: bool,
+    root_path: str,
 ) -> None:
     """Sessions in the browser. What is not rendered yet is rendered first; ends with Ctrl-C, and goes on from there."""
     from study.apps.server.hosting import Settings
@@ -60,27 +63,27 @@ def serve(
 
     checked = load(protocol)
     folder = results_folder(checked, out)
-    if researcher_token is not None and len(researcher_token) < 16:
-        raise click.UsageError(
-            f"expected a researcher's token of 16 characters or more, found {len(researcher_token)}."
-        )
     if completion_url and not completion_url.startswith(("https://", "http://")):
         raise click.UsageError(f"expected a completion URL that starts with https://, found {completion_url!r}.")
-    stimuli = prepare_stimuli(checked, library)
-    check_database(database, stimuli)
-    render_stimuli(stimuli, folder, workers)
+    if root_path and not re.fullmatch(r"(/[\w.~-]+)+", root_path, re.ASCII):
+        raise click.UsageError(f"expected a path such as /study, without a slash at its end, found {root_path!r}.")
     settings = Settings(
-        researcher_token=researcher_token or new_token(),
+        researcher_token=new_token() if researcher_token is None else researcher_token,
         most_participants=participants,
         groups=groups,
         completion_code=completion_code,
         completion_url=completion_url,
         parameters=(*Settings.parameters, *parameters),
     )
+    stimuli = prepare_stimuli(checked, library)
+    check_database(database, stimuli)
+    render_stimuli(stimuli, folder, workers)
 
     def started(address: str, place: str) -> None:
         say(f"participants  {address}/")
-        say(f"researcher    {address}/researcher#{settings.researcher_token}")
+        # What is printed ends up in logs: a token of the researcher's own is not repeated.
+        token = f"#{settings.researcher_token}" if researcher_token is None else "  (asks for your token)"
+        say(f"researcher    {address}/researcher{token}")
         say(f"answers       {place}")
         say("Ctrl-C ends it; the same command goes on from there.")
 
@@ -91,6 +94,7 @@ def serve(
         host=host,
         port=port,
         behind_proxy=behind_proxy,
+        root_path=root_path,
         database=database,
         started=started,
     )

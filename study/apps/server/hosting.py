@@ -48,11 +48,17 @@ from study.experiment.session import Answer, Session, Step
 TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
 
+GONE_SECONDS = 3600.0
+"""A sitting that was not heard of for so long is kept in the database alone, and taken up from there."""
+
 MOST_EVENTS = 2000
 """Events that are stored of one session; a page that goes wrong can't fill the disk."""
 
 TELL_EVERY_SECONDS = 10.0
 """How often it is logged that the database is away."""
+
+SHORTEST_TOKEN = 16
+"""Characters of the researcher's token."""
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
@@ -76,6 +82,14 @@ class Settings:
     identifying: tuple[str, ...] = ("PROLIFIC_PID", "participant")
     dropped_after: timedelta = people.DROPPED_AFTER
 
+    def __post_init__(self) -> None:
+        """A token that nobody guesses; an empty one would let in everybody."""
+        if len(self.researcher_token) < SHORTEST_TOKEN:
+            raise SessionError(
+                f"Expected a researcher's token of {SHORTEST_TOKEN} characters or more, found one of "
+                f"{len(self.researcher_token)}; leave it out, and one is made up."
+            )
+
 
 @dataclass
 class Sitting:
@@ -87,7 +101,7 @@ class Sitting:
     answers: dict[tuple[int, str, int], Answer]
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
     page: str = ""
-    page_seen: float = 0.0
+    page_seen: float = field(default_factory=time.monotonic)
     events: int = 0
     shown_trial: tuple[int, int] | None = None
 
@@ -351,12 +365,13 @@ class Host:
         if size is None or size != video["bytes"]:
             detail = {"what": "film damaged", "stimulus": step.stimulus, "bytes": size, "expected": video.get("bytes")}
             await self.note(sitting, "fault", detail)
-            raise SessionError(f"Expected the film {step.stimulus} whole, found {size} bytes; render again.")
+            # Which one it is stands in the event: a page must not learn it.
+            raise SessionError("Expected the film whole, found it damaged; the researcher has to render again.")
         return path
 
     def _film_step(self, sitting: Sitting, name: str) -> Step | None:
         for step in views.films_due(sitting.state):
-            if secrets.compare_digest(views.film_name(sitting.participant, step), name):
+            if secrets.compare_digest(views.film_name(sitting.participant, step).encode(), name.encode()):
                 return step
         return None
 
@@ -368,7 +383,9 @@ class Host:
         return session_id is not None
 
     async def note_who_is_here(self) -> None:
-        """Store who was heard of, so that drop-outs can be told apart."""
+        """Store who was heard of, so that drop-outs can be told apart; let go of those who are long gone."""
+        gone = time.monotonic() - GONE_SECONDS
+        self.sittings = {k: one for k, one in self.sittings.items() if one.lock.locked() or one.page_seen > gone}
         recent, self.recent = self.recent, set()
         try:
             await asyncio.to_thread(people.seen, self.responses, recent)

@@ -18,7 +18,7 @@ from pydantic_core import to_json
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from study.apps.server.hosting import Host, Sitting
-from study.apps.server.messages import Answered, Begin, Done, Happened, Withdrawal, read
+from study.apps.server.messages import LONGEST_PAGE, SHORTEST_PAGE, Answered, Begin, Done, Happened, Withdrawal, read
 from study.errors import SegueError
 from study.experiment.databases import AWAY
 
@@ -177,7 +177,8 @@ def _same_origin(letter: Letter) -> None:
 
 def _of_our_pages(letter: Letter) -> None:
     _same_origin(letter)
-    if b"x-segue-page" not in letter.headers or letter.headers.get(b"content-type") != b"application/json":
+    named = SHORTEST_PAGE <= len(letter.page) <= LONGEST_PAGE
+    if not named or letter.headers.get(b"content-type") != b"application/json":
         raise RefusedError(403, "Expected a message of this site's own pages.")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -10,6 +11,9 @@ from study.errors import SessionError
 
 LONGEST_FILM_FRAMES = 40_000
 """Far above the longest stimulus (120 s at 240 frames a second); a page can't fill the database."""
+
+SHORTEST_PAGE, LONGEST_PAGE = 8, 64
+"""Characters of the name that a page gives itself."""
 
 Text = Annotated[str, Field(max_length=400)]
 Milliseconds = Annotated[float, Field(ge=0, lt=1e9, allow_inf_nan=False)]
@@ -37,8 +41,8 @@ class Display(Message):
 class Begin(Message):
     """A page was opened: by which link, in which tab, on what display."""
 
-    page: Annotated[str, Field(min_length=8, max_length=64)]
-    previous: Annotated[str, Field(max_length=64)] = ""
+    page: Annotated[str, Field(min_length=SHORTEST_PAGE, max_length=LONGEST_PAGE)]
+    previous: Annotated[str, Field(max_length=LONGEST_PAGE)] = ""
     force: bool = False
     parameters: Annotated[dict[Annotated[str, Field(max_length=60)], Text], Field(max_length=20)] = {}
     display: Display = Display()
@@ -92,8 +96,14 @@ class Withdrawal(Message):
     code: Annotated[str, Field(max_length=100)]
 
 
+_NUL = re.compile(rb"(?<!\\)(?:\\\\)*\\u0000")
+"""As JSON writes it; after a backslash that stands for itself it is only text."""
+
+
 def read(model: type[Message], data: bytes) -> Any:
     """A message of a kind, or a `SessionError` that says what is wrong with it."""
+    if b"u0000" in data and _NUL.search(data):
+        raise SessionError(f"Expected a message {model.__name__} without NUL characters, which databases don't take.")
     try:
         return model.model_validate_json(data)
     except ValidationError as error:

@@ -30,6 +30,7 @@ def run(
     host: str = "127.0.0.1",
     port: int = 8000,
     behind_proxy: bool = False,
+    root_path: str = "",
     database: str | None = None,
     started: Callable[[str, str], object] | None = None,
 ) -> None:
@@ -37,6 +38,8 @@ def run(
 
     Parameters
     ----------
+    root_path
+        Where a proxy shows the study, such as `/study`; it hands requests on without it.
     database
         Where answers go, instead of the folder's own `responses.sqlite`.
     started
@@ -54,20 +57,20 @@ def run(
         app = make_app(Host(protocol, manifest, responses, settings))
         if started:
             started(f"http://{name}:{listening.getsockname()[1]}", responses.place)
-        serve(app, listening, behind_proxy=behind_proxy)
+        serve(app, listening, behind_proxy=behind_proxy, root_path=root_path)
 
 
-def serve(app: ASGIApp, listening: socket.socket, *, behind_proxy: bool = False) -> None:
+def serve(app: ASGIApp, listening: socket.socket, *, behind_proxy: bool = False, root_path: str = "") -> None:
     """Serve an application in this process until it is told to end."""
     _allow_files(MOST_CONNECTIONS + 100)
     # Two hundred answers at one instant are so many new objects that the collector would look through all sittings
     # several times, a quarter of all work; what is there now stays, and the rest can wait a while.
     gc.freeze()
     gc.set_threshold(100_000, 10, 10)
-    uvicorn.Server(configuration(app, behind_proxy=behind_proxy)).run(sockets=[listening])
+    uvicorn.Server(configuration(app, behind_proxy=behind_proxy, root_path=root_path)).run(sockets=[listening])
 
 
-def configuration(app: ASGIApp, *, behind_proxy: bool = False) -> uvicorn.Config:
+def configuration(app: ASGIApp, *, behind_proxy: bool = False, root_path: str = "") -> uvicorn.Config:
     """How uvicorn runs: quiet, with connections that outlive a trial, ending within seconds."""
     return uvicorn.Config(
         app,
@@ -78,6 +81,7 @@ def configuration(app: ASGIApp, *, behind_proxy: bool = False) -> uvicorn.Config
         access_log=False,
         server_header=False,
         proxy_headers=behind_proxy,
+        root_path=root_path,
         timeout_keep_alive=75,
         timeout_graceful_shutdown=5,
     )
