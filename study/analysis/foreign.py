@@ -1,12 +1,15 @@
 """Answers that another program wrote: its table and the names of its columns in, one row a trial in our terms out.
 
 PsychoPy, jsPsych and Gorilla write one row a screen or a trial, with blanks where a column says nothing, and each its
-own words for right and wrong. Nothing is guessed: a word that can't be understood is refused with its row.
+own words for right and wrong. Nothing is guessed: a word that can't be understood is refused with its row. Tasks with a
+stimulus level here; preferences and ratings in `foreign_answers`.
 """
 
 from __future__ import annotations
 
 import difflib
+import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -50,6 +53,8 @@ class Columns:
         What counts as right, yes or different; the usual words where empty.
     where
         Rows to take: pairs of column and value.
+    decimal
+        "point" or "comma"; found out where None.
     """
 
     level: str
@@ -59,6 +64,7 @@ class Columns:
     order: str | None = None
     yes: tuple[str, ...] = ()
     where: tuple[tuple[str, str], ...] = ()
+    decimal: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,31 +86,136 @@ class Trials:
     missed: int
 
 
-def _column(table: pd.DataFrame, name: str, means: str) -> pd.Series[str]:
-    """One column as trimmed text."""
+def column(table: pd.DataFrame, name: str, means: str) -> pd.Series[str]:
+    """Return one column as trimmed text, empty where it says nothing.
+
+    A list of one answer (PsychoPy) or an object with one (jsPsych) is that answer; `response.Q0` is the answer `Q0` of
+    the objects in `response`.
+
+    Raises
+    ------
+    AnalysisError
+        When there is no such column, or a cell holds several answers.
+    """
+    whole, _, key = name.rpartition(".")
+    if name not in table.columns and whole in table.columns:
+        return _answers_in(_text(table, whole), whole, key)
     if name not in table.columns:
-        near = difflib.get_close_matches(name, [str(column) for column in table.columns], n=1, cutoff=0.5)
+        near = difflib.get_close_matches(name, [str(there) for there in table.columns], n=1, cutoff=0.5)
         hint = f"did you mean {near[0]!r}?" if near else "name one of them"
-        there = ", ".join(str(column) for column in table.columns[:30])
+        there = ", ".join(str(there) for there in table.columns[:30])
         raise AnalysisError(f"expected a column {name!r} for the {means}, found {there}; {hint}")
+    return _answers_in(_text(table, name), name, None)
+
+
+def _text(table: pd.DataFrame, name: str) -> pd.Series[str]:
     text = table[name].fillna("").astype(str).str.strip()
     return text.where(~text.str.lower().isin(BLANK), "")
 
 
-def _numbers(text: pd.Series[str], name: str, means: str) -> pd.Series[float]:
+def _answers_in(text: pd.Series[str], name: str, key: str | None) -> pd.Series[str]:
+    """Texts with lists and objects replaced by the one answer that they hold."""
+    packed = text.str.startswith(("{", "["))
+    if key is None and not packed.any():
+        return text
+    found = text.copy()
+    for row in text.index[packed]:
+        found.loc[row] = _one_answer(str(text.loc[row]), f"row {int(row) + 2}, column {name!r}", name, key)
+    if key is not None:
+        found = found.where(packed, "")
+    return found.where(~found.str.lower().isin(BLANK), "")
+
+
+def _one_answer(cell: str, place: str, name: str, key: str | None) -> str:
+    try:
+        # PsychoPy writes lists as Python does, with single quotes.
+        value = json.loads(cell if cell.startswith("{") else cell.replace("'", '"'))
+    except ValueError:
+        return cell
+    if isinstance(value, dict):
+        if key is not None:
+            value = value.get(key, "")
+        elif len(value) > 1:
+            named = " or ".join(f"{name}.{one}" for one in value)
+            raise AnalysisError(f"{place}: expected one answer, found {len(value)}; name one of them: {named}")
+        else:
+            value = next(iter(value.values()), "")
+    if isinstance(value, list):
+        if len(value) > 1:
+            raise AnalysisError(f"{place}: expected one answer, found {cell}; take other rows with --where")
+        value = value[0] if value else ""
+    return "" if value is None else str(value).strip()
+
+
+def numbers(text: pd.Series[str], name: str, means: str, decimal: str | None = None) -> pd.Series[float]:
+    """Return numbers from texts, NaN where these are empty.
+
+    Parameters
+    ----------
+    decimal
+        "point" or "comma"; found out where None.
+
+    Raises
+    ------
+    AnalysisError
+        When a cell holds something else, or a comma may stand for thousands as well as for decimals.
+    """
     import pandas as pd
 
-    numbers = pd.to_numeric(text.where(text != ""), errors="coerce")
-    strange = text[(text != "") & numbers.isna()]
+    given = text[text != ""]
+    if decimal == "comma" or (decimal is None and _has_decimal_commas(given, name)):
+        text = text.where(~text.str.fullmatch(_WITH_COMMA), text.str.replace(",", ".", regex=False))
+    found = pd.to_numeric(text.where(text != ""), errors="coerce").astype(float)
+    strange = text[(text != "") & ~found.abs().lt(float("inf"))]
     if len(strange):
         raise AnalysisError(
-            f"row {_row(strange)}, column {name!r}: expected a number as the {means}, found {strange.iloc[0]!r}; "
+            f"row {row_of(strange)}, column {name!r}: expected a number as the {means}, found {strange.iloc[0]!r}; "
             "correct it, or take other rows with --where"
         )
-    return numbers.astype(float)
+    return found
 
 
-def _row(chosen: pd.Series[str]) -> int:
+_WITH_COMMA = r"[-+]?\d*,\d+"
+
+
+def _has_decimal_commas(given: pd.Series[str], name: str) -> bool:
+    """Whether commas in numbers stand for decimals; refused where they may as well part thousands."""
+    commas = given[given.str.fullmatch(_WITH_COMMA)]
+    if not len(commas):
+        return False
+    points = given[given.str.fullmatch(r"[-+]?\d*\.\d+")]
+    if len(points):
+        raise AnalysisError(
+            f"column {name!r}: expected one way to write decimals, found {commas.iloc[0]!r} in row {row_of(commas)} "
+            f"and {points.iloc[0]!r} in row {row_of(points)}; write all in one way"
+        )
+    if all(re.fullmatch(r"[-+]?[1-9]\d{0,2},\d{3}", str(value)) for value in commas):
+        raise AnalysisError(
+            f"row {row_of(commas)}, column {name!r}: {commas.iloc[0]!r} may be thousands or decimals; say which with "
+            "--decimal comma, or write it without the comma"
+        )
+    return True
+
+
+def taken(table: pd.DataFrame, where: Sequence[tuple[str, str]]) -> pd.DataFrame:
+    """Return the rows that hold all these values, whatever the case.
+
+    Raises
+    ------
+    AnalysisError
+        When there are none.
+    """
+    for name, value in where:
+        held = column(table, name, "rows to take")
+        matches = held.str.lower() == value.strip().lower()
+        if not matches.any():
+            seen = ", ".join(sorted(set(held))[:12])
+            raise AnalysisError(f"expected rows with {name} = {value}, found none; {name} holds {seen}")
+        table = table[matches]
+    return table
+
+
+def row_of(chosen: pd.Series[str]) -> int:
     """The first row's line in the file; the heading is line 1."""
     return int(str(chosen.index[0])) + 2
 
@@ -131,14 +242,9 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Trials:
     if task not in TASKS:
         raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {task!r}")
     rows = len(table)
-    for name, value in columns.where:
-        matches = _column(table, name, "rows to take").str.lower() == value.strip().lower()
-        if not matches.any():
-            seen = ", ".join(sorted(set(_column(table, name, "rows to take")))[:12])
-            raise AnalysisError(f"expected rows with {name} = {value}, found none; {name} holds {seen}")
-        table = table[matches]
-    level = _numbers(_column(table, columns.level, "stimulus level"), columns.level, "stimulus level")
-    answer = _column(table, columns.answer, "answer")
+    table = taken(table, columns.where)
+    level = numbers(column(table, columns.level, "stimulus level"), columns.level, "stimulus level", columns.decimal)
+    answer = column(table, columns.answer, "answer")
     placed, given = level.notna(), level.notna() & (answer != "")
     if not given.any():
         raise AnalysisError(
@@ -146,10 +252,16 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Trials:
             "columns' names and --where"
         )
     yes, shown = _answers(table, answer[given], columns, task)
-    who = _column(table, columns.participant, "participant")[given] if columns.participant else "participant"
+    who: pd.Series[str] | str = "participant"
+    if columns.participant:
+        who = column(table, columns.participant, "participant")[given]
+        if (who == "").any():
+            raise AnalysisError(
+                f"row {row_of(who[who == ''])}, column {columns.participant!r}: expected who answered, found nothing"
+            )
     result = pd.DataFrame({"participant": who, "level": level[given], "yes": yes, "shown": shown})
     if columns.order:
-        result["order"] = _column(table, columns.order, "order of a pair")[given]
+        result["order"] = column(table, columns.order, "order of a pair")[given]
     missed = int((placed & ~given).sum())
     return Trials(result.reset_index(drop=True), rows, len(result), int((~placed).sum()), missed)
 
@@ -161,13 +273,13 @@ def _answers(
     if columns.shown is None:
         yes = _understood(answer, columns, task)
         return yes, yes * 0 + 1
-    shown = _numbers(_column(table, columns.shown, "number of answers"), columns.shown, "number of answers")
+    shown = numbers(column(table, columns.shown, "number of answers"), columns.shown, "number of answers", "point")
     shown = shown.reindex(answer.index).fillna(0.0)
-    count = _numbers(answer, columns.answer, "number of answers “yes”")
+    count = numbers(answer, columns.answer, "number of answers “yes”")
     wrong = answer[(count < 0) | (count > shown)]
     if len(wrong):
         raise AnalysisError(
-            f"row {_row(wrong)}: expected at most {columns.shown} answers, found {wrong.iloc[0]} of "
+            f"row {row_of(wrong)}: expected at most {columns.shown} answers, found {wrong.iloc[0]} of "
             f"{shown[wrong.index[0]]:g}"
         )
     return count, shown
@@ -180,7 +292,7 @@ def _understood(answer: pd.Series[str], columns: Columns, task: str) -> pd.Serie
         words = {word.strip().lower() for word in columns.yes}
         found = text.isin(words)
         if not found.any():
-            seen = _few(answer)
+            seen = few(answer)
             raise AnalysisError(
                 f"column {columns.answer!r}: expected answers {' or '.join(columns.yes)}, found only {seen}; name with "
                 "--yes what counts as right, yes or different"
@@ -190,12 +302,13 @@ def _understood(answer: pd.Series[str], columns: Columns, task: str) -> pd.Serie
     if len(strange):
         counts_as = {"2afc": "right", "yes-no": "yes"}.get(task, "different")
         raise AnalysisError(
-            f"row {_row(strange)}, column {columns.answer!r}: expected {YES[task][0]} or {NO[task][0]} (or such "
-            f"words), found {strange.iloc[0]!r}; say with --yes which of {_few(answer)} counts as {counts_as}"
+            f"row {row_of(strange)}, column {columns.answer!r}: expected {YES[task][0]} or {NO[task][0]} (or such "
+            f"words), found {strange.iloc[0]!r}; say with --yes which of {few(answer)} counts as {counts_as}"
         )
     return text.isin(YES[task]).astype(float)
 
 
-def _few(answer: pd.Series[str]) -> str:
+def few(answer: pd.Series[str]) -> str:
+    """Return a column's different values, the first eight of them."""
     values: Sequence[str] = sorted(set(answer))
     return ", ".join(repr(value) for value in values[:8]) + (" ..." if len(values) > 8 else "")

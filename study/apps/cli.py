@@ -39,7 +39,7 @@ VERBS = {
     "analyse": "study_commands:analyse",
     "report": "study_commands:report",
     "export": "study_commands:export",
-    "fit": "analysis_commands:fit",
+    "fit": "fit_command:fit",
     "power": "power_command:power",
     "doctor": "doctor_command:doctor",
 }
