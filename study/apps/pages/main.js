@@ -37,14 +37,14 @@ async function act(view, study, state) {
     if (message.value === null && view.question.window_s !== null && message.shown.length > 0) status(texts.missed);
     // The pause begins with the answer, not with the server's word for it.
     state.pauseOver = sleep(view.pause_s * 1000);
-    const next = await send("/api/answer", message, texts.waiting);
+    const next = await send("api/answer", message, texts.waiting);
     if (next.kind === "feedback" || next.kind === "trial") return next;
     await state.pauseOver;
     return next;
   }
   const pages = { consent: screens.consent, form: screens.form, instructions: screens.instructions };
   const message = await (pages[view.kind] ?? screens.read)(view, study);
-  return send("/api/done", { step: view.step, ...message }, texts.waiting);
+  return send("api/done", { step: view.step, ...message }, texts.waiting);
 }
 
 function end(view, study) {

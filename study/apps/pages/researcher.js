@@ -12,7 +12,7 @@ async function get(path, token) {
 }
 
 async function download(name, token) {
-  const response = await get(`/api/researcher/${name}.csv`, token);
+  const response = await get(`api/researcher/${name}.csv`, token);
   const link = element("a", { href: URL.createObjectURL(await response.blob()), download: `${name}.csv` });
   link.click();
   URL.revokeObjectURL(link.href);
@@ -79,7 +79,7 @@ function askForToken() {
 async function watch(token) {
   for (;;) {
     try {
-      const response = await get("/api/researcher/overview", token);
+      const response = await get("api/researcher/overview", token);
       if (response.status === 401) {
         sessionStorage.removeItem(KEPT);
         askForToken();

@@ -122,7 +122,7 @@ export function done(view, study) {
   const parts = [heading(study.texts.finished)];
   if (view.completion_code) parts.push(element("p", {}, `${study.texts.completion} `, element("code", {}, view.completion_code)));
   if (view.withdrawal_code) {
-    parts.push(element("p", { class: "note" }, `${study.texts.withdrawal} `, element("br"), element("code", {}, view.withdrawal_code), "   ", element("a", { href: "/withdraw" }, study.texts.withdraw)));
+    parts.push(element("p", { class: "note" }, `${study.texts.withdrawal} `, element("br"), element("code", {}, view.withdrawal_code), "   ", element("a", { href: "withdraw" }, study.texts.withdraw)));
   }
   if (view.completion_url) {
     parts.push(element("div", { class: "buttons" }, element("a", { class: "button", href: view.completion_url, rel: "noreferrer" }, study.texts.back)));

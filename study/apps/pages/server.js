@@ -67,7 +67,7 @@ export async function send(path, body, waitingText) {
 
 export async function begin(body, waitingText) {
   const previous = storage((tab) => tab.getItem("segue-page"), "sessionStorage") ?? "";
-  const { content } = await insist("/api/begin", { ...body, page, previous }, waitingText);
+  const { content } = await insist("api/begin", { ...body, page, previous }, waitingText);
   if (content.kind !== "elsewhere") storage((tab) => tab.setItem("segue-page", page), "sessionStorage");
   session = content.session ?? "";
   return content;
@@ -91,13 +91,13 @@ export const hasKept = () => storage((kept) => kept.getItem(KEPT + session)) !==
 
 // Tells of something that happened; lost where the server can't be reached, and nothing waits for it.
 export function tell(kind, detail = {}) {
-  post("/api/happened", { kind, detail }).catch(() => {});
+  post("api/happened", { kind, detail }).catch(() => {});
 }
 
 export function keepAlive(whenTaken) {
   const every = setInterval(async () => {
     try {
-      await post("/api/alive", {});
+      await post("api/alive", {});
     } catch (error) {
       if (error instanceof Refused && error.code === 409) {
         clearInterval(every);
@@ -105,13 +105,13 @@ export function keepAlive(whenTaken) {
       }
     }
   }, 10000);
-  window.addEventListener("pagehide", () => navigator.sendBeacon("/api/leave", page));
+  window.addEventListener("pagehide", () => navigator.sendBeacon("api/leave", page));
 }
 
 export async function study() {
   for (;;) {
     try {
-      const response = await fetch("/api/study", { signal: AbortSignal.timeout(TIMEOUT_MS) });
+      const response = await fetch("api/study", { signal: AbortSignal.timeout(TIMEOUT_MS) });
       if (response.ok) return await response.json();
     } catch {
       // not there yet

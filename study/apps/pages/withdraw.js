@@ -4,7 +4,7 @@ import { element, heading, show, status } from "./dom.js";
 import { page, study as getStudy } from "./server.js";
 
 async function withdraw(code) {
-  const response = await fetch("/api/withdraw", {
+  const response = await fetch("api/withdraw", {
     method: "POST",
     headers: { "content-type": "application/json", "x-segue-page": page },
     body: JSON.stringify({ code }),

@@ -15,7 +15,8 @@ from study.experiment.participants import Participant
 from study.experiment.protocol import Protocol
 from study.experiment.session import Session, Step
 
-FILMS = "/films"
+FILMS = "films"
+"""Relative to the page, which a proxy may show under any path."""
 Films = Mapping[str, Mapping[str, int]]
 
 
