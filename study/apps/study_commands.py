@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ OUT = click.option(
     default=None,
     help="Results folder; results/<name of the protocol> unless given.",
 )
+SHARE = click.FloatRange(0.0, 1.0)
 WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes; one a core unless given.")
 
 
@@ -67,9 +68,18 @@ def check_database(database: str | None, stimuli: StimulusSet) -> None:
 
 
 def simulate_participants(
-    protocol: Protocol, folder: Path, participants: int, seed: int | None = None, database: str | None = None
+    protocol: Protocol,
+    folder: Path,
+    participants: int,
+    seed: int | None = None,
+    database: str | None = None,
+    **goes_wrong: Any,
 ) -> dict[str, Any]:
-    """Simulated sessions on the stimuli of a results folder; the numbers for `--json`."""
+    """Simulated sessions on the stimuli of a results folder; the numbers for `--json`.
+
+    `goes_wrong` are shares of the observers' settings, such as `missed`; the usual ones where they are left out.
+    """
+    from study.experiment.observers import default_observer
     from study.experiment.observers import simulate as simulate_all
     from study.experiment.rendering import read_manifest
     from study.experiment.responses import open_responses, refuse_other_stimuli
@@ -84,6 +94,7 @@ def simulate_participants(
             participants,
             protocol.seed if seed is None else seed,
             lambda done, total: report(done / max(total, 1), f"{done} of {total}"),
+            settings=replace(default_observer(), **goes_wrong),
         )
     return {**asdict(summary), "folder": str(folder), "database": responses.place, "simulated": True}
 
@@ -148,7 +159,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
         f"A sitting takes about {usual} minutes, {longest} where every answer and every film takes its longest."
     )
     lines += [f"To do: {note}" for note in notes]
-    result = {"protocol": checked.name, "library": opened.name, "problems": problems, "notes": notes}
+    result: dict[str, Any] = {"protocol": checked.name, "library": opened.name, "problems": problems, "notes": notes}
     result |= {"minutes": usual, "minutes_at_most": longest} | ({"texts": read} if texts else {})
     emit(result, as_json, "\n".join(lines))
     if problems:
@@ -183,31 +194,40 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
 
 @click.command()
 @click.argument("protocol")
-@click.option("--participants", type=click.IntRange(min=1), required=True, help="How many there should be in the end.")
+@click.option("--participants", type=click.IntRange(min=1), help="How many in the end; the protocol's unless given.")
 @click.option("--seed", type=click.IntRange(min=0), help="Of the observers' chance; the protocol's unless given.")
+@click.option(
+    "--missed", type=SHARE, default=0.005, show_default=True, help="Share of answers missed, slow ones apart."
+)
+@click.option("--badly-shown", type=SHARE, default=0.0, show_default=True, help="Share of showings that stall.")
+@click.option("--careless", type=SHARE, default=0.0, show_default=True, help="Share of participants who do not look.")
 @library_option
 @OUT
 @database_option
 @json_option
 def simulate(
     protocol: str,
-    participants: int,
+    participants: int | None,
     seed: int | None,
     library: str | None,
     out: Path | None,
     database: str | None,
     as_json: bool,
+    **goes_wrong: float,
 ) -> None:
     """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
-    from study.experiment.rendering import MANIFEST, record
+    from study.experiment.rendering import MANIFEST, PROTOCOL, record
 
     checked = load(protocol)
-    folder = results_folder(checked, out)
-    if library is not None or not (folder / MANIFEST).exists():
+    folder, participants = results_folder(checked, out), participants or checked.participants
+    if participants is None:
+        raise click.UsageError("expected --participants, or participants in the protocol, found neither; give one.")
+    known = (folder / MANIFEST).exists() and (folder / PROTOCOL).read_text(encoding="utf-8") == checked.text
+    if library is not None or not known:
         stimuli = prepare_stimuli(checked, library)
         check_database(database, stimuli)
         record(stimuli, folder)
-    summary = simulate_participants(checked, folder, participants, seed, database)
+    summary = simulate_participants(checked, folder, participants, seed, database, **goes_wrong)
     text = (
         f"{summary['folder']}: {summary['participants']} simulated participants, "
         f"{summary['answers']} answers made now, {summary['found']} found"
