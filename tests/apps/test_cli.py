@@ -146,6 +146,31 @@ def test_check_lists_what_can_not_be_shown_and_says_so_by_its_status(
     assert "Did you mean" in printed.out
 
 
+def test_check_tells_the_time_and_what_is_to_be_written(capsys: pytest.CaptureFixture[str]) -> None:
+    found = ask(capsys, "check", "geodesic_vs_fixed", "--texts")
+    assert found["problems"] == []
+    assert 3 <= found["minutes"] <= found["minutes_at_most"] <= 15  # type: ignore[operator]
+    (note,) = found["notes"]  # type: ignore[misc]
+    assert "consent.contact" in note
+    read = {one["where"]: one["text"] for one in found["texts"]}  # type: ignore[attr-defined]
+    assert f"about {found['minutes']} minutes" in read["consent.text"].replace("\n", " ")
+    assert "texts" not in ask(capsys, "check", "geodesic_vs_fixed")
+
+
+def test_simulate_takes_the_number_of_participants_from_the_protocol(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = (ROOT / "protocols" / "demo.toml").read_text(encoding="utf-8")
+    protocol = tmp_path / "small.toml"
+    protocol.write_text(text, encoding="utf-8")
+    assert run(["simulate", str(protocol), "--out", str(tmp_path / "out")]) == 2
+    assert "participants in the protocol, found neither" in capsys.readouterr().err
+    protocol.write_text(text.replace("seed = 7", "seed = 7\nparticipants = 2"), encoding="utf-8")
+    found = ask(capsys, "simulate", protocol, "--out", tmp_path / "out", "--badly-shown", 1.0)
+    assert found["participants"] == 2
+    assert found["answers"] == 2 * 2 * 17  # every trial is shown twice where each showing stalls
+
+
 @pytest.mark.gl
 def test_doctor_s_status_says_that_nothing_can_draw(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
