@@ -56,10 +56,14 @@ def serve(
     behind_proxy: bool,
     root_path: str,
 ) -> None:
-    """Sessions in the browser. What is not rendered yet is rendered first; ends with Ctrl-C, and goes on from there."""
+    """Sessions in the browser. What is not rendered yet is rendered first; ends with Ctrl-C, and goes on from there.
+
+    A results folder that is rendered whole is served as it is, without --library, on any machine.
+    """
     from study.apps.server.hosting import Settings
     from study.apps.server.running import run
     from study.experiment.participants import new_token
+    from study.experiment.rendering import rendered_before
 
     checked = load(protocol)
     folder = results_folder(checked, out)
@@ -75,9 +79,13 @@ def serve(
         completion_url=completion_url,
         parameters=(*Settings.parameters, *parameters),
     )
-    stimuli = prepare_stimuli(checked, library)
-    check_database(database, stimuli)
-    render_stimuli(stimuli, folder, workers)
+    rendered = None if library is not None else rendered_before(checked, folder)
+    if rendered is None:
+        stimuli = prepare_stimuli(checked, library)
+        check_database(database, stimuli)
+        render_stimuli(stimuli, folder, workers)
+    else:
+        check_database(database, rendered)
 
     def started(address: str, place: str) -> None:
         say(f"participants  {address}/")

@@ -149,15 +149,25 @@ def made_from(protocol: Protocol, library: Library) -> str:
     return digest.hexdigest()
 
 
-def rendered_already(protocol: Protocol, library: Library, out: str | Path) -> RenderSummary | None:
-    """What `render` would say where nothing is left to do; None where there is, or something changed since."""
+def rendered_before(protocol: Protocol, out: str | Path) -> Manifest | None:
+    """The manifest of a folder where all stimuli of a protocol are rendered, whatever they were made from; else None.
+
+    Such a folder can be shown where its motions are not, as on another machine.
+    """
     folder = Path(out)
     if not (folder / MANIFEST).exists():
         return None
     manifest = read_manifest(folder)
-    if manifest.made_from != made_from(protocol, library) or not manifest.complete:
+    if manifest.protocol_sha256 != protocol.sha256 or not manifest.complete:
         return None
-    if not all(_is_whole(manifest.video(known.id), manifest.videos[known.id]) for known in manifest.records):
+    whole = all(_is_whole(manifest.video(known.id), manifest.videos[known.id]) for known in manifest.records)
+    return manifest if whole else None
+
+
+def rendered_already(protocol: Protocol, library: Library, out: str | Path) -> RenderSummary | None:
+    """What `render` would say where nothing is left to do; None where there is, or something changed since."""
+    manifest = rendered_before(protocol, out)
+    if manifest is None or manifest.made_from != made_from(protocol, library):
         return None
     frames = sum(known.frames for known in manifest.records)
     count = len(manifest.records)
@@ -217,12 +227,14 @@ def _claim(folder: Path, stimulus_set: StimulusSet) -> None:
             )
     if (folder / MANIFEST).exists():
         known = read_manifest(folder)
-        if known.library != stimulus_set.library:
+        # A library is known by its folder, which may have moved, or be elsewhere on another machine: what counts is
+        # whether the stimuli are the same.
+        changed = {entry.id for entry in known.records} ^ {entry.id for entry in stimulus_set.records}
+        if changed and known.library != stimulus_set.library:
             raise StimulusError(
                 f"{folder}: expected stimuli from the library {stimulus_set.library!r}, found some from "
-                f"{known.library!r}; name another folder."
+                f"{known.library!r}; name that library, or another folder."
             )
-        changed = {entry.id for entry in known.records} ^ {entry.id for entry in stimulus_set.records}
         if changed and (folder / ANSWERS).exists():
             # Plans name stimuli by id: with another manifest the answers would be about nothing.
             raise StimulusError(

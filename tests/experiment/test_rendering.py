@@ -16,7 +16,7 @@ from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
 from study.errors import StimulusError
 from study.experiment.protocol import load_protocol, parse_protocol
-from study.experiment.rendering import read_manifest, record, render, rendered_already, write_whole
+from study.experiment.rendering import read_manifest, record, render, rendered_already, rendered_before, write_whole
 from study.experiment.stimuli import prepare
 
 MOTIONS = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
@@ -219,7 +219,26 @@ def test_a_folder_of_another_protocol_or_library_is_refused(prepared, rendered):
     with pytest.raises(StimulusError, match=r"expected the results of 'toy' with sha256 \w+, found a\s+protocol.toml"):
         render(other, folder)
     with pytest.raises(StimulusError, match="expected stimuli from the library 'mine', found some from 'toy'"):
-        render(replace(prepared, library="mine"), folder)
+        render(replace(prepared, library="mine", stimuli=prepared.stimuli[1:]), folder)
+
+
+def test_a_library_may_be_elsewhere_when_its_motions_are_the_same(prepared, rendered, tmp_path):
+    """On another machine, or under another spelling of the folder."""
+    folder = copied(rendered, tmp_path)
+    summary = render(replace(prepared, library="elsewhere/toy"), folder)
+    assert (summary.rendered, summary.reused) == (0, rendered[1].videos)
+    assert read_manifest(folder).library == "elsewhere/toy"
+
+
+def test_a_folder_that_is_rendered_whole_can_be_shown_without_its_motions(rendered, tmp_path):
+    folder = copied(rendered, tmp_path)
+    protocol = parse_protocol(TOY_PROTOCOL)
+    assert rendered_before(protocol, folder) == read_manifest(folder)
+    assert rendered_before(parse_protocol(TOY_PROTOCOL + "\n# changed\n"), folder) is None
+    assert rendered_before(protocol, tmp_path / "nothing") is None
+    video = next((folder / "stimuli").glob("*.mp4"))
+    video.write_bytes(video.read_bytes()[:-1])
+    assert rendered_before(protocol, folder) is None
 
 
 def test_stimuli_that_were_answered_to_are_not_replaced(prepared, tmp_path):
