@@ -95,7 +95,7 @@ def test_the_marginal_likelihood_is_the_integral() -> None:
             delta = factor * np.where(LEVELS < 0, -slopes["shorter"] * LEVELS, slopes["longer"] * LEVELS)
             criteria = found.criterion * np.exp(found.criterion_spread * nodes)[:, None]
             far = norm.sf(criteria, delta, 2**0.5) + norm.cdf(-criteria, delta, 2**0.5)
-            share = found.lapse / 2 + (1 - found.lapse) * far
+            share = np.clip(found.lapse / 2 + (1 - found.lapse) * far, 1e-12, 1 - 1e-12)
             logs = (different * np.log(share) + (shown - different) * np.log1p(-share)).sum(axis=1)
             mean += weight * float(weights @ np.exp(logs))
         total += np.log(mean)
