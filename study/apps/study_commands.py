@@ -12,6 +12,7 @@ from study.apps.console import database_option, emit, json_option, library_optio
 
 if TYPE_CHECKING:
     from study.experiment.protocol import Protocol
+    from study.experiment.rendering import Manifest
     from study.experiment.stimulus_set import StimulusSet
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
@@ -58,7 +59,7 @@ def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> d
     return {**asdict(summary), "folder": str(folder)}
 
 
-def check_database(database: str | None, stimuli: StimulusSet) -> None:
+def check_database(database: str | None, stimuli: StimulusSet | Manifest) -> None:
     """Refuse a database elsewhere that can't be opened, or is about other stimuli, before anything is rendered."""
     from study.experiment.responses import open_responses, refuse_other_stimuli
 
@@ -247,12 +248,13 @@ def analyse(results: Path, database: str | None, as_json: bool) -> None:
 
 @click.command()
 @click.argument("results", type=RESULTS)
+@database_option
 @json_option
-def report(results: Path, as_json: bool) -> None:
+def report(results: Path, database: str | None, as_json: bool) -> None:
     """One self-contained HTML page, and its tables as CSV and JSON."""
     from study.report.document import write_report
 
-    page = write_report(results)
+    page = write_report(results, database=database)
     emit({"report": str(page)}, as_json, str(page))
 
 

@@ -55,6 +55,8 @@ def test_verbs_say_the_same_of_answers_in_either_database(ask, protocol, tmp_pat
         lines = Path(ask("export", folder, *more)["file"]).read_text(encoding="utf-8").splitlines()
         tables.append([line.split(",")[columns] for line in lines])
     assert tables[0] == tables[1]
+    pages = [ask("report", here)["report"], ask("report", there, *elsewhere)["report"]]
+    assert all("3 simulated observers" in Path(page).read_text(encoding="utf-8") for page in pages)
     for file in there.rglob("*"):
         assert file.is_dir() or b"wombat" not in file.read_bytes(), file
 
