@@ -11,7 +11,7 @@ sleeps until something happens, so a key is timed when it arrives, not at the ne
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from renderer.events import Focus, Resized
@@ -21,7 +21,7 @@ from study.apps.player.desk import Desk, Stopped
 from study.apps.player.display import Display
 from study.apps.player.pages import Look
 from study.apps.player.sheet import draw_page
-from study.apps.player.showing import Showing, frame_at
+from study.apps.player.showing import Showing, find_rate, frame_at
 from study.apps.player.store import Store
 from study.experiment import session as sitting
 from study.experiment.responses import Presentation
@@ -87,12 +87,17 @@ class _Player(Desk):
         super().__init__(window, session, store, look)
         self._stimulus, self._fill, self._say = stimulus, fill, say
         self._drawings: dict[str, Any] = {}
+        self._rate = find_rate(self.protocol.fps, window.pacing.refresh_hz)
         self._answers = self._dropped = self._faulty = 0
 
     def run(self) -> Outcome:
         """Step after step."""
+        rate = self._rate
+        if not rate.even:
+            flips = f"{rate.shortest_flips} or {rate.longest_flips} flips of {self.window.pacing.refresh_hz:.4g} Hz"
+            self._say(f"frames of {rate.fps:g} a second stand for {flips}: not all equally long")
         self._check_pages()
-        self.store.event("display", self.window.describe())
+        self.store.event("display", {**self.window.describe(), **asdict(rate)})
         end = "finished"
         try:
             if not any(step.kind == "consent" for step in self.session.steps):
@@ -200,7 +205,7 @@ class _Player(Desk):
     def _show(self, identifier: str) -> Showing | None:
         """Play a stimulus to its end; None where the participant interrupted it and stays."""
         window, drawing = self.window, self._drawing(identifier)
-        fps, period_s = self.protocol.fps, window.pacing.period_s
+        fps, period_s = self._rate.fps, window.pacing.period_s
         frames: list[int] = []
         flips: list[float] = []
         wrong: list[str] = []

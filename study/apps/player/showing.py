@@ -6,19 +6,69 @@ holds each frame for two flips, on one of 144 Hz for four or five. So the frame 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
+
+from study.errors import SessionError
 
 LONGEST_GAP_FRAMES = 1.5
 """A frame that stood longer than this is a fault in the presentation: the trial is shown again."""
 
 _JITTER_FLIPS = 0.25
+_SAME_RATE = 0.01
+"""How far rates may differ that count as the same: nobody sees a motion that is one in a hundred faster."""
 
 
 def frame_at(flip_s: float, onset_s: float, fps: float, period_s: float) -> int:
     """The frame that a flip at `flip_s` shall show; half a flip early counts as due, so that jitter moves nothing."""
     return int((flip_s - onset_s + 0.5 * period_s) * fps)
+
+
+@dataclass(frozen=True)
+class Rate:
+    """How a display of one rate shows motions of another; made by `find_rate`.
+
+    Parameters
+    ----------
+    fps
+        Frames per second as they are shown: the study's, or the display's divided by a whole number where that is
+        nearly the same (29.97 for 30 on 59.94 Hz), so that every frame stands equally long.
+    shortest_flips, longest_flips
+        For how many flips of the display a frame stands.
+    """
+
+    fps: float
+    shortest_flips: int
+    longest_flips: int
+
+    @property
+    def even(self) -> bool:
+        """Whether all frames stand equally long."""
+        return self.shortest_flips == self.longest_flips
+
+
+def find_rate(fps: float, refresh_hz: float) -> Rate:
+    """How motions of `fps` frames a second are shown at `refresh_hz`.
+
+    Raises
+    ------
+    SessionError
+        For a display that is slower than the motions, and for one on which some frames would stand for more than 1.5
+        of theirs: one flip and two in turn jerk.
+    """
+    flips = refresh_hz / fps
+    whole = round(flips)
+    if whole >= 1 and abs(flips / whole - 1.0) < _SAME_RATE:
+        return Rate(refresh_hz / whole, whole, whole)
+    shortest, longest = math.floor(flips), math.ceil(flips)
+    if shortest == 0 or longest > LONGEST_GAP_FRAMES * flips:
+        raise SessionError(
+            f"Expected a display that shows {fps:g} frames a second evenly, found one of {refresh_hz:.4g} Hz; set it "
+            f"to a multiple of {fps:g} Hz, or to at least {2 * fps:g} Hz."
+        )
+    return Rate(fps, shortest, longest)
 
 
 @dataclass(frozen=True)

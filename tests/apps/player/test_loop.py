@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from study.apps.player.lettering import default_font
 from study.apps.player.loop import Outcome, play
 from study.apps.player.pages import Look
 from study.apps.player.scripted import Act, ScriptedWindow, click, press
+from study.errors import SessionError
 from study.experiment.session import open_session
 
 LOOK = Look((222, 223, 225), (default_font(),))
@@ -63,6 +65,41 @@ def test_stimuli_of_30_fps_hold_each_frame_for_two_flips_and_gaps_last_as_writte
     assert after[0] == "frame"
     assert after[2] - gap[2] == pytest.approx(0.1)
     assert window.shown[start + 2 * first + 1 + 2 * second][0] == "page"
+
+
+@pytest.mark.parametrize(("hz", "holds"), [(144.0, {4, 5}), (59.94, {2}), (120.0, {4}), (75.0, {2, 3})])
+def test_sessions_on_other_displays_are_shown_well(make_small: Any, store: Any, hz: float, holds: set[int]) -> None:
+    window = ScriptedWindow(whole([press("s")] * 6), refresh_hz=hz)
+    assert sit(make_small(), window, store) == Outcome("finished", 6, 0, 0)
+    counts: dict[Any, int] = {}
+    stimulus = 0
+    for kind, thing, _ in window.shown:
+        stimulus += kind != "frame"
+        if kind == "frame":
+            counts[stimulus, thing[1]] = counts.get((stimulus, thing[1]), 0) + 1
+    last = {number: max(frame for n, frame in counts if n == number) for number, _ in counts}
+    assert {count for (number, frame), count in counts.items() if 0 < frame < last[number]} == holds
+    display = store.all("display")[0]
+    assert (display["shortest_flips"], display["longest_flips"]) == (min(holds), max(holds))
+    assert display["fps"] == pytest.approx(30, rel=0.002)
+    assert all(one.shown_well for one in store.all("shown"))
+
+
+def test_stimuli_of_60_fps_change_with_every_flip_of_60_hz(make_small: Any, store: Any) -> None:
+    small = make_small("", ("fps = 30", "fps = 60"))
+    window = ScriptedWindow(whole([press("s")] * 6))
+    assert sit(small, window, store) == Outcome("finished", 6, 0, 0)
+    frames = [thing[1] for kind, thing, _ in window.shown if kind == "frame"]
+    assert all(b == a + 1 or b == 0 for a, b in pairwise(frames))
+
+
+def test_a_display_that_is_too_slow_is_refused_before_anything_is_shown(make_small: Any, store: Any) -> None:
+    small = make_small("", ("fps = 30", "fps = 60"))
+    window = ScriptedWindow(refresh_hz=50.0)
+    with pytest.raises(SessionError, match="Expected a display that shows 60 frames a second evenly"):
+        sit(small, window, store)
+    assert not window.shown
+    assert not store.log
 
 
 def test_no_answer_within_the_window_is_missed(make_small: Any, store: Any) -> None:

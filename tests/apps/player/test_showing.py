@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from study.apps.player.showing import Showing, frame_at
+from study.apps.player.showing import Rate, Showing, find_rate, frame_at
+from study.errors import SessionError
 
 
 def run(fps: float, hz: float, frames: int, jitter: float = 0.0) -> list[int]:
     """The frames shown by flips at every beat, each early or late by `jitter` of a period in turn."""
     shown = []
-    for flip in range(10_000):
+    for flip in range(40_000):
         at = flip / hz + (jitter / hz * (-1) ** flip if flip else 0.0)
         frame = frame_at(at, 0.0, fps, 1 / hz)
         if frame >= frames:
@@ -30,6 +31,60 @@ def test_a_rate_that_does_not_divide_holds_frames_for_two_or_three_flips() -> No
     assert sorted(set(shown)) == list(range(24))
     assert {shown.count(frame) for frame in range(1, 24)} == {2, 3}
     assert len(shown) == 60  # one second
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.4, -0.4])
+@pytest.mark.parametrize(
+    ("fps", "hz", "holds"),
+    [(30, 59.94, 2), (30, 60.3, 2), (60, 59.94, 1), (25, 49.8, 2), (120, 240, 2), (30, 119.88, 4), (24, 120, 5)],
+)
+def test_rates_that_nearly_divide_are_made_to_divide(fps: float, hz: float, holds: int, jitter: float) -> None:
+    """A minute of motion: not one frame stands for longer or shorter."""
+    rate = find_rate(fps, hz)
+    assert rate == Rate(pytest.approx(hz / holds), holds, holds)
+    assert rate.fps == pytest.approx(fps, rel=0.01)
+    shown = run(rate.fps, hz, int(60 * fps), jitter)
+    assert shown == [frame for frame in range(int(60 * fps)) for _ in range(holds)]
+
+
+@pytest.mark.parametrize(
+    ("fps", "hz", "holds"),
+    [(30, 144, {4, 5}), (60, 144, {2, 3}), (24, 60, {2, 3}), (30, 75, {2, 3}), (30, 165, {5, 6})],
+)
+def test_rates_that_do_not_divide_keep_the_time(fps: float, hz: float, holds: set[int]) -> None:
+    rate = find_rate(fps, hz)
+    assert rate == Rate(fps, min(holds), max(holds))
+    assert not rate.even
+    frames = int(3 * fps)
+    shown = run(rate.fps, hz, frames)
+    assert sorted(set(shown)) == list(range(frames))
+    assert {shown.count(frame) for frame in range(1, frames - 1)} == holds
+    assert len(shown) / hz == pytest.approx(3.0, abs=1.5 / hz)
+
+
+@pytest.mark.parametrize(("fps", "hz"), [(60, 30), (60, 50), (55, 60), (120, 60), (60, 75), (50, 60)])
+def test_displays_that_cannot_show_a_motion_evenly_are_refused(fps: float, hz: float) -> None:
+    with pytest.raises(SessionError, match=rf"shows {fps} frames a second evenly, found one of {hz} Hz; set it to a"):
+        find_rate(fps, hz)
+
+
+def test_what_is_not_refused_is_not_flagged_either() -> None:
+    """On every display, a stimulus whose flips all came in time is shown well."""
+    tried = 0
+    for hz in (50, 59.94, 60, 72, 75, 90, 100, 120, 144, 165, 240, 360):
+        for fps in (24, 25, 30, 48, 50, 60, 72, 90, 100, 120):
+            try:
+                rate = find_rate(fps, hz)
+            except SessionError:
+                continue
+            frames = run(rate.fps, hz, 2 * fps)
+            flips = tuple(i / hz for i in range(len(frames)))
+            one = Showing("s", rate.fps, 1 / hz, tuple(frames), flips, 2 * fps, len(frames) / hz)
+            assert one.shown_well, (hz, fps, one.longest_gap_frames)
+            assert one.dropped_flips == 0
+            assert one.longest_gap_frames <= 1.5 + 1e-6
+            tried += 1
+    assert tried > 60
 
 
 def test_a_display_slower_than_the_motion_skips_frames() -> None:
