@@ -183,6 +183,25 @@ class Person:
         return view
 
 
+class Serving:
+    """A server in this process, without sockets; `person()` is a participant with own cookies."""
+
+    def __init__(self, manifest: Manifest, responses: Responses, root_path: str = "", **settings: Any) -> None:
+        self.host = make_host(manifest, responses, **settings)
+        self.root_path = root_path
+        self.client = TestClient(make_app(self.host), root_path=root_path)
+        self.client.__enter__()
+
+    def person(self, page: str = "page-one") -> Person:
+        fresh = TestClient(self.client.app, root_path=self.root_path)
+        fresh.portal = self.client.portal
+        return Person(fresh, page)
+
+    def ask(self, path: str, token: str = TOKEN) -> Any:
+        """As the researcher."""
+        return self.client.get(f"/api/researcher/{path}", headers={"authorization": f"Bearer {token}"})
+
+
 def answer_to(view: dict[str, Any], value: str | None = "", **more: Any) -> dict[str, Any]:
     """A message that answers a trial's view; the first legal answer unless given."""
     return {

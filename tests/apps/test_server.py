@@ -4,49 +4,13 @@ from __future__ import annotations
 
 import json
 
-import pytest
 import sqlalchemy as sa
-from serving import PROTOCOL, QUESTIONS, Person, answer_to, make_host, protocol_of, unfilmed
-from starlette.testclient import TestClient
+from serving import PROTOCOL, QUESTIONS, answer_to, protocol_of
 
-from study.apps.server.web import make_app
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
 from study.experiment.response_tables import events, presentations
 from study.experiment.responses import answers_frame, open_responses, session_table, stored_form
-
-
-@pytest.fixture(scope="module")
-def stimuli(tmp_path_factory):
-    return unfilmed(tmp_path_factory.mktemp("served"))
-
-
-@pytest.fixture
-def responses(tmp_path):
-    with open_responses(tmp_path) as opened:
-        yield opened
-
-
-@pytest.fixture
-def serve(stimuli, responses):
-    """`serve(**settings)`: a new server on the same database; `serve.person()` is a participant with own cookies."""
-    open_clients = []
-
-    class Serving:
-        def __init__(self, **settings):
-            self.host = make_host(stimuli, responses, **settings)
-            self.client = TestClient(make_app(self.host), raise_server_exceptions=True)
-            self.client.__enter__()
-            open_clients.append(self.client)
-
-        def person(self, page="page-one"):
-            fresh = TestClient(self.client.app)
-            fresh.portal = self.client.portal
-            return Person(fresh, page)
-
-    yield Serving
-    for client in open_clients:
-        client.__exit__(None, None, None)
 
 
 def happenings(responses, kind):

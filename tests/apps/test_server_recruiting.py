@@ -7,44 +7,17 @@ import io
 from datetime import timedelta
 
 import pytest
-from serving import TOKEN, Person, answer_to, make_host, unfilmed
+from serving import TOKEN, Person, answer_to, make_host
 from starlette.testclient import TestClient
 
 from study.apps.server.web import make_app
 from study.experiment.responses import answers_frame, open_responses, session_table
 
 
-@pytest.fixture(scope="module")
-def stimuli(tmp_path_factory):
-    return unfilmed(tmp_path_factory.mktemp("served"))
-
-
 @pytest.fixture
 def responses(database):
     with open_responses(database) as opened:
         yield opened
-
-
-@pytest.fixture
-def serve(stimuli, responses):
-    clients = []
-
-    class Serving:
-        def __init__(self, **settings):
-            self.client = TestClient(make_app(make_host(stimuli, responses, **settings)))
-            clients.append(self.client.__enter__())
-
-        def person(self):
-            fresh = TestClient(self.client.app)
-            fresh.portal = self.client.portal
-            return Person(fresh)
-
-        def ask(self, path, token=TOKEN):
-            return self.client.get(f"/api/researcher/{path}", headers={"authorization": f"Bearer {token}"})
-
-    yield Serving
-    for client in clients:
-        client.__exit__(None, None, None)
 
 
 LINK = {"PROLIFIC_PID": "5f1", "STUDY_ID": "s", "SESSION_ID": "9a8", "wave": "2", "unknown": "x"}
