@@ -187,6 +187,10 @@ class Texts(Part):
     no_touch: str = Field(
         default="Please take part on a computer with a keyboard.", description="On tablets where they are not allowed."
     )
+    no_script: str = Field(
+        default="This study needs JavaScript. Please switch it on and open the link again.",
+        description="Where the browser runs no JavaScript.",
+    )
     no_film: str = Field(
         default="This browser can't play the films. Please use a current Chrome, Edge, Firefox or Safari.",
         description="Where the browser can't play the stimuli at all.",

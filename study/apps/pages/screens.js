@@ -38,6 +38,11 @@ function field(spec) {
   return element("input", { ...shared, type: "text", maxlength: "1000" });
 }
 
+// What a number may be, as the window says it too.
+function range({ least, most }) {
+  return least === null && most === null ? "" : `${least ?? ""} – ${most ?? ""}`.trim();
+}
+
 export function form(view, study) {
   return new Promise((resolve) => {
     const inputs = view.fields.map((spec) => [spec, field(spec)]);
@@ -49,10 +54,11 @@ export function form(view, study) {
     }
     const check = () => {
       let first = null;
-      for (const [, input] of inputs) {
+      for (const [spec, input] of inputs) {
         const wrong = grid.querySelector(`#${CSS.escape(input.getAttribute("aria-describedby"))}`);
         wrong.hidden = input.validity.valid;
-        wrong.textContent = input.validity.valid ? "" : input.validationMessage;
+        // In the words of the protocol: the browser's own are in the browser's language.
+        wrong.textContent = input.validity.valid ? "" : [study.texts.not_taken, range(spec)].filter(Boolean).join(" ");
         input.setAttribute("aria-invalid", String(!input.validity.valid));
         if (!input.validity.valid) first ??= input;
       }
