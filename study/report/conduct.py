@@ -38,7 +38,7 @@ def presentation_table(presentations: pd.DataFrame) -> tables.Table:
         )
     return tables.make(
         "presentation",
-        "How stimuli were shown: presentations by what timed them; how many were faulty (a gap of more than "
+        "How stimuli were shown. Presentations by what timed them; how many were faulty (a gap of more than "
         f"{LONGEST_GAP_FRAMES:g} frames, a frame missing, or hidden) and how many showed a trial again; frames that "
         "were "
         "not seen; and the longest time between two frames, in frames (1 is perfect).",
@@ -87,9 +87,8 @@ def checks_sentence(checks: pd.DataFrame) -> str:
         return ""
     passed = int((checks["answer"].notna() & (checks["answer"] == checks["expected"])).sum())
     people = checks["participant"].nunique()
-    return (
-        f"{passed} of {words.number(len(checks), 'attention check')} by {words.number(people, 'participant')} passed."
-    )
+    asked = words.number(len(checks), "attention check")
+    return f"{passed} of {asked} by {words.number(people, 'participant')} were passed."
 
 
 def exclusion_sentence(analysis: Result) -> str:

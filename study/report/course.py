@@ -21,7 +21,7 @@ def learning_table(answers: pd.DataFrame) -> tables.Table:
     rows = [row for (study, task), part in _studies(answers) for row in _course(str(study), str(task), part)]
     return tables.make(
         "learning",
-        "Over the course of each study, in sixths of its trials: right answers (same-different) or answers for the one "
+        "Over the course of each study. By sixths of its trials: right answers (same-different) or answers for the one "
         "shown first (preference), means over participants with standard errors.",
         "study part what percent standard_error:one answers",
         rows,
@@ -64,7 +64,7 @@ def learning_figure(table: tables.Table, name: str, mark: str) -> str | None:
     if not table.rows:
         return None
     studies = list(dict.fromkeys(str(row["study"]) for row in table.rows))
-    columns = min(len(studies), 4)
+    columns = 4  # also for fewer: panels keep their size
     lines = -(-len(studies) // columns)
     with style():
         figure, grid = new_figure(7.2, 2.0 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)

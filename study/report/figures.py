@@ -290,6 +290,7 @@ def ratings_figure(rows: Sequence[Result], name: str, mark: str, points: int) ->
         axes.spines["left"].set_visible(False)
         quiet_grid(axes, "x")
         axes.set_xlim(-0.1, points - 0.9)
+        axes.set_xticks(range(points))
         axes.set_xlabel("mean rating")
         add_mark(figure, mark)
         spoken = "; ".join(f"{label}: {row['mean']:.2f}" for label, row in zip(labels, rows, strict=True))
@@ -301,7 +302,7 @@ def cells_figure(cells: Sequence[Result], name: str, mark: str, points: int) -> 
     items = list(dict.fromkeys(row["item"] for row in cells))
     methods = list(dict.fromkeys(row["method"] for row in cells))
     orders = list(dict.fromkeys(row["order"] for row in cells))
-    columns = min(len(items), 3)
+    columns = 3  # also for fewer: panels keep their size
     lines = -(-len(items) // columns)
     with style():
         figure, grid = new_figure(7.2, 2.3 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)
@@ -313,6 +314,7 @@ def cells_figure(cells: Sequence[Result], name: str, mark: str, points: int) -> 
             axes.set_xticks(range(len(methods)), [_readable(method) for method in methods])
             axes.set_xlim(-0.4, len(methods) - 0.3)
             axes.set_ylim(-0.1, points - 0.9)
+            axes.set_yticks(range(points))
             quiet_grid(axes)
         for axes in grid.flat[len(items) :]:
             axes.set_axis_off()

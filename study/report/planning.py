@@ -72,7 +72,7 @@ def power_table(found: Sequence[Result]) -> tables.Table:
     ]
     return tables.make(
         "power",
-        "Power: the share of simulated studies, through the real plan and the real analysis, that found what is there, "
+        "Power. The share of simulated studies, through the real plan and the real analysis, that found what is there, "
         "with Wilson’s 95% interval.",
         "study participants studies power low high",
         rows,

@@ -138,8 +138,8 @@ def _no_preference(found: Result) -> list[str]:
     if found["equivalence_p_value"] is None:
         return []
     text = (
-        f"Evidence for no preference: that the share lies within {_margin(found)} has "
-        f"{words.p(found['equivalence_p_value'])} (two one-sided tests over participants)"
+        f"Evidence for no preference: two one-sided tests over participants for a share within {_margin(found)} give "
+        f"{words.p(found['equivalence_p_value'])}"
     )
     factor = found["bayes_factor_null"]
     if factor is None:
@@ -236,7 +236,7 @@ def motion_table(name: str, comparison: Result) -> Table:
     rows = [{**row, "motion": words.readable(row["motion"])} for row in comparison["motions"]]
     return tables.make(
         f"{name}_preference_by_motion",
-        "For every motion pair: Wilson’s 95% interval, chi-square(1) as published, exact binomial test, and the "
+        "Every motion pair. Wilson’s 95% interval, chi-square(1) as published, exact binomial test, and the "
         "latter adjusted over the motions by Holm’s method.",
         "motion favouring answers percent low:one high:one chi_square p_value exact_p_value holm_p_value",
         rows,
@@ -258,7 +258,7 @@ def order_table(name: str, comparison: Result) -> Table:
             rows.append({"reading": reading, "order_logit": found["order_logit"], "p_value": found["order_p_value"]})
     return tables.make(
         f"{name}_order",
-        "How far the order of presentation decided: percentages of answers, with Student’s t over participants; and "
+        "How far the order of presentation decided. Percentages of answers, with Student’s t over participants; and "
         "what being shown first adds in the models, in logits.",
         "reading percent order_logit p_value",
         rows,
@@ -272,7 +272,7 @@ def no_preference_table(name: str, comparison: Result) -> Table:
     row = {"margin": _margin(found), "percent": comparison["participants"]["mean_percent"], **ends}
     return tables.make(
         f"{name}_no_preference",
-        "Evidence for no preference: two one-sided t tests over participants (Schuirmann) that the share lies within "
+        "Evidence for no preference. Two one-sided t tests over participants (Schuirmann) that the share lies within "
         f"{_margin(found)}, whose 90% interval then lies in it; and how many times likelier the data are without a "
         "preference than with one (Bayes factor of Rouder et al. 2009, Cauchy prior of 0.71).",
         "margin percent low:one high:one equivalence_p_value bayes_factor_null",
@@ -308,7 +308,7 @@ def confirmatory_table(tests: Sequence[Result]) -> Table | None:
     ]
     return tables.make(
         "confirmatory",
-        f"The confirmatory family: the default test of {words.number(len(rows), 'comparison')}, p-values adjusted "
+        f"The confirmatory family. The default test of {words.number(len(rows), 'comparison')}, p-values adjusted "
         "together by Holm’s method, so that the chance of any false finding among them stays at the level of "
         "significance.",
         "study comparison test p_value holm_p_value",

@@ -234,7 +234,7 @@ def _mixed_note(mixed: Result) -> str:
     """How people differ, by the mixed model."""
     text = (
         "By the mixed model, participants’ logarithms of sensitivity and criterion have standard deviations of "
-        f"{mixed['sensitivity_spread']:.2f} and {mixed['criterion_spread']:.2f}; that they are alike has "
+        f"{mixed['sensitivity_spread']:.2f} and {mixed['criterion_spread']:.2f}; the test that they are alike gives "
         f"{words.p(mixed['alike_p_value'])} (likelihood ratio)."
     )
     return f"{text} Caution: {mixed['note']}." if mixed["note"] else text
@@ -377,7 +377,7 @@ def d_prime_table(name: str, result: Result) -> Table:
     """Return sensitivity at every level."""
     return tables.make(
         f"{name}_d_prime",
-        "Sensitivity at every level under the differencing rule, against the pairs without a difference. Answers "
+        "Sensitivity at every level. Under the differencing rule, against the pairs without a difference; answers "
         "pooled, taken as independent; one half added to each count.",
         "difference_frames d_prime standard_error low high criterion",
         result["d_prime"],
