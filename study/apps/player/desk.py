@@ -75,9 +75,11 @@ class Desk:
             left = None if deadline_s is None else deadline_s - self.window.now()
             if left is not None and left <= 0:
                 return None, self.window.now()
-            for event in self.window.wait(left):
+            events = self.window.wait(left)
+            for number, event in enumerate(events):
                 button = chosen(drawn, event)
                 if button is not None and (deadline_s is None or event.time_s <= deadline_s):
+                    self.notice(events[number + 1 :])  # a second key counts for nothing; a lost focus is logged
                     return button, event.time_s
                 if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:
                     drawn, _ = self.show_page(turned)

@@ -208,7 +208,7 @@ class _Player(Desk):
         fps, period_s = self._rate.fps, window.pacing.period_s
         frames: list[int] = []
         flips: list[float] = []
-        wrong: list[str] = []
+        wrong = [] if window.focused else ["focus lost"]
         window.cursor(False)
         with calm():
             while True:

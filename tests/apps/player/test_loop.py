@@ -163,6 +163,30 @@ def test_a_window_left_or_resized_in_mid_stimulus_flags_the_trial(make_small: An
         assert store.all("focus")[0] == {"focused": False, "trial": 1, "step": "first"}
 
 
+def test_a_film_that_begins_while_the_window_is_away_is_flagged_too(make_small: Any, store: Any) -> None:
+    small = make_small()
+    flips = first_frame_flips(small)
+    window = ScriptedWindow(whole([press("s")] * 7), at_flip={flips[5]: Focus(False, 0.0)})
+    original = window.flip
+
+    def flip() -> float:
+        at = original()
+        window.focused = not flips[5] < len(window.shown) < flips[-1] + 20  # comes back in the second film
+        return at
+
+    window.flip = flip  # type: ignore[method-assign]
+    sit(small, window, store)
+    assert [one.shown_well for one in store.all("shown")[:4]] == [False, False, True, True]
+
+
+def test_what_comes_with_an_answer_is_logged_all_the_same(make_small: Any, store: Any) -> None:
+    both = Act((Key("s", 0.3), Key("d", 0.3), Focus(False, 0.3)))
+    window = ScriptedWindow(whole([both, *[press("d")] * 6]))
+    sit(make_small(), window, store)
+    assert store.all("answer")[0].value == "same"
+    assert store.all("focus") == [{"focused": False, "trial": 1, "step": "answer"}]
+
+
 @pytest.mark.parametrize("event", [Key("escape", 0.0), CloseAsked(0.0)], ids=["escape", "close"])
 def test_going_on_after_escape_shows_the_trial_from_its_start(make_small: Any, store: Any, event: Any) -> None:
     small = make_small()
