@@ -90,7 +90,7 @@ def postgres_server() -> Iterator[PostgresServer]:
     try:
         import psycopg  # noqa: F401
     except ImportError:
-        unavailable("psycopg", "install it: pip install 'segue[postgres]'")
+        unavailable("psycopg", "install it: pip install 'psycopg[binary]'")
     server = PostgresServer(binaries)
     yield server
     server.remove()

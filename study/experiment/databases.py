@@ -63,7 +63,7 @@ def open_engine(url_or_path: str | Path) -> sa.Engine:
     except ImportError as error:
         raise SessionError(
             f"{shown(url)}: expected the Python package psycopg, which connects to PostgreSQL, found none that works "
-            f"({error}); install it: pip install 'segue[postgres]', or pip install 'psycopg[binary]'."
+            f"({error}); install it: pip install 'psycopg[binary]'."
         ) from error
     sa.event.listen(engine, "connect", _set_up_postgresql)
     return engine

@@ -13,9 +13,10 @@ from postgres_server import PASSWORD, ROLE, without_password
 
 from study.errors import SessionError
 from study.experiment import databases, response_tables
+from study.experiment import participants as people
 from study.experiment.plan import draw_plan
 from study.experiment.response_migrations import MIGRATIONS
-from study.experiment.responses import begin_session, open_responses, record_answer, stored_answers
+from study.experiment.responses import begin_session, find_session, open_responses, record_answer, stored_answers
 from study.experiment.session import Answer
 
 ANSWER = Answer(1, "", 1, "same", 1.0)
@@ -165,6 +166,36 @@ def test_a_role_that_may_not_make_tables_is_told_so(postgres_server):
     assert "make the user of the URL the owner of the database" in said
 
 
+def test_a_role_that_owns_nothing_runs_sessions_and_cannot_take_the_guard_away(
+    postgres_server, postgres_url, toy_protocol, plan
+):
+    """As `docs/serving.md` says: the owner makes the tables, another role writes to them."""
+    open_responses(postgres_url).close()
+    postgres_server.administer("DROP ROLE IF EXISTS writer; CREATE ROLE writer LOGIN PASSWORD 'w'")
+    rights = (
+        "GRANT SELECT, INSERT, DELETE ON ALL TABLES IN SCHEMA public TO writer",
+        "GRANT UPDATE ON participants TO writer",
+        "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO writer",
+    )
+    owner = sa.create_engine(postgres_url)
+    with owner.begin() as connection:
+        for right in rights:
+            connection.execute(sa.text(right))
+    owner.dispose()
+    as_writer = sa.make_url(postgres_url).set(username="writer", password="w").render_as_string(hide_password=False)
+    with open_responses(as_writer) as responses:
+        newcomer = people.Newcomer("p01", "token")
+        people.admit(responses, toy_protocol, newcomer, people.Places(), lambda _: plan)
+        record = find_session(responses, "p01")
+        record_answer(responses, record, ANSWER)
+        people.seen(responses, [record.id])
+        for statement in ("ALTER TABLE answers DISABLE TRIGGER ALL", "DROP FUNCTION segue_append_only() CASCADE"):
+            with pytest.raises(sa.exc.ProgrammingError, match="must be owner"), responses.engine.begin() as connection:
+                connection.execute(sa.text(statement))
+        people.erase(responses, record.id)
+        assert find_session(responses, "p01") is None
+
+
 def test_a_password_is_hidden_wherever_it_stands(postgres_server, postgres_url):
     in_query = sa.make_url(without_password(postgres_url)).update_query_dict({"password": PASSWORD})
     with open_responses(in_query.render_as_string(hide_password=False)) as responses:
@@ -194,7 +225,7 @@ def test_without_psycopg_it_is_said_how_to_install_it(monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", without)
     said = refusal("postgresql+psycopg://u:secret@127.0.0.1/d")
-    assert "pip install 'segue[postgres]'" in said
+    assert "pip install 'psycopg[binary]'" in said
     assert "secret" not in said
 
 
