@@ -1,11 +1,14 @@
-"""Agresti 2013, Categorical Data Analysis, section 11.6: Bradley-Terry with a home advantage, baseball 1987.
+"""Agresti, Categorical Data Analysis (2nd edition 2002, section 10.6; 3rd 2013, 11.6): baseball 1987, home advantage.
 
-Table 11.10: wins of the home team over the visitors, American League East. Printed: home advantage 0.302, standard
-error 0.131; strengths beside Baltimore from 1.62 (Milwaukee) to 0.70 (Cleveland).
+Wins of the home team over the visitors, American League East. The 42 records agree with the data set `baseball` of the
+R package BradleyTerry2, whose documentation gives page 438 of the second edition as their source, and whose tests hold
+columns 3 and 5 of its Table 10.11: strengths without the home advantage, and shares with it. The standard error of the
+home advantage, 0.131, and the strengths 1.62 and 0.70 are the book's as far as they were remembered.
 """
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from study.analysis.bradley_terry import BradleyTerry, fit_bradley_terry
@@ -53,8 +56,19 @@ def test_home_advantage_and_strengths() -> None:
     assert found.strengths[0].method == "Milwaukee"
 
 
+def test_table_10_11_column_5() -> None:
+    """Strengths with the home advantage, as shares that sum to one."""
+    found = fit_bradley_terry(*games(), reference="Baltimore")
+    assert isinstance(found, BradleyTerry)
+    worth = np.exp([row.value for row in reversed(found.strengths)])
+    assert np.round(worth / worth.sum(), 3) == pytest.approx([0.044, 0.088, 0.137, 0.157, 0.164, 0.190, 0.220])
+
+
 def test_without_the_order_the_home_advantage_is_gone() -> None:
     found = fit_bradley_terry(*games(), with_order=False, reference="Baltimore")
     assert isinstance(found, BradleyTerry)
     assert found.order is None
-    assert {row.method: row.value for row in found.strengths}["Milwaukee"] == pytest.approx(1.58, abs=0.01)
+    # Table 10.11, column 3; the text says that standard errors are about 0.3.
+    others = [row for row in reversed(found.strengths) if row.method != "Baltimore"]
+    assert [round(row.value or 0.0, 2) for row in others] == [0.68, 1.11, 1.25, 1.29, 1.44, 1.58]
+    assert all(round(row.standard_error or 0.0, 1) == 0.3 for row in others)

@@ -1,8 +1,9 @@
 """Hecht, Shlaer & Pirenne 1942, "Energy, quanta, and vision", J. Gen. Physiol. 25: frequency of seeing.
 
-Table V: percent of flashes seen at each number of quanta at the cornea, by three observers. Their Figure 7 lays
-Poisson distributions through them: observers see where at least 6 (SH), 7 (SS) and 5 (MHP) quanta are absorbed. Their
-abstract puts the threshold, 60% seen, at 54 to 148 quanta.
+Table V: percent of flashes seen at each number of quanta at the cornea, by three observers, two of them twice. The
+values and the numbers of flashes agree with the data set `HSP` of the R package MPDiR (Knoblauch & Maloney 2012), which
+gives Table V as its source. Their Figure 7 lays Poisson distributions through the first runs: observers see where at
+least 6 (SH), 7 (SS) and 5 (MHP) quanta are absorbed. Their abstract puts the threshold, 60% seen, at 54 to 148 quanta.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ from scipy.stats import gamma
 
 from study.analysis.psychometric import PsychometricFit, fit_psychometric, make_model, threshold_at
 
-# Quanta, percent seen, number of flashes at each; 50 stand for SS and MHP, about 35 for SH.
+# Quanta, percent seen, number of flashes at each, quanta of the Poisson curve.
 SEEN = {
     "SH": ([46.9, 73.1, 113.8, 177.4, 276.1, 421.7], [0.0, 9.4, 33.3, 73.5, 100.0, 100.0], 35, 6),
     "SS": ([24.1, 37.6, 58.6, 91.0, 141.9, 221.3], [0.0, 4.0, 18.0, 54.0, 94.0, 100.0], 50, 7),
     "MHP": ([37.6, 58.6, 91.0, 141.9, 221.3, 342.8], [6.0, 6.0, 24.0, 66.0, 88.0, 100.0], 50, 5),
+    "SH again": ([37.1, 58.5, 92.9, 148.6, 239.3, 386.4], [0.0, 7.5, 40.0, 80.0, 97.5, 100.0], 40, 6),
+    "SS again": ([23.5, 37.1, 58.5, 92.9, 148.6, 239.3], [0.0, 0.0, 12.0, 44.0, 94.0, 100.0], 50, 7),
 }
 
 
