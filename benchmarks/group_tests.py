@@ -1,0 +1,210 @@
+"""How far tests of groups can be trusted: simulated studies, with and without an effect, through the real analysis.
+
+Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of preference, motions,
+models, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code that the
+analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+from scipy.special import expit, ndtr
+
+from study.analysis.group_models import preference_models, psychometric_mixed
+from study.analysis.no_effect import no_preference
+from study.analysis.preference import published_test
+from study.analysis.preference_tests import motions_as_sample, participant_tests
+from study.analysis.rating_comparisons import rating_anova
+
+CORRELATIONS = (0.0, 0.1, 0.2, 0.3)
+
+
+def shares(rng, people, correlation, mean=0.5):
+    """Participants' own shares, beta distributed, with this intraclass correlation."""
+    if not correlation:
+        return np.full(people, mean)
+    weight = 1 / correlation - 1
+    return rng.beta(mean * weight, (1 - mean) * weight, size=people)
+
+
+def rate(p_values, alpha=0.05):
+    """How often a test finds something; where it can't be had, it does not."""
+    known = np.array([np.nan if p is None else p for p in p_values], dtype=float)
+    return float((known < alpha).mean())
+
+
+def preference(studies, seed):
+    """Type I error at nominal .05: the default test and those beside it; equivalence at the margin's edge."""
+    print("preference: type I error at .05 (35 people, 8 answers); equivalence: error where the share is 60%")
+    print(f"{'correlation':>11} {'default':>8} {'Wilcoxon':>8} {'robust':>7} {'published':>9} {'equivalence':>11}")
+    for correlation in CORRELATIONS:
+        rng = np.random.default_rng([seed, 1, int(100 * correlation)])
+        rows, edge = [], []
+        for _ in range(studies):
+            chosen = rng.binomial(8, shares(rng, 35, correlation)).astype(float)
+            tests = participant_tests(chosen, np.full(35, 8.0))
+            pooled = published_test(int(chosen.sum()), 280).p_value
+            rows.append((tests["p_value"], tests["wilcoxon_p_value"], tests["robust_p_value"], pooled))
+            far = rng.binomial(8, shares(rng, 35, correlation, 0.6)) / 8
+            edge.append(no_preference(far, 0.1).equivalence_p_value)
+        rates = [rate(column) for column in zip(*rows, strict=True)]
+        print(
+            f"{correlation:11} " + "{:8.3f} {:8.3f} {:7.3f} {:9.3f}".format(*rates) + f" {rate(edge):11.3f}", flush=True
+        )
+
+
+def answers_of(chosen, first=None):
+    """A table of answers from an array (people, motions)."""
+    people, motions = chosen.shape
+    table = pd.DataFrame(
+        {
+            "participant": np.repeat(np.arange(people), motions),
+            "motion": np.tile(np.arange(motions), people),
+            "chose_a": chosen.ravel().astype(float),
+        }
+    )
+    return table if first is None else table.assign(a_first=first.ravel())
+
+
+def motions(studies, seed):
+    """Type I error where motions differ too: over participants, over motions, over both. 3% of answers are missed."""
+    print("motions: type I error at .05 where participants and motions differ (standard deviations in logits)")
+    print(f"{'people':>6} {'motions':>7} {'sd people':>9} {'sd motions':>10} {'people':>7} {'motions':>8} {'both':>6}")
+    for people, count, own, other in (
+        (35, 8, 0.0, 0.0), (35, 8, 0.7, 0.0), (35, 8, 0.0, 0.5), (35, 8, 0.7, 0.5), (35, 8, 1.2, 1.0), (12, 4, 0.7, 0.5)
+    ):  # fmt: skip
+        rng, rows = np.random.default_rng([seed, 2, people, int(10 * own), int(10 * other)]), []
+        for _ in range(studies):
+            lean = own * rng.normal(size=(people, 1)) + other * rng.normal(size=(1, count))
+            part = answers_of(rng.random((people, count)) < expit(lean))
+            part = part[rng.random(len(part)) > 0.03]
+            by = part.groupby("participant")["chose_a"].agg(["sum", "count"]).to_numpy(dtype=float).T
+            found = motions_as_sample(part)
+            both = found["both"] or {"p_value": None}
+            rows.append((participant_tests(*by)["p_value"], found["by_motion"]["p_value"], both["p_value"]))
+        rates = [rate(column) for column in zip(*rows, strict=True)]
+        print(f"{people:6} {count:7} {own:9} {other:10} " + "{:7.3f} {:8.3f} {:6.3f}".format(*rates), flush=True)
+
+
+def models(studies, seed):
+    """Type I error and coverage of mixed model and estimating equations, with an order effect of 0.3 logits."""
+    print("models: type I error at .05, and coverage of 95% intervals where 65% is true of the population")
+    print(f"{'correlation':>11} {'mixed':>6} {'GEE':>6} {'GEE covers':>10} {'ms a study':>10}")
+    for correlation in CORRELATIONS:
+        rng, wrong, inside, spent = np.random.default_rng([seed, 3, int(100 * correlation)]), [], [], 0.0
+        for _ in range(studies):
+            first = rng.permuted(np.tile([True, False], (35, 4)), axis=1)
+            for mean, kept in ((0.5, wrong), (0.65, inside)):
+                own = np.clip(shares(rng, 35, correlation, mean), 1e-9, 1 - 1e-9)[:, None]
+                chance = expit(np.log(own / (1 - own)) + np.where(first, 0.15, -0.15))
+                started = time.process_time()
+                found = preference_models(answers_of(rng.random((35, 8)) < chance, first))
+                spent += time.process_time() - started
+                kept.append(found)
+        gee = [found["gee"] for found in inside if found["gee"]["percent"] is not None]
+        covers = np.mean([one["low"] <= 65 <= one["high"] for one in gee])
+        rates = [rate([found[name]["p_value"] for found in wrong]) for name in ("mixed", "gee")]
+        print(f"{correlation:11} {rates[0]:6.3f} {rates[1]:6.3f} {covers:10.3f} {1000 * spent / studies / 2:10.1f}",
+              flush=True)  # fmt: skip
+
+
+def rating_answers(rng, people, better, own, place):
+    """2003's study, one question of five points: two groups by order, two films each."""
+    lenient = own * rng.normal(size=people)
+    rows = []
+    for person in range(people):
+        shown = ["a", "b"] if person % 2 else ["b", "a"]
+        for trial, method in enumerate(shown, start=1):
+            lean = 2 + lenient[person] + better * (method == "b") + place * (trial - 1.5) + 0.9 * rng.normal()
+            rows.append((person, "rating", trial, method, int(np.clip(np.round(lean), 0, 4))))
+    return pd.DataFrame(rows, columns=["participant", "task", "trial", "method_a", "answer"])
+
+
+def ratings(studies, seed):
+    """Type I error and power of every test of the methods, by how alike one person's ratings are."""
+    print("ratings: how often the methods are found to differ at .05 (26 people, two ratings each)")
+    names = ("published F", "t", "mixed design", "Wilcoxon", "rank F", "ordinal", "likelihood")
+    print(f"{'people sd':>9} {'effect':>6}  " + "  ".join(names))
+    for own, better in ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.7)):
+        rng, rows, spent = np.random.default_rng([seed, 4, int(10 * own), int(10 * better)]), [], 0.0
+        for _ in range(studies):
+            answers = rating_answers(rng, 26, better, own, 0.3)
+            started = time.process_time()
+            (question,) = rating_anova(answers)
+            spent += time.process_time() - started
+            rows.append(_p_values(question))
+        rates = [rate(column) for column in zip(*rows, strict=True)]
+        cells = "  ".join(f"{value:{len(name)}.3f}" for value, name in zip(rates, names, strict=True))
+        print(f"{own:9} {better:6}  {cells}   {1000 * spent / studies:.0f} ms a question", flush=True)
+
+
+def _p_values(question):
+    """The p-values of the methods, test by test."""
+    within = {row["source"]: row for row in question["mixed_design"]["effects"]}
+    between = {row["source"]: row for row in question["ranks"]["between"]}
+    ordinal = question["ordinal"]
+    people = question["ranks"]["participants"]
+    return (
+        question["anova"][0]["p_value"] if question["anova"] else None,
+        question["difference"]["p_value"],
+        within["method"]["p_value"] if within else None,
+        people["p_value"] if people else None,
+        between["method"]["p_value"] if between else None,
+        ordinal["effects"][0]["p_value"] if ordinal["effects"] else None,
+        ordinal["p_value"],
+    )
+
+
+def mixed(studies, seed):
+    """Time of the mixed model of 8 participants, random intercept and slope: processor time, median of 20 fits."""
+    del studies
+    rng = np.random.default_rng([seed, 5])
+    levels, who = np.tile(np.arange(7.0), 8), np.repeat(np.arange(8), 7)
+    spent = []
+    for _ in range(20):
+        own = rng.multivariate_normal([-3.0, 1.0], [[0.16, 0.0], [0.0, 0.04]], size=8)
+        chance = ndtr(own[who, 0] + own[who, 1] * levels)
+        table = pd.DataFrame({"participant": who, "level": levels, "yes": rng.binomial(30, chance), "shown": 30})
+        started = time.process_time()
+        psychometric_mixed(table)
+        spent.append(time.process_time() - started)
+    print(f"mixed: 8 participants, 7 levels: median {np.median(spent):.3f} s, longest {max(spent):.3f} s")
+
+
+def power(studies, seed):
+    """Time of `segue power` for a preference study of 35 people: simulated and analysed studies a second."""
+    from study.analysis.power import power_curve
+    from study.apps.power_command import AT_ONCE, planned, plans_of
+    from study.apps.study_commands import load
+
+    protocol = load("geodesic_vs_fixed")
+    plans = plans_of(protocol, None, 35)
+    options = {"share": 0.65, "correlation": 0.1, "order_bias": 0.1, "missed": 0.02, "sessions": False}
+    for words, size in (("at once", studies), ("whole sessions", 10)):
+        run, _ = planned(protocol, protocol.studies[0], plans, {**options, "sessions": words != "at once"})
+        started = time.process_time()
+        found = power_curve(run, [35], studies=size, at_once=AT_ONCE, seed=seed)
+        spent = time.process_time() - started
+        print(f"power, {words}: {size} studies of 35 people in {spent:.1f} s, power {found.points[0].power:.3f}")
+
+
+PARTS = {
+    "preference": preference,
+    "motions": motions,
+    "models": models,
+    "ratings": ratings,
+    "mixed": mixed,
+    "power": power,
+}
+
+if __name__ == "__main__":
+    part = sys.argv[1] if len(sys.argv) > 1 else "all"
+    count = int(sys.argv[2]) if len(sys.argv) > 2 else 2000
+    start = int(sys.argv[3]) if len(sys.argv) > 3 else 1
+    for name, measure in PARTS.items():
+        if part in ("all", name):
+            measure(count, start)
