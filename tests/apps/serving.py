@@ -21,7 +21,7 @@ from study.experiment.responses import Responses, open_responses
 from study.experiment.stimuli import prepare
 from study.motion.library import open_library
 
-TOKEN = "the researcher's token"
+TOKEN = "token-of-the-researcher-4711"
 
 PROTOCOL = """\
 name = "served"

@@ -16,13 +16,13 @@ SHORTEST_PAGE, LONGEST_PAGE = 8, 64
 """Characters of the name that a page gives itself."""
 
 Text = Annotated[str, Field(max_length=400)]
-Milliseconds = Annotated[float, Field(ge=0, lt=1e9, allow_inf_nan=False)]
+Milliseconds = Annotated[float, Field(ge=0, lt=1e9)]
 
 
 class Message(BaseModel):
     """What all messages share."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Display(Message):
@@ -64,7 +64,7 @@ class Shown(Message):
     place: Literal["first", "second"]
     method: Annotated[str, Field(max_length=40)]
     frames_presented: Annotated[int, Field(ge=0, lt=LONGEST_FILM_FRAMES)] | None = None
-    longest_gap_frames: Annotated[float, Field(ge=0, lt=1e9, allow_inf_nan=False)] | None = None
+    longest_gap_frames: Annotated[float, Field(ge=0, lt=1e9)] | None = None
     shown_well: bool
     times_ms: Annotated[tuple[Milliseconds, ...], Field(max_length=LONGEST_FILM_FRAMES)] = ()
     frames: Annotated[tuple[int, ...], Field(max_length=LONGEST_FILM_FRAMES)] = ()
@@ -77,7 +77,7 @@ class Answered(Message):
     attempt: Annotated[int, Field(ge=1, le=100)]
     item: Annotated[str, Field(max_length=80)] = ""
     value: Annotated[str, Field(max_length=40)] | None = None
-    response_s: Annotated[float, Field(ge=0, lt=1e6, allow_inf_nan=False)] | None = None
+    response_s: Annotated[float, Field(ge=0, lt=1e6)] | None = None
     shown_well: bool = True
     shown: Annotated[tuple[Shown, ...], Field(max_length=2)] = ()
     timing: Annotated[dict[Annotated[str, Field(max_length=40)], float | str | None], Field(max_length=20)] = {}

@@ -27,6 +27,10 @@ Handler = Callable[[Request], Awaitable[Response]]
 
 LATEST_FAULTS = 50
 
+FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r", "\n", "\N{FULLWIDTH EQUALS SIGN}", "\N{FULLWIDTH PLUS SIGN}",
+                 "\N{FULLWIDTH HYPHEN-MINUS}", "\N{FULLWIDTH COMMERCIAL AT}")  # fmt: skip
+"""What a spreadsheet takes for the beginning of a formula, or passes over before one."""
+
 
 def researcher_routes(host: Host, guarded: Callable[[Handler], Handler]) -> list[Route]:
     """The routes; each asks for the token first."""
@@ -112,7 +116,7 @@ def _listed(host: Host, row: Mapping[str, Any], sitting: Any, total: int, now: d
 
 def csv_safe(value: Any) -> Any:
     """A cell that no spreadsheet runs: text that begins like a formula gets an apostrophe."""
-    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r"):
+    if isinstance(value, str) and value.startswith(FORMULA_SIGNS):
         return f"'{value}"
     return value
 
@@ -127,7 +131,8 @@ def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 def _answers(host: Host) -> str:
     table = answers_frame(host.responses, all_attempts=True, roles=("trial", "practice", "check"))
-    return str(table.to_csv(index=False))
+    text = table.select_dtypes(["object", "string"]).columns
+    return str(table.assign(**{name: table[name].map(csv_safe) for name in text}).to_csv(index=False))
 
 
 def _joined(host: Host, table: sa.Table, *columns: sa.Column[Any]) -> str:
