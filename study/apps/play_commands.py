@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.console import database_option, emit, json_option, library_option, say
-from study.apps.study_commands import OUT, check_database, load, prepare_stimuli, results_folder
+from study.apps.study_commands import OUT, check_database, load_for_people, prepare_stimuli, results_folder
 
 if TYPE_CHECKING:
     from renderer.window import Window
@@ -64,7 +64,7 @@ def play(
     from study.experiment.stimuli import record
 
     pixels = _size(size)
-    loaded = load(protocol)
+    loaded = load_for_people(protocol)
     check_display(monitor)
     stimuli = prepare_stimuli(loaded, library)
     folder = results_folder(loaded, out)

@@ -12,7 +12,7 @@ from study.apps.study_commands import (
     OUT,
     WORKERS,
     check_database,
-    load,
+    load_for_people,
     prepare_stimuli,
     render_stimuli,
     results_folder,
@@ -65,7 +65,7 @@ def serve(
     from study.experiment.participants import new_token
     from study.experiment.rendering import rendered_before
 
-    checked = load(protocol)
+    checked = load_for_people(protocol)
     folder = results_folder(checked, out)
     if completion_url and not completion_url.startswith(("https://", "http://")):
         raise click.UsageError(f"expected a completion URL that starts with https://, found {completion_url!r}.")
