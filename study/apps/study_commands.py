@@ -33,6 +33,16 @@ def load(protocol: str) -> Protocol:
     return load_protocol(find_protocol(protocol))
 
 
+def load_for_people(protocol: str) -> Protocol:
+    """A protocol that people are about to read; what has still to be written in it is said on standard error."""
+    from study.experiment.proofreading import to_do
+
+    loaded = load(protocol)
+    for note in to_do(loaded):
+        say(f"to do: {note}")
+    return loaded
+
+
 def results_folder(protocol: Protocol, out: Path | None) -> Path:
     """Where a run of a protocol goes."""
     return out if out is not None else Path("results") / protocol.name
