@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -25,6 +26,7 @@ from renderer.camera import Camera
 from renderer.capsules import Figure
 from renderer.errors import RendererError
 from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Size, Typed, key_name
+from renderer.monitors import Monitor, find_monitors, monitor_of
 from renderer.pacing import OWN_CLOCK_HZ, Pacing, find_pacing, next_flip
 from renderer.screen import RGB, Drawing, Picture, Screen
 from renderer.server_times import server_times
@@ -42,11 +44,11 @@ NO_DISPLAY = (
 class Window:
     """An open window; made by `open_window`, closed by `close` or `with`. Draw, then `flip`."""
 
-    def __init__(self, handle: Any, gl: Any, monitor: dict[str, Any], reported_hz: float, full_screen: bool) -> None:
+    def __init__(self, handle: Any, gl: Any, full_screen: bool) -> None:
         import glfw
 
         self._glfw, self._handle, self.gl = glfw, handle, gl
-        self._monitor, self.full_screen = monitor, full_screen
+        self.full_screen = full_screen
         self._events: list[Event] = []
         self._screen = Screen(gl)
         self._beat_s = float(glfw.get_time())
@@ -54,7 +56,8 @@ class Window:
         self._zero_s = time.monotonic() - self.now()  # glfw counts the same clock there, from another zero
         self._listen()
         self.pacing = Pacing(OWN_CLOCK_HZ, 0.0, 0.0, own_clock=False)
-        self.pacing = find_pacing(self._trial_swaps(), reported_hz)
+        self._paced_by: Monitor | None = None
+        self.settle((128, 128, 128))
 
     def __enter__(self) -> Self:
         return self
@@ -80,10 +83,31 @@ class Window:
         """Whether keys come here."""
         return bool(self._glfw.get_window_attrib(self._handle, self._glfw.FOCUSED))
 
+    @property
+    def monitor(self) -> Monitor | None:
+        """The monitor that shows most of the window; None while none is connected."""
+        monitors = find_monitors(self._glfw)
+        if not monitors:
+            return None
+        return monitor_of(monitors, self._glfw.get_window_pos(self._handle), self._glfw.get_window_size(self._handle))
+
+    def settle(self, colour: RGB) -> bool:
+        """Find the pacing by trial swaps of one colour, where the window has come to another monitor or mode.
+
+        Returns whether it had; it takes up to a second then, and microseconds otherwise.
+        """
+        monitor = self.monitor
+        if monitor is None or monitor == self._paced_by:
+            return False
+        self._paced_by = monitor
+        self.pacing = replace(self.pacing, own_clock=False)  # swaps are to show what they wait for
+        self.pacing = find_pacing(self._trial_swaps(colour), monitor.reported_hz)
+        return True
+
     def describe(self) -> dict[str, Any]:
         """Display, rates, sizes and what draws, for the record of a session."""
         return {
-            **self._monitor,
+            **({} if self._paced_by is None else self._paced_by.describe()),
             "full_screen": self.full_screen,
             "viewport": list(self.size),
             "content_scale": self.scale,
@@ -135,11 +159,11 @@ class Window:
         while self.now() < moment_s:
             pass
 
-    def _trial_swaps(self) -> NDArray[np.float64]:
+    def _trial_swaps(self, colour: RGB) -> NDArray[np.float64]:
         """Times between swaps of an empty window, after some to warm up."""
         times = []
         for _ in range(_WARM_UP + _TRIAL_SWAPS):
-            self.clear((128, 128, 128))
+            self.clear(colour)
             times.append(self.flip())
         return np.diff(times)[_WARM_UP:]
 
@@ -277,9 +301,10 @@ def open_window(
         raise RendererError(NO_DISPLAY.format(reason=_last_error(glfw)))
     try:
         screen = _monitor(glfw, monitor)
-        mode = glfw.get_video_mode(screen)
-        full = (mode.size.width, mode.size.height)
-        handle = _create(glfw, title, full if full_screen else size, screen if full_screen else None)
+        full = glfw.get_video_mode(screen).size
+        handle = _create(
+            glfw, title, (full.width, full.height) if full_screen else size, screen if full_screen else None
+        )
         glfw.make_context_current(handle)
         glfw.swap_interval(1)
         import moderngl
@@ -288,12 +313,7 @@ def open_window(
         gl = create(require=330)
         glfw.show_window(handle)
         glfw.focus_window(handle)
-        about = {
-            "display": _text(glfw.get_monitor_name(screen)),
-            "display_mm": list(glfw.get_monitor_physical_size(screen)),
-            "display_pixels": list(full),
-        }
-        return Window(handle, gl, about, float(mode.refresh_rate), full_screen)
+        return Window(handle, gl, full_screen)
     except BaseException:
         glfw.terminate()
         raise

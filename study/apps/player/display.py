@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,6 +26,13 @@ class Display(Protocol):
     @property
     def focused(self) -> bool:
         """Whether keys come here."""
+
+    @property
+    def monitor(self) -> Hashable:
+        """What shows it; another value on another monitor."""
+
+    def settle(self, colour: RGB) -> bool:
+        """Find the pacing anew where the window has come to another monitor; whether it had."""
 
     def describe(self) -> dict[str, Any]:
         """For the record."""

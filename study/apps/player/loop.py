@@ -88,16 +88,13 @@ class _Player(Desk):
         self._stimulus, self._fill, self._say = stimulus, fill, say
         self._drawings: dict[str, Any] = {}
         self._rate = find_rate(self.protocol.fps, window.pacing.refresh_hz)
+        self._monitor = window.monitor
         self._answers = self._dropped = self._faulty = 0
 
     def run(self) -> Outcome:
         """Step after step."""
-        rate = self._rate
-        if not rate.even:
-            flips = f"{rate.shortest_flips} or {rate.longest_flips} flips of {self.window.pacing.refresh_hz:.4g} Hz"
-            self._say(f"frames of {rate.fps:g} a second stand for {flips}: not all equally long")
         self._check_pages()
-        self.store.event("display", {**self.window.describe(), **asdict(rate)})
+        self._note_display()
         end = "finished"
         try:
             if not any(step.kind == "consent" for step in self.session.steps):
@@ -109,6 +106,14 @@ class _Player(Desk):
         except Stopped as stopped:
             end = stopped.end
         return Outcome(end, self._answers, self._dropped, self._faulty)
+
+    def _note_display(self) -> None:
+        """Write down what shows the session, and how its rate goes with that of the motions."""
+        self._rate = rate = find_rate(self.protocol.fps, self.window.pacing.refresh_hz)
+        if not rate.even:
+            flips = f"{rate.shortest_flips} or {rate.longest_flips} flips of {self.window.pacing.refresh_hz:.4g} Hz"
+            self._say(f"frames of {rate.fps:g} a second stand for {flips}: not all equally long")
+        self.store.event("display", {**self.window.describe(), **asdict(rate)})
 
     def _check_pages(self) -> None:
         """Refuse a text that is too long for this window now, not in mid-session."""
@@ -171,6 +176,9 @@ class _Player(Desk):
     def _stimulus_step(self, step: sitting.Step) -> None:
         if step.kind == "first":
             self.showings, self.faults = [], []
+            if self.window.settle(self.look.ground):
+                self._note_display()
+            self._monitor = self.window.monitor
             self._prepare(step)
             if not self.window.focused:
                 self.read_until(screens.away_page(self.protocol))
@@ -280,6 +288,8 @@ class _Player(Desk):
         deadline_s = None if step.duration_s is None else zero_s + step.duration_s
         with calm():
             button, at = self.ask(page, deadline_s)
+        if self.window.monitor != self._monitor:  # asked after the answer, since asking takes time
+            self.fault("moved to another display")
         shown_well = not self.faults and all(showing.shown_well for showing in self.showings)
         before = self.session
         if button is None:

@@ -73,6 +73,7 @@ class ScriptedWindow:
     ) -> None:
         self.pacing = Pacing(refresh_hz, 0.0 if own_clock else refresh_hz, 1.0 / refresh_hz, own_clock)
         self.size, self.focused = size, True
+        self.monitor, self.other_hz = "scripted", refresh_hz
         self.shown: list[tuple[str, Any, float]] = []
         self._script = iter(script)
         self._late, self._at_flip = dict(late_s or {}), dict(at_flip or {})
@@ -80,6 +81,14 @@ class ScriptedWindow:
         self._drawn: tuple[str, Any] = ("nothing", None)
         self._page: Shown | None = None
         self._coming: list[Event] = []
+
+    def settle(self, colour: tuple[int, int, int]) -> bool:
+        """Takes the rate `other_hz`, where a test has moved the window there (`monitor`)."""
+        del colour
+        moved = self.monitor != "scripted" and self.pacing.refresh_hz != self.other_hz
+        if moved:
+            self.pacing = replace(self.pacing, refresh_hz=self.other_hz)
+        return moved
 
     def describe(self) -> dict[str, Any]:
         """As the real one, in short."""

@@ -93,6 +93,27 @@ def test_stimuli_of_60_fps_change_with_every_flip_of_60_hz(make_small: Any, stor
     assert all(b == a + 1 or b == 0 for a, b in pairwise(frames))
 
 
+def test_a_window_that_was_moved_to_another_display_is_paced_by_that(make_small: Any, store: Any) -> None:
+    small = make_small()
+    moved_at = first_frame_flips(small)[10]
+    window = ScriptedWindow(whole([press("s")] * 7))
+    window.other_hz = 144.0
+    original = window.flip
+
+    def flip() -> float:
+        if len(window.shown) == moved_at:
+            window.monitor = "another"
+        return original()
+
+    window.flip = flip  # type: ignore[method-assign]
+    assert sit(small, window, store).faulty_trials == 1
+    answers = store.all("answer")
+    assert [answer.trial for answer in answers if not answer.shown_well] == [1]
+    assert store.all("shown")[0].detail["faults"] == ["moved to another display"]
+    assert [one["longest_flips"] for one in store.all("display")] == [2, 5]
+    assert window.pacing.refresh_hz == 144.0
+
+
 def test_a_display_that_is_too_slow_is_refused_before_anything_is_shown(make_small: Any, store: Any) -> None:
     small = make_small("", ("fps = 30", "fps = 60"))
     window = ScriptedWindow(refresh_hz=50.0)
