@@ -271,10 +271,14 @@ def withdraw(responses: Responses, withdrawal_code: str, *, clock: Clock = _utc_
 
 
 def erase(responses: Responses, session_id: int, *, clock: Clock = _utc_now) -> None:
-    """Delete all that is stored of a session; one audit line stays."""
-    with responses.engine.begin() as connection:
+    """Delete all that is stored of a session; one audit line stays. What is being answered just then goes, too."""
+    with alone(responses.engine) as connection:
         if connection.dialect.name == "sqlite":
             connection.execute(sa.text("PRAGMA secure_delete = ON"))
+        # Locked, so that no answer comes in between; gone where it was erased twice at one time.
+        own = sa.select(sessions.c.id).where(sessions.c.id == session_id).with_for_update()
+        if connection.execute(own).first() is None:
+            return
         count = connection.execute(sa.select(sa.func.count()).where(answers.c.session_id == session_id)).scalar_one()
         line = {"session_id": session_id, "answers": count, "at": clock()}
         connection.execute(sa.insert(withdrawals).values(line))

@@ -351,6 +351,10 @@ def record_answer(
     except sa.exc.IntegrityError as error:
         if answer in stored_answers(responses, record.id):
             return False
+        if find_session(responses, record.participant) is None:
+            raise SessionError(
+                f"Expected the session of {record.participant!r}, found that it was withdrawn; nothing more is stored."
+            ) from error
         raise SessionError(
             f"Expected the first answer of {record.participant!r} to trial {answer.trial} (showing {answer.attempt}), "
             f"found that one is stored already; {answer.value!r} was not. Open the session again to see what is due."

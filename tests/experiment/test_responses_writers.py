@@ -10,6 +10,7 @@ import sys
 import threading
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -195,6 +196,33 @@ def test_what_reads_before_it_writes_runs_alone(two):
 
     with ThreadPoolExecutor(8) as threads:
         assert sorted(threads.map(add, two * 10)) == list(range(20))
+
+
+def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(two, toy_protocol, plan):
+    for number in range(8):
+        record = begin_session(two[0], toy_protocol, replace(plan, participant=f"p{number}"))
+        together = threading.Barrier(3)
+
+        def answer_all(record=record, together=together):
+            together.wait()
+            for trial in range(1, 9):
+                try:
+                    record_answer(two[0], record, Answer(trial, "", 1, "same", 1.0))
+                except SessionError as gone:
+                    return str(gone)
+            return ""
+
+        def erase(record=record, together=together):
+            together.wait()
+            people.erase(two[1], record.id)
+
+        with ThreadPoolExecutor(3) as threads:
+            told = [one.result() for one in [threads.submit(work) for work in (answer_all, erase, erase)]]
+        assert told[0] == "" or "found that it was withdrawn" in told[0]
+    for table in response_tables.metadata.sorted_tables:
+        with two[0].engine.connect() as connection:
+            count = connection.execute(sa.select(sa.func.count()).select_from(table)).scalar_one()
+        assert count == {"withdrawals": 8, "schema_version": len(MIGRATIONS)}.get(table.name, 0)
 
 
 def away():
