@@ -175,7 +175,7 @@ def _compare_two(
         "ties": int((part["chose_a"] == 0.5).sum()),
         "participants": participants,
         "clustering": estimates.plain(estimates.clustering(chosen, shown)),
-        "motions": motion_table(part, confidence).to_dict("records"),
+        "motions": estimates.plain(motion_table(part, confidence).to_dict("records")),
         "motions_as_sample": motions_as_sample(part, confidence),
         "order": order_effect(part, confidence),
         "no_preference": estimates.plain(no_preference(chosen[shown > 0] / shown[shown > 0], margin)),

@@ -191,6 +191,8 @@ def _ordinal(part: pd.DataFrame, confidence: float) -> dict[str, Any]:
     methods = sorted(part["method_a"].unique())
     columns = [(part["method_a"] == method).to_numpy(dtype=np.float64) for method in methods[1:]]
     names = [f"{method} over {methods[0]}" for method in methods[1:]]
+    if not columns:
+        return {"effects": [], "p_value": None, "note": "one method: nothing to compare"}
     place = _shown_later(part)
     shared = [place] if place is not None else []
     design = np.column_stack([*columns, *shared])
