@@ -19,6 +19,7 @@ import json
 import os
 import random
 import re
+import secrets
 import select
 import socket
 import statistics
@@ -62,6 +63,9 @@ question = "Same?"
 FRAMES = 130
 """Of a film: those of the 2004 protocols last about 4.3 s at 30 frames a second."""
 
+RUN = f"load-{secrets.token_hex(4)}"
+"""Names the participants of this run, in a database that may hold others."""
+
 LENGTH = re.compile(rb"content-length: (\d+)", re.IGNORECASE)
 Key = tuple[str, int, str, int, str | None]
 
@@ -70,7 +74,7 @@ class Browser:
     """One browser: a connection that stays open, the page that it shows, the request that it sends next."""
 
     def __init__(self, port: int, number: int) -> None:
-        self.name, self.cookie = f"browser-{number:03d}", ""
+        self.name, self.cookie = f"{RUN}-{number:03d}", ""
         self.socket = socket.create_connection(("127.0.0.1", port))
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.request, self.reply = b"", bytearray()
@@ -267,13 +271,13 @@ def do_nothing(port: int, reply: bytes) -> None:
     serve(app, listen("127.0.0.1", port))
 
 
-def load(folder: Path, count: int, rounds: int) -> list[Key]:
+def load(folder: Path, database: str, count: int, rounds: int) -> list[Key]:
     """All rounds, printed; what was acknowledged. The server is killed at the end."""
     from serving import free_port
 
     ports = free_port(), free_port()
     commands = (
-        [str(ROOT / "tests" / "apps" / "server_child.py"), str(folder), str(ports[0])],
+        [str(ROOT / "tests" / "apps" / "server_child.py"), str(folder), str(ports[0]), database],
         [__file__, "--do-nothing", str(ports[1])],
     )
     found = {(pattern, name): Measured() for pattern in ("burst", "spread") for name in ("segue", "does nothing")}
@@ -296,14 +300,14 @@ def load(folder: Path, count: int, rounds: int) -> list[Key]:
     return [key for browser in browsers for key in browser.acknowledged]
 
 
-def lost(folder: Path, acknowledged: Sequence[Key]) -> int:
+def lost(database: str, acknowledged: Sequence[Key]) -> int:
     """How many of the acknowledged answers are not in the database, or are there twice."""
     from study.experiment.responses import answers_frame, open_responses
 
     columns = ["participant", "trial", "item", "attempt", "answer"]
-    with open_responses(folder) as responses:
+    with open_responses(database) as responses:
         table = answers_frame(responses, all_attempts=True)[columns]
-    stored = [tuple(row) for row in table.itertuples(index=False)]
+    stored = [tuple(row) for row in table.itertuples(index=False) if row.participant.startswith(RUN)]
     missing = len(set(acknowledged) - set(stored))
     double = len(stored) - len(set(stored))
     print(f"{len(acknowledged)} acknowledged, {len(stored)} stored after SIGKILL, {missing} lost, {double} twice")
@@ -314,6 +318,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--browsers", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--database", metavar="URL", help="an empty PostgreSQL database, instead of a SQLite file")
     parser.add_argument("--do-nothing", type=int, metavar="PORT", help="be the peer at this port")
     options = parser.parse_args()
     if options.do_nothing:
@@ -322,8 +327,10 @@ def main() -> int:
     from serving import unfilmed
 
     with tempfile.TemporaryDirectory() as name:
-        unfilmed(Path(name), PROTOCOL)
-        return int(lost(Path(name), load(Path(name), options.browsers, options.rounds)) > 0)
+        folder = Path(name)
+        database = options.database or str(folder / "responses.sqlite")
+        unfilmed(folder, PROTOCOL)
+        return int(lost(database, load(folder, database, options.browsers, options.rounds)) > 0)
 
 
 if __name__ == "__main__":

@@ -7,10 +7,12 @@ import io
 from datetime import timedelta
 
 import pytest
+import sqlalchemy as sa
 from serving import TOKEN, Person, answer_to, make_host
 from starlette.testclient import TestClient
 
 from study.apps.server.web import make_app
+from study.experiment.response_tables import withdrawals
 from study.experiment.responses import answers_frame, open_responses, session_table
 
 
@@ -78,6 +80,28 @@ def test_no_more_than_are_wanted(serve):
     assert serving.person().begin()["kind"] == "consent"
 
 
+def test_a_place_of_a_drop_out_is_free_again_and_its_participant_may_still_come_back(serve):
+    serving = serve(most_participants=1, dropped_after=timedelta(seconds=-1))
+    first, second = serving.person(), serving.person()
+    view = first.until(first.begin(), "trial")
+    assert second.begin()["kind"] == "consent"
+    assert first.answer(view)["counted"] is True
+    # Whoever finished keeps the place for good.
+    first.until(first.begin(), "done")
+    assert serving.person().begin() == {"kind": "full"}
+
+
+def test_at_the_end_a_code_and_the_way_back_each_once_the_session_is_done(serve):
+    back = "https://app.prolific.example/submissions/complete?cc=C1"
+    person = serve(completion_code="C1", completion_url=back).person()
+    view = person.begin(parameters=LINK)
+    while view["kind"] != "done":
+        assert not {"completion_code", "completion_url"} & set(view)
+        view = person.step(view)
+    assert (view["completion_code"], view["completion_url"]) == ("C1", back)
+    assert person.begin("page-two", previous="page-one")["completion_url"] == back
+
+
 def test_withdrawing_deletes_and_the_server_forgets(serve, responses):
     serving = serve()
     person, other = serving.person(), serving.person()
@@ -92,6 +116,9 @@ def test_withdrawing_deletes_and_the_server_forgets(serve, responses):
     assert len(session_table(responses)) == 1
     assert answers_frame(responses)["participant"].nunique() == 1
     assert serving.ask("overview").json()["withdrawn"] == 1
+    with responses.engine.connect() as connection:
+        lines = connection.execute(sa.select(withdrawals)).mappings().all()
+    assert [(line["session_id"], line["answers"]) for line in lines] == [(2, 11)]
 
 
 def test_the_researchers_page_needs_the_token(serve):
