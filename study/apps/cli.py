@@ -38,7 +38,7 @@ VERBS = {
     "simulate": "study_commands:simulate",
     "analyse": "study_commands:analyse",
     "report": "study_commands:report",
-    "export": "study_commands:export",
+    "export": "export_command:export",
     "fit": "fit_command:fit",
     "power": "power_command:power",
     "doctor": "doctor_command:doctor",

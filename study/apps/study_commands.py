@@ -1,4 +1,4 @@
-"""The verbs of a study's life: check, render, simulate, analyse, report, export, and demo, which does them all."""
+"""The verbs of a study's life: check, render, simulate, analyse, report, and demo, which does them all."""
 
 from __future__ import annotations
 
@@ -266,22 +266,6 @@ def report(results: Path, database: str | None, as_json: bool) -> None:
 
     page = write_report(results, database=database)
     emit({"report": str(page)}, as_json, str(page))
-
-
-@click.command()
-@click.argument("results", type=RESULTS)
-@click.option("--to", "kind", type=click.Choice(["csv"]), default="csv", show_default=True)
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="File; RESULTS/answers.csv unless given.")
-@database_option
-@json_option
-def export(results: Path, kind: str, out: Path | None, database: str | None, as_json: bool) -> None:
-    """All answers as a table for other programs."""
-    from study.experiment.responses import export_csv, open_answers
-
-    del kind  # one so far
-    with open_answers(results, database) as responses:
-        file = export_csv(responses, out or results / "answers.csv")
-    emit({"file": str(file)}, as_json, str(file))
 
 
 @click.command()

@@ -1,0 +1,85 @@
+"""What every column of exported data means: its description, type, unit and levels, declared once for all formats."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A column: what it means, what kind of value it holds, its unit, and its values where they are few."""
+
+    description: str
+    kind: Literal["text", "number", "boolean", "time"] = "text"
+    unit: str = ""
+    levels: Mapping[str, str] = field(default_factory=dict)
+
+
+ANSWERS: Mapping[str, Variable] = {
+    "participant": Variable("Who answered."),
+    "simulated": Variable("Whether a simulated observer answered, not a person.", "boolean"),
+    "study": Variable("Name of the study in the protocol."),
+    "task": Variable(
+        "What was decided.",
+        levels={
+            "same-different": "whether two transitions are the same",
+            "preference": "which of two transitions is more natural",
+            "rating": "points of a scale for one transition",
+        },
+    ),
+    "trial": Variable("Number of the trial in the participant's plan, from 1.", "number"),
+    "attempt": Variable("Which showing of the trial it was, from 1; faulty ones are shown again.", "number"),
+    "item": Variable("Which question of a rating; empty for other tasks."),
+    "repeat": Variable("Which repetition of the pair, from 1.", "number"),
+    "pair": Variable("Name of the pair, or of the transition that was rated."),
+    "motion": Variable("Name of the transition in the protocol."),
+    "category": Variable("Type of motion."),
+    "first": Variable("Stimulus shown first: the SHA-256 of its content."),
+    "second": Variable("Stimulus shown second; empty for ratings."),
+    "difference_frames": Variable("Blend length of the comparison minus that of the reference.", "number", "frames"),
+    "reference_first": Variable("Whether the reference was shown first (same-different).", "boolean"),
+    "method_a": Variable("Method of the reference, or of what was rated."),
+    "method_b": Variable("Method of the comparison; empty for ratings."),
+    "a_first": Variable("Whether the transition of method_a was shown first (preference).", "boolean"),
+    "answer": Variable("The answer: same, different, first, second, or a point of the scale; empty where missed."),
+    "missed": Variable("Whether the time to answer ended without an answer.", "boolean"),
+    "correct": Variable("Whether the answer was right, where one is.", "boolean"),
+    "chose_a": Variable("Whether the transition of method_a was favoured (preference).", "boolean"),
+    "response_s": Variable("Time from the end of the last stimulus to the answer.", "number", "s"),
+    "shown_well": Variable("Whether the stimuli were shown without a fault.", "boolean"),
+    "answered_at": Variable("When the answer was given, with its time zone.", "time"),
+    "role": Variable(
+        "What the trial was for.",
+        levels={
+            "trial": "counts in the analysis",
+            "practice": "practice, counts for nothing",
+            "check": "attention check, asks for a stated answer",
+        },
+    ),
+    "expected": Variable("The answer that an attention check asked for."),
+}
+
+PRESENTATIONS: Mapping[str, Variable] = {
+    "participant": ANSWERS["participant"],
+    "trial": ANSWERS["trial"],
+    "attempt": ANSWERS["attempt"],
+    "place": Variable("Which stimulus of the trial: first or second."),
+    "stimulus": Variable("The stimulus: the SHA-256 of its content."),
+    "method": Variable("What timed its frames: a browser's requestVideoFrameCallback, a window's swap, or a fallback."),
+    "frames_expected": Variable("Frames of the stimulus.", "number", "frames"),
+    "frames_presented": Variable("Frames that were seen to be presented.", "number", "frames"),
+    "longest_gap_frames": Variable("Longest time between two frames; 1 is perfect.", "number", "frames"),
+    "shown_well": Variable("Whether no gap was too long and no frame was missing.", "boolean"),
+    "at": Variable("When it was recorded, with its time zone.", "time"),
+}
+
+PARTICIPANTS: Mapping[str, Variable] = {
+    "participant": ANSWERS["participant"],
+    "simulated": ANSWERS["simulated"],
+    "started_at": Variable("When the session began, with its time zone.", "time"),
+    "segue_version": Variable("Version of Segue that ran the session."),
+    "library": Variable("Library of motions that was shown."),
+    "library_synthetic": Variable("Whether its motions are synthetic, not captured.", "boolean"),
+}

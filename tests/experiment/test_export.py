@@ -1,0 +1,109 @@
+"""Exports: names and descriptions as the standards ask, every answer there, and nothing that should stay behind."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from study.errors import SessionError
+from study.experiment.export import export, label, labels
+from study.experiment.observers import simulate
+from study.experiment.plan import draw_plan
+from study.experiment.responses import begin_session, open_responses, record_answer, record_form
+from study.experiment.session import Answer
+
+
+@pytest.fixture
+def responses(tmp_path, toy_protocol, toy_stimuli):
+    """Two simulated participants, and a person who missed the first question and gave the second answer."""
+    with open_responses(tmp_path / "answers.sqlite") as opened:
+        simulate(toy_protocol, toy_stimuli, opened, 2, seed=1)
+        record = begin_session(opened, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "a b-1"))
+        record_answer(opened, record, Answer(1, "", 1, None, None))
+        record_answer(opened, record, Answer(2, "", 1, "same", 0.75))
+        record_form(opened, record, {field.name: "one\ttwo" for field in toy_protocol.form})
+        yield opened
+
+
+def rows(path: Path, delimiter: str) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        quoting = csv.QUOTE_NONE if delimiter == "\t" else csv.QUOTE_MINIMAL
+        return list(csv.DictReader(file, delimiter=delimiter, quoting=quoting))
+
+
+def test_psych_ds_names_and_describes_everything(tmp_path, toy_protocol, responses):
+    folder = export(toy_protocol, responses, "psych-ds", tmp_path / "out")
+    files = sorted((folder / "data").iterdir())
+    assert files
+    for file in files:
+        assert re.fullmatch(r"([a-z]+-[A-Za-z0-9]+)(_[a-z]+-[A-Za-z0-9]+)*_data\.csv", file.name), file.name
+    description = json.loads((folder / "dataset_description.json").read_text(encoding="utf-8"))
+    assert description["@context"] == "https://schema.org/"
+    assert description["@type"] == "Dataset"
+    assert "people's and simulated answers mixed" in description["name"]
+    described = {entry["name"] for entry in description["variableMeasured"]}
+    assert all(entry["description"] for entry in description["variableMeasured"])
+    answers = 0
+    for file in files:
+        table = rows(file, ",")
+        assert set(table[0]) <= described, file.name
+        answers += len(table) if file.name.startswith("task-") else 0
+    with responses.engine.connect() as connection:
+        assert answers == connection.exec_driver_sql("SELECT count(*) FROM answers").scalar()
+    assert (folder / "materials" / "protocol.toml").read_text(encoding="utf-8") == toy_protocol.text
+
+
+def test_bids_has_a_file_a_participant_and_study_with_its_sidecar(tmp_path, toy_protocol, responses):
+    folder = export(toy_protocol, responses, "bids", tmp_path / "out")
+    description = json.loads((folder / "dataset_description.json").read_text(encoding="utf-8"))
+    assert description["BIDSVersion"] == "1.10.0"
+    people = rows(folder / "participants.tsv", "\t")
+    assert [row["participant_id"] for row in people] == ["sub-sim001", "sub-sim002", "sub-ab1"]
+    assert [row["simulated"] for row in people] == ["True", "True", "False"]
+    assert set(people[0]) == set(json.loads((folder / "participants.json").read_text(encoding="utf-8")))
+    files = sorted(folder.glob("sub-*/beh/*"))
+    assert len(files) == 2 * len([file for file in files if file.suffix == ".tsv"])
+    for file in (file for file in files if file.suffix == ".tsv"):
+        assert re.fullmatch(r"sub-([A-Za-z0-9]+)_task-[A-Za-z0-9]+_beh\.tsv", file.name), file.name
+        assert file.name.startswith(file.parent.parent.name)
+        table = rows(file, "\t")
+        sidecar = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
+        assert set(table[0]) <= set(sidecar)
+        assert sidecar["TaskName"] in file.name
+        assert all(value != "" for row in table for value in row.values()), "BIDS writes n/a for what is missing"
+    first, second = rows(next(folder.glob("sub-ab1/beh/*.tsv")), "\t")
+    assert (first["answer"], first["missed"], first["response_s"]) == ("n/a", "True", "n/a")
+    assert (second["answer"], float(second["response_s"])) == ("same", 0.75)
+
+
+def test_an_export_is_written_again_but_nothing_else_is_overwritten(tmp_path, toy_protocol, responses):
+    for kind in ("psych-ds", "bids", "psych-ds"):
+        folder = export(toy_protocol, responses, kind, tmp_path / "out")
+    assert not list(folder.glob("sub-*"))
+    other = tmp_path / "thesis"
+    other.mkdir()
+    (other / "chapter.txt").write_text("years of work")
+    with pytest.raises(SessionError, match="expected a new or empty folder, or an earlier export of Segue"):
+        export(toy_protocol, responses, "bids", other)
+    assert (other / "chapter.txt").read_text() == "years of work"
+    assert not list(tmp_path.glob(".*.part"))
+
+
+def test_no_answers_are_refused(tmp_path, toy_protocol):
+    with (
+        open_responses(tmp_path / "empty.sqlite") as opened,
+        pytest.raises(SessionError, match="expected answers to export, found none"),
+    ):
+        export(toy_protocol, opened, "bids", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_labels_hold_letters_and_digits_and_stay_apart():
+    assert label("geodesic_vs-fixed 2") == "geodesicvsfixed2"
+    made = labels(["p-1", "p_1", "p1", "..."])
+    assert len(set(made.values())) == 4
+    assert all(re.fullmatch("[A-Za-z0-9]+", name) for name in made.values())
