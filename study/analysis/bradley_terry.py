@@ -154,7 +154,11 @@ def _fitted(
     order = found.pop() if size > len(others) else None
     ranked = [*zip(point, found, strict=False), (0.0, Strength(held, 0.0, None, Interval(0.0, 0.0, confidence)))]
     ranked.sort(key=lambda pair: -pair[0])
-    endless = [row.method for row in (*found, *([order] if order else [])) if row.value is None]
+    every = (*found, *([order] if order else []))
+    endless = [row.method for row in every if row.value is None]
+    notes = [f"always or never favoured, so without a finite strength: {', '.join(endless)}"] if endless else []
+    if any(row.value is not None and row.standard_error is None for row in every):
+        notes.append(f"{people} participants: too few, or too much alike, for standard errors")
     # Rows may hold single answers: the saturated model is one share for every pair and order.
     cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
     favoured, seen = np.bincount(cells, yes), np.bincount(cells, total)
@@ -171,21 +175,24 @@ def _fitted(
         degrees_of_freedom=max(freedom, 0),
         p_value=chi_square_probability(deviance, freedom) if freedom > 0 else None,
         participants=people,
-        note=f"always or never favoured, so without a finite strength: {', '.join(endless)}" if endless else "",
+        note="; ".join(notes),
     )
 
 
 def _errors(information: FloatArray, scores: FloatArray, groups: NDArray[np.intp] | None) -> FloatArray:
-    """Standard errors: of independent answers, or of participants (NaN with one, who has nobody to differ from)."""
+    """Standard errors: of independent answers, or of participants; NaN where these are no more than the strengths."""
     inverse = np.linalg.pinv(information)
+    single = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     if groups is None:
-        return np.asarray(np.sqrt(np.diag(inverse)), dtype=np.float64)
+        return np.asarray(single, dtype=np.float64)
     people = int(groups.max()) + 1
-    if people < 2:
+    if people <= len(inverse):
         return np.full(len(inverse), np.nan)
     sums = np.zeros((people, scores.shape[1]))
     np.add.at(sums, groups, scores)
-    return np.asarray(np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse) * people / (people - 1)), dtype=np.float64)
+    spread = np.diag(inverse @ (sums.T @ sums) @ inverse) * people / (people - 1)
+    # Where strengths grow without end the scores vanish, and with them what would show it.
+    return np.asarray(np.where(single > 50, single, np.sqrt(np.maximum(spread, 0.0))), dtype=np.float64)
 
 
 def _strength(name: str, value: float, error: float, times: float, confidence: float) -> Strength:
