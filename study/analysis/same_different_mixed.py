@@ -29,6 +29,7 @@ FARTHEST_SCORE = 4.2
 COARSEST_STEP = 0.35
 LARGEST_SPREAD = 1.5
 ALIKE = 1e-3
+AVOIDANCE = 0.5
 METHOD = "mixed differencing model; Student interval of the logarithm"
 
 
@@ -79,6 +80,15 @@ class _People:
     log_mass: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Doubt:
+    """How sure the parameters are: their covariance, the point it was taken at, and how many people it rests on."""
+
+    covariance: FloatArray
+    point: FloatArray
+    participants: int
+
+
 def fit_mixed_thresholds(
     counts: Counts, *, level: float = 0.75, confidence: float = 0.95, largest_lapse: float = differencing.LARGEST_LAPSE
 ) -> MixedThresholds | str:
@@ -103,7 +113,10 @@ def fit_mixed_thresholds(
     Notes
     -----
     Maximum likelihood. Standard errors come from the curvature of the marginal likelihood, so they hold if people are
-    as the model has them; `same_different_model.fit_model` asks less of them and describes the group's curve.
+    as the model has them; `same_different_model.fit_model` asks less of them and describes the group's curve. With few
+    people the likeliest spread is often none, which would make the rest look too sure, so the curvature is taken where
+    the likelihood times the root of the spread of sensitivity is highest (after Chung, Rabe-Hesketh, Dorie, Gelman &
+    Liu 2013).
     """
     answered = counts.shown.sum(axis=1) > 0
     reason = why_no_fit(counts)
@@ -117,14 +130,19 @@ def fit_mixed_thresholds(
     )
     if start.held[0, 2:].any() or start.held[0, 0]:
         return "sensitivity or criterion of the group stands at the bound of its range: people can't be told apart"
-    point, value, settled = _maximise(people, start, largest_lapse)
-    covariance = _covariance(point, people, largest_lapse)
+    slopes = np.log(start.slopes[0])
+    begin = np.concatenate([np.log(start.criterion), start.lapse, slopes, [0.2, 0.2]])
+    bounds = [(math.log(1e-3), math.log(9.0)), (0.0, largest_lapse), *((slope - 3, slope + 3) for slope in slopes)]
+    point, value, settled = _maximise(people, begin, [*bounds, *[(0.0, LARGEST_SPREAD)] * 2], 0.0)
+    near = np.concatenate([point[:-2], np.maximum(point[-2:-1], 0.1), point[-1:]])
+    wary, _, _ = _maximise(people, near, [*bounds, (2 * ALIKE, LARGEST_SPREAD), (0.0, LARGEST_SPREAD)], AVOIDANCE)
+    doubt = _Doubt(_covariance(wary, people, largest_lapse), wary, len(people.shown))
     sides = [SIDES[index] for index in frames_by_side(counts.differences[counts.shown.sum(axis=0) > 0])[1]]
     nobody_else = replace(people, sensitivity=np.zeros(1), criterion=np.zeros(1), log_mass=np.zeros(1))
     alike = float(start.log_likelihood[0])
     return MixedThresholds(
-        typical=_thresholds(point, covariance, nobody_else, sides, level, confidence),
-        population=_thresholds(point, covariance, people, sides, level, confidence),
+        typical=_thresholds(point, doubt, nobody_else, sides, level, confidence),
+        population=_thresholds(point, doubt, people, sides, level, confidence),
         sensitivity_spread=float(point[-2]),
         criterion_spread=float(point[-1]),
         criterion=math.exp(point[0]),
@@ -193,16 +211,17 @@ def _log_likelihood(point: FloatArray, people: _People) -> tuple[float, FloatArr
     return float((highest + np.log(total)).sum()), gradient
 
 
-def _maximise(people: _People, start: differencing.Fits, largest_lapse: float) -> tuple[FloatArray, float, bool]:
+def _maximise(
+    people: _People, begin: FloatArray, bounds: list[tuple[float, float]], avoidance: float
+) -> tuple[FloatArray, float, bool]:
+    """The highest point of the likelihood times the spread of sensitivity to the power `avoidance`."""
     from scipy.optimize import minimize
-
-    slopes = np.log(start.slopes[0])
-    begin = np.concatenate([np.log(start.criterion), start.lapse, slopes, [0.2, 0.2]])
-    bounds = [(math.log(1e-3), math.log(9.0)), (0.0, largest_lapse), *((s - 3, s + 3) for s in slopes)]
-    bounds += [(0.0, LARGEST_SPREAD)] * 2
 
     def loss(point: FloatArray) -> tuple[float, FloatArray]:
         value, gradient = _log_likelihood(point, people)
+        if avoidance:
+            value += avoidance * math.log(point[-2])
+            gradient[-2] += avoidance / point[-2]
         return -value, -gradient
 
     found = minimize(loss, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 200, "ftol": 1e-10})
@@ -210,7 +229,7 @@ def _maximise(people: _People, start: differencing.Fits, largest_lapse: float) -
 
 
 def _covariance(point: FloatArray, people: _People, largest_lapse: float) -> FloatArray:
-    """Inverse of the curvature; parameters at a bound are held there."""
+    """Inverse of the curvature, avoidance included; parameters at a bound are held there."""
     step, size = 1e-4, len(point)
     curvature = np.empty((size, size))
     for place in range(size):
@@ -219,6 +238,7 @@ def _covariance(point: FloatArray, people: _People, largest_lapse: float) -> Flo
         ahead, behind = _log_likelihood(point + moved, people)[1], _log_likelihood(point - moved, people)[1]
         curvature[place] = -(ahead - behind) / (2 * step)
     curvature = (curvature + curvature.T) / 2
+    curvature[-2, -2] += AVOIDANCE / point[-2] ** 2
     held = np.zeros(size, dtype=bool)
     held[1] = point[1] <= 2 * step or point[1] >= largest_lapse - 1e-9
     held[-2:] = (point[-2:] <= ALIKE) | (point[-2:] >= LARGEST_SPREAD - 1e-9)
@@ -254,7 +274,7 @@ def _log_threshold(point: FloatArray, people: _People, place: int, level: float)
 
 def _thresholds(
     point: FloatArray,
-    covariance: FloatArray,
+    doubt: _Doubt,
     people: _People,
     sides: list[Side],
     level: float,
@@ -269,7 +289,7 @@ def _thresholds(
             note = f"{100 * level:g}% is not crossed: false alarms lie above it, or lapses keep the curve below it"
             result[side] = Threshold(side, None, None, nothing, "not estimable", METHOD, note)
             continue
-        found, (variance, freedom) = math.exp(log_found), _variance(point, covariance, gradient, len(people.shown))
+        found, (variance, freedom) = math.exp(log_found), _variance(doubt, gradient)
         if not variance > 0:
             note = "the answers do not tell how sure this is"
             result[side] = Threshold(side, found, None, nothing, "reached", METHOD, note)
@@ -286,23 +306,20 @@ def _thresholds(
     return result
 
 
-def _variance(
-    point: FloatArray, covariance: FloatArray, gradient: FloatArray, participants: int
-) -> tuple[float, float]:
+def _variance(doubt: _Doubt, gradient: FloatArray) -> tuple[float, float]:
     """Variance of the log threshold, and its degrees of freedom.
 
     The part that comes from people's differing rests on as many of them as there are, less one; the part that comes
     from single answers rests on many (Satterthwaite 1946). Maximum likelihood takes the first part too small by one
     participant, as it does every variance.
     """
-    variance = float(gradient @ covariance @ gradient)
-    between = float(point[-2] ** 2 + (gradient[0] * point[-1]) ** 2) / participants
-    between *= participants / (participants - 1)
-    variance += between / participants
+    variance, others = float(gradient @ doubt.covariance @ gradient), doubt.participants - 1
+    between = float(doubt.point[-2] ** 2 + (gradient[0] * doubt.point[-1]) ** 2) / others
+    variance += between / doubt.participants
     if not variance > 0:
         return 0.0, math.inf
     part = min(between / variance, 1.0)
-    return variance, (participants - 1) / max(part, 1e-3) ** 2
+    return variance, others / max(part, 1e-3) ** 2
 
 
 def _alike_probability(ratio: float) -> float:
