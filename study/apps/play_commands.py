@@ -134,7 +134,7 @@ def _sit(
     look, size = page_look(stimuli, session, place.font), place.window_size
     take_precedence()
     with open_window(
-        protocol.title, full_screen=size is None, size=size or (1280, 800), monitor=place.monitor
+        protocol.texts.title, full_screen=size is None, size=size or (1280, 800), monitor=place.monitor
     ) as window:
         _tell_of_timing(window)
         window.when_lost(lambda: _leave_a_lost_display(store))
@@ -155,7 +155,7 @@ def page_look(stimuli: StimulusSet, session: Session, font: Path | None) -> Look
     from study.apps.player.pages import Look
 
     protocol = session.protocol
-    parts = protocol.model_dump(include={"title", "consent", "form", "texts", "studies"})
+    parts = protocol.model_dump(include={"consent", "form", "texts", "studies"})
     texts = [*_strings(parts), *(step.text for step in session.steps)]
     return Look(stimuli.stimuli[0].figure.background, fonts_for(texts, font))
 

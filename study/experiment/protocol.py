@@ -44,7 +44,7 @@ class Protocol(Part):
     """A whole sitting."""
 
     name: Slug = Field(description="Name of the protocol and of its results folder.")
-    title: str = Field(min_length=1, description="Heading for people.")
+    title: str = Field(min_length=1, description="Heading for researchers; participants read `texts.title`.")
     source: str = Field(default="", description="Paper and section that it follows.")
     fps: float = Field(default=30.0, ge=1, le=240, description="Frame rate of every stimulus. [frames per second]")
     seed: int = Field(ge=0, description="Where all of the protocol's randomness comes from.")

@@ -109,6 +109,11 @@ class Keys(Part):
 class Texts(Part):
     """What participants read besides questions and instructions."""
 
+    title: str = Field(
+        default="How do you see movement?",
+        min_length=1,
+        description="What the study is called on the participants' pages; the protocol's title may tell too much.",
+    )
     welcome: str = Field(default="", description="Read before the first study; `{standard}` is the built-in text.")
     break_text: str = Field(default="You can rest now. Go on when you are ready.", description="Read at a break.")
     debrief: str = Field(default="", description="Read at the end; `{standard}` is the built-in text.")

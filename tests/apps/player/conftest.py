@@ -40,6 +40,7 @@ shortest_frames = 4
 longest_frames = 12
 
 [texts]
+title = "A small study"
 welcome = "Welcome."
 debrief = "It was about blends."
 
