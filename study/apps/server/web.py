@@ -111,15 +111,23 @@ def _about(host: Host) -> dict[str, Any]:
     """What every page may know: title, language, words."""
     protocol = host.protocol
     return {
-        "title": protocol.title,
+        "title": protocol.texts.title,
         "language": protocol.language,
         "texts": protocol.texts.model_dump(),
         "declined": protocol.consent.declined,
         "touch": protocol.touch,
         "size": [protocol.stimuli.width, protocol.stimuli.height],
-        "background": protocol.stimuli.colours.background,
+        "background": _background(protocol.stimuli),
         "parameters": host.settings.parameters,
     }
+
+
+def _background(stimuli: StimulusSettings) -> str:
+    """The colour behind the figure, which the pages have too."""
+    from renderer.figure import BACKGROUND, POINT_BACKGROUND
+
+    red, green, blue = POINT_BACKGROUND if stimuli.style == "points" else BACKGROUND
+    return stimuli.colours.background or f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def _pages(host: Host) -> list[Route]:
@@ -127,7 +135,7 @@ def _pages(host: Host) -> list[Route]:
     routes = []
     # A page has its language and its name before any script runs.
     protocol = host.protocol
-    words = {b"{language}": protocol.language, b"{title}": protocol.title, b"{no_script}": protocol.texts.no_script}
+    words = {b"{language}": protocol.language, b"{title}": protocol.texts.title, b"{no_script}": protocol.texts.no_script}
     for file in sorted(PAGES.iterdir()):
         if file.suffix not in TYPES:
             continue
