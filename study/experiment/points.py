@@ -179,7 +179,7 @@ def _supply(
         except MotionError as error:
             why = str(error)
             continue
-        return Supply(name, longer, first, first + clip.frames, window, str(entry.file or ""), notes)
+        return Supply(name, longer, first, first + clip.frames, window, library.where(entry), notes)
     missing = _missing(motion, needs.least_before, needs.least_after)
     raise StimulusError(
         f"motion {name!r}: expected {needs.least_before + needs.least_after} frames at {protocol.fps:g} fps around a "

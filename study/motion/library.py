@@ -96,6 +96,13 @@ class Library(ABC):
         """The files that the motions come from; none where they are synthetic."""
         return ()
 
+    def where(self, entry: Entry) -> str:
+        """The file of a motion as seen from the library's own folder, with `/`; empty where no file is behind it.
+
+        What is written into records: it holds on every machine, and tells of nobody's disk.
+        """
+        return "" if entry.file is None else entry.file.name
+
     @abstractmethod
     def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
         """Read or synthesize a motion."""
@@ -205,6 +212,11 @@ class FolderLibrary(Library):
         self._entries = _own_entries(folder, others, {} if self._is_cmu else trials)
         if self._is_cmu:
             self._entries = {**_indexed_entries(trials), **self._entries}
+
+    def where(self, entry: Entry) -> str:
+        if entry.file is None or not entry.file.is_relative_to(self.folder):
+            return super().where(entry)
+        return entry.file.relative_to(self.folder).as_posix()
 
     def names(self) -> tuple[str, ...]:
         return tuple(self._entries)

@@ -102,6 +102,7 @@ def test_file_stems_are_names(plain_folder: Path) -> None:
     assert not library.synthetic
     assert library.acknowledgement == ""
     assert library.entry("short").file == plain_folder / "outside" / "short.bvh"
+    assert library.where(library.entry("short")) == "outside/short.bvh"
     assert library.clip("short").name == "short"
 
 
