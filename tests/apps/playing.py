@@ -67,10 +67,10 @@ class Playing:
         time.sleep(1.0)
         return self.running
 
-    def press_all(self, keys: tuple[str, ...], seconds: float) -> None:
-        """Press keys over and over until it ends or the time is over; those that answer nothing do nothing."""
+    def press_all(self, keys: tuple[str, ...], seconds: float, answers: int = 1_000_000) -> None:
+        """Press keys until it ends, so many answers are stored, or the time is over; other pages take no harm."""
         end = time.monotonic() + seconds
-        while self.running and time.monotonic() < end:
+        while self.running and time.monotonic() < end and len(self.stored) < answers:
             self.do("key", "--delay", 15, *keys)
             time.sleep(0.03)
 

@@ -14,10 +14,13 @@ NICE = -10
 def take_precedence() -> bool:
     """Go before other processes from now on, where the system allows that; whether it does.
 
-    Unprivileged users are allowed to where their limit `nice` says so (`ulimit -e`, limits.conf), root always.
+    Unprivileged users are allowed to where their limit `nice` says so (`ulimit -e`, limits.conf), root always. A
+    process that somebody gave another place than the usual one stays there.
     """
     try:
-        os.setpriority(os.PRIO_PROCESS, 0, min(NICE, os.getpriority(os.PRIO_PROCESS, 0)))
+        if os.getpriority(os.PRIO_PROCESS, 0) != 0:
+            return False
+        os.setpriority(os.PRIO_PROCESS, 0, NICE)
     except (OSError, AttributeError):  # not allowed, or not on this system
         return False
     return True

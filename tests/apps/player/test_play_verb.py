@@ -127,12 +127,16 @@ def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, se
     while kills < times:
         participant = f"p{finished}"
         playing = start(protocol, "--participant", participant, "--out", out)
-        # From the start of Python to the middle of the session.
-        if rng.random() < 0.2:
+        # From the start of Python to the middle of the session; or just when an answer was acknowledged.
+        moment = rng.random()
+        if moment < 0.2:
             time.sleep(float(rng.uniform(0.0, 2.0)))
         else:
             playing.opened()
-            playing.press_all(("space", "s", "7"), float(rng.uniform(0.0, 3.0)))
+            if moment < 0.7:
+                playing.press_all(("space", "s", "7"), float(rng.uniform(0.0, 3.0)))
+            else:
+                playing.press_all(("space", "s", "7"), 20.0, answers=1)
         kills += playing.running
         playing.kill()
         stored |= set(playing.stored)
