@@ -127,7 +127,7 @@ def test_goodness_of_fit_is_the_same_from_answers_and_from_counts() -> None:
 
 
 def test_one_participant_has_strengths_without_errors() -> None:
-    found = fit_bradley_terry(list("abab"), list("baba"), [1, 0, 1, 1], [1] * 4, participants=["p"] * 4)
+    found = fit_bradley_terry(list("aaabbb"), list("bbbaaa"), [1, 1, 0, 1, 0, 0], [1] * 6, participants=["p"] * 6)
     assert isinstance(found, BradleyTerry)
     assert all(row.standard_error is None for row in found.strengths)
     assert found.strengths[0].value is not None
