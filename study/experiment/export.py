@@ -1,9 +1,9 @@
 """Exports for archives and other programs: the answers of a results folder in, a Psych-DS or BIDS data set out.
 
 Psych-DS: `data/*_data.csv`, and `dataset_description.json` in schema.org's words. BIDS: behavioural data without
-imaging (`sub-*/beh/*_beh.tsv`, a JSON file beside each). Both carry every showing and role, how stimuli were shown (Psych-DS),
-what participants said of themselves in the form, and the protocol. Parameters of recruiting services, tokens and codes
-stay behind. Simulated answers are called so in title, readme and every row.
+imaging (`sub-*/beh/*_beh.tsv`, a JSON file beside each). Both carry every showing and role, what participants said of
+themselves in the form, and the protocol; Psych-DS also how every stimulus was shown. Parameters of recruiting services,
+tokens and codes stay behind. Simulated answers are called so in title, readme and every row.
 """
 
 from __future__ import annotations
