@@ -27,6 +27,7 @@ from study.apps.server.limits import Limits
 from study.apps.server.researcher import researcher_routes
 from study.errors import SegueError
 from study.experiment.databases import AWAY
+from study.experiment.protocol_stimuli import StimulusSettings
 
 PAGES = Path(__file__).resolve().parents[1] / "pages"
 TYPES = {
