@@ -149,7 +149,8 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> dict[str,
     -----
     A mixed model with crossed random effects would rest its intervals on a normal approximation over as few motions as
     there are (8 in 2004), so it is not used. The variance in `both` is that of sums over participants, plus that over
-    motions, less that of single answers, each corrected for its number of groups.
+    motions, less that of single answers, each corrected for its number of groups; never below the last, so that the
+    test errs too seldom rather than too often where neither participants nor motions differ.
     """
     if "motion" not in part.columns or part["motion"].nunique() < 2:
         return {"by_motion": None, "both": None, "note": "fewer than two motions: they can't stand for others"}
@@ -179,10 +180,10 @@ def _both_vary(part: pd.DataFrame, confidence: float) -> tuple[dict[str, Any] | 
     cells = np.unique(np.column_stack(groups), axis=0, return_inverse=True)[1].ravel()
     apart = chosen - chosen.mean()
     variances = [_variance_of_sums(apart, group) for group in groups]
-    # Answers of one participant to one motion count in both sums, and so once too often.
-    variance = sum(variances) - float((np.bincount(cells, apart) ** 2).sum()) / len(chosen) ** 2
-    if variance <= 1e-12:
-        variance = max(variances)
+    # Answers of one participant to one motion count in both sums, and so once too often; by themselves they are the
+    # least that there can be.
+    single = float((np.bincount(cells, apart) ** 2).sum()) / len(chosen) ** 2
+    variance = max(sum(variances) - single, single)
     if variance <= 1e-12:
         return None, "all answers alike: there is no spread to judge by"
     error, mean = math.sqrt(variance), float(chosen.mean())
