@@ -135,8 +135,8 @@ def _pages(host: Host) -> list[Route]:
     """The files of the pages folder, read once: no path of a request ever reaches the file system."""
     routes = []
     # A page has its language and its name before any script runs.
-    protocol = host.protocol
-    words = {b"{language}": protocol.language, b"{title}": protocol.texts.title, b"{no_script}": protocol.texts.no_script}
+    texts = host.protocol.texts
+    words = {b"{language}": host.protocol.language, b"{title}": texts.title, b"{no_script}": texts.no_script}
     for file in sorted(PAGES.iterdir()):
         if file.suffix not in TYPES:
             continue
