@@ -68,8 +68,8 @@ class Desk:
     def ask(self, page: Page, deadline_s: float | None = None) -> tuple[Button | None, float]:
         """Show a page until one of its buttons is chosen; the button and when, or None once the time is over."""
         self.window.cursor(True)
-        drawn, _ = self.show_page(page)
-        # Keys from before the page stood there answer nothing.
+        drawn, shown_s = self.show_page(page)
+        # Keys from before the page stood there answer nothing, were they to arrive as late as now or later.
         self.notice(self.window.poll())
         while True:
             left = None if deadline_s is None else deadline_s - self.window.now()
@@ -78,7 +78,8 @@ class Desk:
             events = self.window.wait(left)
             for number, event in enumerate(events):
                 button = chosen(drawn, event)
-                if button is not None and (deadline_s is None or event.time_s <= deadline_s):
+                in_time = shown_s <= event.time_s and (deadline_s is None or event.time_s <= deadline_s)
+                if button is not None and in_time:
                     self.notice(events[number + 1 :])  # a second key counts for nothing; a lost focus is logged
                     return button, event.time_s
                 if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:

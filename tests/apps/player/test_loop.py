@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -137,6 +138,19 @@ def test_keys_that_answer_nothing_count_for_nothing(make_small: Any, store: Any)
     sit(make_small(), window, store)
     first = store.all("answer")[0]
     assert (first.value, first.response_s) == ("different", pytest.approx(0.5 + 2 / 60))
+
+
+def test_a_key_from_before_the_question_answers_nothing_however_late_it_arrives(make_small: Any, store: Any) -> None:
+    window = ScriptedWindow(whole([Act((Key("d", 0.1), Key("s", 0.4))), *[press("s")] * 5]))
+    original = window.wait
+
+    def late(timeout_s: float | None = None) -> Any:
+        """The first `d` was pressed while the film played; it comes only now."""
+        return tuple(replace(e, time_s=e.time_s - 0.3) if e == Key("d", e.time_s) else e for e in original(timeout_s))
+
+    window.wait = late  # type: ignore[method-assign]
+    sit(make_small(), window, store)
+    assert store.all("answer")[0].value == "same"
 
 
 def test_a_key_pressed_while_the_motion_plays_answers_nothing(make_small: Any, store: Any) -> None:
