@@ -162,10 +162,17 @@ def run_pooled(options):
         for _ in range(options.studies):
             found = analyse_psychometric(many_people(rng, people))
             pooled, group, mixed = found["pooled"]["threshold"]["interval"], found["group"], found["mixed"]
-            inside.append([part["low"] <= 3.0 <= part["high"] for part in (pooled, group, mixed)])
-        shares = np.mean(inside, axis=0)
+            inside.append([holds(part["low"], part["high"], 3.0) for part in (pooled, group, mixed)])
+        shares = np.nanmean(inside, axis=0)
         print(f"{people} people cover: all answers as one person's {shares[0]:.3f}, mean over participants "
               f"{shares[1]:.3f}, mixed {shares[2]:.3f}", flush=True)  # fmt: skip
+
+
+def holds(low, high, truth):
+    """Whether an interval holds the truth; open ends reach on for ever, and both open is no interval."""
+    if low is None and high is None:
+        return np.nan
+    return float((low is None or low <= truth) and (high is None or truth <= high))
 
 
 def run_speed(options):
