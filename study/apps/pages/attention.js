@@ -53,6 +53,7 @@ export function attend() {
 
 export function filmsOn(on) {
   state.filmsOn = on;
+  document.body.classList.toggle("showing", on); // nothing but the film is on the page
   if (on) state.unseen = document.hidden;
 }
 

@@ -13,6 +13,14 @@ export function element(tag, attributes = {}, ...children) {
 
 const main = () => document.getElementById("main");
 
+// A text that does not fit is set smaller; see .dense in style.css.
+function fit() {
+  const page = document.documentElement;
+  main().classList.remove("dense");
+  main().classList.toggle("dense", page.scrollHeight > window.innerHeight);
+}
+window.addEventListener("resize", fit);
+
 let shownAt = 0;
 const DOUBLE_CLICK_MS = 500;
 
@@ -25,6 +33,7 @@ export function show(children, { trial = false, focus = true } = {}) {
   place.className = trial ? "trial" : "";
   place.replaceChildren(...children);
   shownAt = performance.now();
+  fit();
   if (focus) (place.querySelector("[data-focus]") ?? place).focus({ preventScroll: true });
 }
 

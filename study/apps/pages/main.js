@@ -2,6 +2,7 @@
 // server's word whenever anything is unclear. It decides nothing about the study.
 
 import { watchAttention } from "./attention.js";
+import { fromHex, surround } from "./colours.js";
 import { ask, heading, sleep, status, top } from "./dom.js";
 import { hasFrameCallback, refreshRate } from "./playing.js";
 import * as screens from "./screens.js";
@@ -86,7 +87,7 @@ async function run(study) {
 async function start() {
   const study = await getStudy();
   status("");
-  if (study.background) document.documentElement.style.setProperty("--stage", study.background);
+  surround(fromHex(study.background));
   if (!study.touch && window.matchMedia("(pointer: coarse)").matches) {
     screens.notice(study.texts.no_touch);
     return;

@@ -21,7 +21,7 @@ async function download(name, token) {
 function table(columns, rows) {
   const head = element("tr", {}, ...columns.map((column) => element("th", { scope: "col" }, column)));
   const body = rows.map((row) => element("tr", {}, ...row.map((cell) => element("td", {}, String(cell)))));
-  return element("table", {}, element("thead", {}, head), element("tbody", {}, ...body));
+  return element("div", { class: "table" }, element("table", {}, element("thead", {}, head), element("tbody", {}, ...body)));
 }
 
 const time = (iso) => new Date(iso).toLocaleString();
@@ -42,6 +42,12 @@ function sessions(data) {
   return table(["participant", "group", "state", "step", "answers", "began", "last heard of", "faults", "focus lost", "link"], rows);
 }
 
+// What went wrong first, then where: "32768 of 315300 bytes · trial 1 · place first".
+function fault(detail) {
+  const { what, ...where } = JSON.parse(detail ?? "{}");
+  return [what, ...Object.entries(where).map(([name, value]) => `${name} ${value}`)].filter(Boolean).join(" · ");
+}
+
 function draw(data, token) {
   const counts = Object.entries(data.counts).map(([state, count]) => `${count} ${state}`);
   if (data.withdrawn) counts.push(`${data.withdrawn} withdrawn or declined`);
@@ -54,7 +60,7 @@ function draw(data, token) {
   parts.push(element("h2", {}, "Sessions"), data.sessions.length ? sessions(data) : element("p", {}, "None yet."));
   if (data.faults.length) {
     parts.push(element("h2", {}, "Latest faults"));
-    parts.push(table(["when", "participant", "what"], data.faults.map((one) => [time(one.at), one.participant, one.detail])));
+    parts.push(table(["when", "participant", "what"], data.faults.map((one) => [time(one.at), one.participant, fault(one.detail)])));
   }
   show(parts, { focus: false });
 }

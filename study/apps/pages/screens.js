@@ -8,8 +8,7 @@ import { matchBackground, stage } from "./trial.js";
 function texts(view, study) {
   // As in most plain text: an empty line parts paragraphs, a single line break is only where a line was full.
   const [first, ...rest] = view.text.split(/\n\s*\n/).map((part) => part.replace(/\s+/g, " ").trim());
-  const long = first.length > 90 || rest.length === 0;
-  return long ? [heading(study.title), ...[first, ...rest].map(paragraph)] : [heading(first), ...rest.map(paragraph)];
+  return first.length > 90 ? [heading(study.title), ...[first, ...rest].map(paragraph)] : [heading(first), ...rest.map(paragraph)];
 }
 
 export async function consent(view, study) {
@@ -83,8 +82,10 @@ export async function instructions(view, study) {
     const buttons = [{ label: study.texts.go_on, value: "on" }];
     if (view.example) buttons.push({ label: study.texts.example, value: "example", quiet: true });
     if (view.keys?.length) {
-      const hints = view.keys.map(({ label, key }) => `${label}: ${study.texts.press.replace("{key}", key.toUpperCase())}`);
-      parts.push(element("p", { class: "note" }, hints.join("   ·   ")));
+      const hints = view.keys.map(({ label, key }) =>
+        element("li", {}, element("b", {}, label), `  ${study.texts.press.replace("{key}", key.toUpperCase())}`),
+      );
+      parts.push(element("ul", { class: "keys" }, ...hints));
     }
     if ((await ask(parts, buttons)) === "on") return {};
     await example(view, study);
@@ -100,7 +101,7 @@ async function example(view, study) {
     video = await load(view.example, view.fps);
     status("");
     place.append(video);
-    matchBackground(place, video);
+    matchBackground(video);
     video.classList.add("now");
     await play(video, view.example, view.fps);
   } catch {
@@ -124,11 +125,13 @@ export function progress(view, study) {
   return study.texts.progress.replace("{done}", done).replace("{total}", total);
 }
 
+const codes = (words, code, link = null) => element("p", { class: "note" }, words, element("br"), element("code", {}, code), link ? "   " : null, link);
+
 export function done(view, study) {
   const parts = [heading(study.texts.finished)];
-  if (view.completion_code) parts.push(element("p", {}, `${study.texts.completion} `, element("code", {}, view.completion_code)));
+  if (view.completion_code) parts.push(codes(study.texts.completion, view.completion_code));
   if (view.withdrawal_code) {
-    parts.push(element("p", { class: "note" }, `${study.texts.withdrawal} `, element("br"), element("code", {}, view.withdrawal_code), "   ", element("a", { href: "withdraw" }, study.texts.withdraw)));
+    parts.push(codes(study.texts.withdrawal, view.withdrawal_code, element("a", { href: "withdraw" }, study.texts.withdraw)));
   }
   if (view.completion_url) {
     parts.push(element("div", { class: "buttons" }, element("a", { class: "button", href: view.completion_url, rel: "noreferrer" }, study.texts.back)));

@@ -1,6 +1,7 @@
 // A trial: films, gap, question, as the server's view says. Resolves with the message that is the answer.
 
 import { attend, faults, filmsOn, unseen, visible } from "./attention.js";
+import { surround } from "./colours.js";
 import { ask, element, heading, secondClick, show, sleep, status } from "./dom.js";
 import { FilmFault, forget, load, loadAhead, release } from "./film.js";
 import { play } from "./playing.js";
@@ -19,13 +20,12 @@ export function stage(study) {
   return made;
 }
 
-// What surrounds and parts the films has their background's colour, so that nothing flashes.
-export function matchBackground(place, video) {
+// The page takes the colour that the browser makes of the films' background, to the last bit, so that nothing flashes.
+export function matchBackground(video) {
   const canvas = element("canvas", { width: 1, height: 1 });
   const context = canvas.getContext("2d");
   context.drawImage(video, 0, 0, 1, 1, 0, 0, 1, 1);
-  const [red, green, blue] = context.getImageData(0, 0, 1, 1).data;
-  place.style.backgroundColor = `rgb(${red}, ${green}, ${blue})`;
+  surround([...context.getImageData(0, 0, 1, 1).data].slice(0, 3));
 }
 
 async function loadAll(view, study, onFault) {
@@ -55,7 +55,7 @@ class Unseen extends Error {} // films that were played to nobody
 async function showFilms(view, study, { restarts, pauseOver, onFault }) {
   const { place, videos } = await loadAll(view, study, onFault);
   const scale = place.clientWidth / study.size[0]; // of the film's own size
-  matchBackground(place, videos[0]);
+  matchBackground(videos[0]);
   await pauseOver;
   await visible();
   if (restarts === MOST_RESTARTS) attend();

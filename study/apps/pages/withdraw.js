@@ -1,5 +1,6 @@
 // Withdrawing: a code comes in, the participant's data is deleted.
 
+import { fromHex, surround } from "./colours.js";
 import { element, heading, show, status } from "./dom.js";
 import { page, study as getStudy } from "./server.js";
 
@@ -13,6 +14,7 @@ async function withdraw(code) {
 }
 
 const study = await getStudy();
+surround(fromHex(study.background));
 document.title = `${study.texts.withdraw} · ${study.title}`;
 const code = element("input", { id: "code", type: "text", autocomplete: "off", spellcheck: "false", maxlength: "60", required: true });
 const form = element(
