@@ -60,8 +60,8 @@ def serve(
 
     A results folder that is rendered whole is served as it is, without --library, on any machine.
     """
-    from study.apps.server.hosting import Settings
     from study.apps.server.running import run
+    from study.apps.server.settings import Settings
     from study.experiment.participants import new_token
     from study.experiment.rendering import rendered_before
 

@@ -13,7 +13,8 @@ from typing import Any
 import uvicorn
 from starlette.testclient import TestClient
 
-from study.apps.server.hosting import Host, Settings
+from study.apps.server.hosting import Host
+from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.experiment.protocol import Protocol, parse_protocol
 from study.experiment.rendering import Manifest, read_manifest, record

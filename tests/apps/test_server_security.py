@@ -14,9 +14,9 @@ from starlette.testclient import TestClient
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from study.apps.server import hosting
-from study.apps.server.hosting import Settings
 from study.apps.server.researcher import csv_safe
 from study.apps.server.running import configuration
+from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.response_tables import events

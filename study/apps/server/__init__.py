@@ -1,5 +1,6 @@
-"""Sessions in the browser: a Starlette application that shows what `experiment.session` says comes next.
+"""Sessions in the browser: an ASGI application that shows what `experiment.session` says comes next.
 
-`hosting` holds the live sittings, `views` says what a page may know of a step, `messages` checks what comes back,
-`writer` commits answers in groups, `web` and `researcher` are the routes. Pages are in `study/apps/pages`.
+From the outside in: `running` and `connections` (sockets), `limits`, `inbox` (what pages send, `messages` checked key
+by key), `web` with `films` and `researcher` (what is fetched), `hosting` (live sittings, under `settings`), `views`
+(what a page may know of a step), `writer` (answers committed in groups). The pages are in `study/apps/pages`.
 """

@@ -14,7 +14,7 @@ import secrets
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ import sqlalchemy as sa
 
 from study.apps.server import views
 from study.apps.server.messages import Answered, Begin, Done, Happened, Shown
+from study.apps.server.settings import Settings
 from study.apps.server.writer import Writer
 from study.errors import SessionError
 from study.experiment import participants as people
@@ -57,38 +58,9 @@ MOST_EVENTS = 2000
 TELL_EVERY_SECONDS = 10.0
 """How often it is logged that the database is away."""
 
-SHORTEST_TOKEN = 16
-"""Characters of the researcher's token."""
-
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 log = logging.getLogger("segue.serve")
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a study is run; what depends on the place and the recruiting service, and so stands in no protocol.
-
-    `most_participants` is None for as many as come. `parameters` are the names that are kept of a link; those in
-    `identifying` name one person, who takes part once.
-    """
-
-    researcher_token: str
-    most_participants: int | None = None
-    groups: int | None = None
-    completion_code: str = ""
-    completion_url: str = ""
-    parameters: tuple[str, ...] = ("PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "participant")
-    identifying: tuple[str, ...] = ("PROLIFIC_PID", "participant")
-    dropped_after: timedelta = people.DROPPED_AFTER
-
-    def __post_init__(self) -> None:
-        """A token that nobody guesses; an empty one would let in everybody."""
-        if len(self.researcher_token) < SHORTEST_TOKEN:
-            raise SessionError(
-                f"Expected a researcher's token of {SHORTEST_TOKEN} characters or more, found one of "
-                f"{len(self.researcher_token)}; leave it out, and one is made up."
-            )
 
 
 @dataclass
@@ -122,6 +94,7 @@ class Host:
         self.places = people.Places(groups, settings.most_participants, settings.dropped_after)
         self.sittings: dict[str, Sitting] = {}
         self.recent: set[int] = set()
+        self.questions: dict[int, int] = {}
         self._told_away = -math.inf
         # Arrivals at this server stand in line here, not as threads that wait for the database's lock.
         self._starting = asyncio.Lock()

@@ -16,12 +16,12 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from study.apps.server.hosting import Host
+from study.apps.server.hosting import Host, Sitting
 from study.experiment import participants as people
 from study.experiment import session as flow
 from study.experiment.observers import questions
 from study.experiment.response_tables import events, form_values, participants, presentations, sessions, withdrawals
-from study.experiment.responses import all_sessions, answers_frame
+from study.experiment.responses import answers_frame, session_by_id
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -65,8 +65,7 @@ def _overview(host: Host) -> dict[str, Any]:
     now = datetime.now(UTC)
     rows = people.overview(host.responses)
     live = {sitting.record.id: sitting for sitting in host.sittings.values()}
-    totals = {record.id: questions(host.protocol, record.plan) for record in all_sessions(host.responses)}
-    listed = [_listed(host, row, live.get(row["id"]), totals.get(row["id"], 0), now) for row in rows]
+    listed = [_listed(host, row, live.get(row["id"]), now) for row in rows]
     states = [row["state"] for row in listed]
     with host.responses.engine.connect() as connection:
         withdrawn = connection.execute(sa.select(sa.func.count()).select_from(withdrawals)).scalar_one()
@@ -89,7 +88,7 @@ def _overview(host: Host) -> dict[str, Any]:
     }
 
 
-def _listed(host: Host, row: Mapping[str, Any], sitting: Any, total: int, now: datetime) -> dict[str, Any]:
+def _listed(host: Host, row: Mapping[str, Any], sitting: Sitting | None, now: datetime) -> dict[str, Any]:
     happened = row["events"]
     if "finished" in happened:
         state = "finished"
@@ -106,12 +105,20 @@ def _listed(host: Host, row: Mapping[str, Any], sitting: Any, total: int, now: d
         "state": state,
         "step": flow.current(sitting.state).kind if sitting is not None else "",
         "answers": row["answers"],
-        "questions": total,
+        "questions": _questions(host, row["id"], sitting),
         "began_at": row["began_at"].isoformat(timespec="seconds"),
         "seen_at": row["seen_at"].isoformat(timespec="seconds"),
         "faults": happened.get("fault", 0),
         "focus_losses": happened.get("focus-lost", 0),
     }
+
+
+def _questions(host: Host, session_id: int, sitting: Sitting | None) -> int:
+    """How many a session has; looked up once, since to read all plans every few seconds would make answers wait."""
+    if session_id not in host.questions:
+        record = sitting.record if sitting is not None else session_by_id(host.responses, session_id)
+        host.questions[session_id] = questions(host.protocol, record.plan)
+    return host.questions[session_id]
 
 
 def csv_safe(value: Any) -> Any:

@@ -11,7 +11,8 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from study.apps.server.connections import Connection
-from study.apps.server.hosting import Host, Settings
+from study.apps.server.hosting import Host
+from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.protocol import Protocol

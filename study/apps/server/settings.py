@@ -1,0 +1,38 @@
+"""Settings: how a study is run. What depends on the place and the recruiting service, and so stands in no protocol."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import timedelta
+
+from study.errors import SessionError
+from study.experiment.participants import DROPPED_AFTER
+
+SHORTEST_TOKEN = 16
+"""Characters of the researcher's token."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a study is run.
+
+    `most_participants` is None for as many as come. `parameters` are the names that are kept of a link; those in
+    `identifying` name one person, who takes part once.
+    """
+
+    researcher_token: str
+    most_participants: int | None = None
+    groups: int | None = None
+    completion_code: str = ""
+    completion_url: str = ""
+    parameters: tuple[str, ...] = ("PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "participant")
+    identifying: tuple[str, ...] = ("PROLIFIC_PID", "participant")
+    dropped_after: timedelta = DROPPED_AFTER
+
+    def __post_init__(self) -> None:
+        """A token that nobody guesses; an empty one would let in everybody."""
+        if len(self.researcher_token) < SHORTEST_TOKEN:
+            raise SessionError(
+                f"Expected a researcher's token of {SHORTEST_TOKEN} characters or more, found one of "
+                f"{len(self.researcher_token)}; leave it out, and one is made up."
+            )
