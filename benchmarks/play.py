@@ -131,6 +131,7 @@ class Timed:
     def __init__(self, window: Any) -> None:
         self.window = window
         self.answered_s: list[float] = []
+        self.missed = 0
         self.shown: list[Any] = []
 
     def begin(self) -> None:
@@ -146,11 +147,14 @@ class Timed:
             raise Done
 
     def answer(self, answer: Any, shown: Any) -> None:
-        """One answer."""
+        """One answer; none where the key came before its question, on a machine that was too busy to show it."""
+        self.shown += shown
+        if answer.missed:
+            self.missed += 1
+            return
         last = shown[-1].detail
         last_frame_s = last["onset_s"] + last["at_ms"][-1] / 1000
         self.answered_s.append(last_frame_s + answer.response_s + time.monotonic() - self.window.now())
-        self.shown += shown
 
 
 def measure(trials: int, full_screen: bool) -> dict[str, Any]:
@@ -189,7 +193,7 @@ def measure(trials: int, full_screen: bool) -> dict[str, Any]:
         display = window.describe()
     injected_s, came_s = injector.times(), peer.times()
     keys = key_summary(np.array(store.answered_s), came_s[:, 0], injected_s)
-    return {**keys, **flip_summary(store.shown), "display": display}
+    return {**keys, "keys_before_their_question": store.missed, **flip_summary(store.shown), "display": display}
 
 
 def error_table(errors: np.ndarray) -> dict[str, float]:
