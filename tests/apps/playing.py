@@ -55,7 +55,7 @@ class Playing:
             time.sleep(0.02)
 
     def opened(self) -> None:
-        self.until(lambda: any(line.startswith("display:") for line in self.said))
+        self.until(lambda: any(line.startswith("display:") for line in self.said), 240.0)
 
     def do(self, *words: object) -> None:
         """Let xdotool do something; it fails where the window closes under its hands, which is none of our concern."""
