@@ -38,7 +38,7 @@ def prepare(folder: Path, participants: int) -> None:
     """Stimuli and answers, once; what is there already is used again."""
     for verb in (["render"], ["simulate", "--participants", str(participants)]):
         command = [*SEGUE, verb[0], PROTOCOL, *verb[1:], "--out", str(folder)]
-        subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
 
 
 def measure(folder: Path, runs: int) -> None:

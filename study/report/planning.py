@@ -93,7 +93,7 @@ def power_drawing(found: Result, name: str, asked: int) -> Drawing:
         if asked and min(across) <= asked <= max(across):
             axes.axvline(asked, color=INK, linewidth=0.9)
             axes.annotate(
-                f"{asked} took part", (asked, 0), xytext=(4, 4), textcoords="offset points", color=INK, fontsize=8.5
+                f"{asked} in this study", (asked, 0), xytext=(4, 4), textcoords="offset points", color=INK, fontsize=8.5
             )
         axes.annotate(
             f"aim {found['target']:g}", (across[0], found["target"]), xytext=(-6, 3), textcoords="offset points",

@@ -161,7 +161,8 @@ def preference_table(name: str, comparison: Result) -> Table:
     first, second = methods_of(comparison)
     return tables.make(
         f"{name}_preference",
-        f"Percent favouring {first} over {second}. As published: all answers as independent, which a participant’s "
+        f"Percent favouring {first} over {second}. As published: all answers as independent (Wilson’s interval), "
+        "which a participant’s "
         "answers are not. Corrected: one share a participant, by Student’s t (the default test) and by ranks; and the "
         "pooled percentage with its variance over participants. Orders balanced: the mean of the percentages with the "
         "first method shown first and second. A typical participant and the population: models with a term for the "
