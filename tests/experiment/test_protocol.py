@@ -182,3 +182,16 @@ def test_an_installed_package_carries_its_protocols(tmp_path, monkeypatch):
     (package / "protocols").mkdir()
     (package / "protocols" / "demo.toml").write_text(GOOD)
     assert find_protocol("demo") == package / "protocols" / "demo.toml"
+
+
+def test_the_study_in_the_documentation_can_be_run(repository):
+    """The walk-through's protocol: sound, nothing left to write, and all of it can be shown."""
+    from study.experiment.proofreading import to_do
+    from study.experiment.stimuli import check
+    from study.motion.library import open_library
+
+    document = (repository / "docs" / "protocols.md").read_text(encoding="utf-8")
+    (text,) = (block for block in re.findall(r"```toml\n(.*?)```", document, re.DOTALL) if "[[studies]]" in block)
+    protocol = parse_protocol(text)
+    assert to_do(protocol) == []
+    assert check(protocol, open_library("synthetic")) == []
