@@ -148,9 +148,12 @@ def migrate(engine: sa.Engine, place: str) -> None:
     with engine.connect() as connection:
         if _version(connection, place) == len(MIGRATIONS):
             return
+    # Asked again alone: another program may have made the tables in the meantime.
     with alone(engine) as connection:
-        schema_version.create(connection, checkfirst=True)
         found = _version(connection, place)
+        if found == 0:
+            _refuse_strangers(connection, place)
+        schema_version.create(connection, checkfirst=True)
         for version, migration in enumerate(MIGRATIONS[found:], start=found + 1):
             row = {"version": version, "migration": migration.__name__, "applied_at": datetime.now(UTC)}
             connection.execute(sa.insert(schema_version).values(row))
@@ -159,20 +162,21 @@ def migrate(engine: sa.Engine, place: str) -> None:
 
 def _version(connection: sa.Connection, place: str) -> int:
     """How many migrations a database has seen; 0 for an empty one."""
-    inspector = sa.inspect(connection)
-    found = 0
-    if inspector.has_table(schema_version.name):
-        found = connection.execute(sa.select(sa.func.max(schema_version.c.version))).scalar() or 0
+    if not sa.inspect(connection).has_table(schema_version.name):
+        return 0
+    found = connection.execute(sa.select(sa.func.max(schema_version.c.version))).scalar() or 0
     if found > len(MIGRATIONS):
         raise SessionError(
             f"{place}: expected a database of version {len(MIGRATIONS)} or older, found version {found}; "
             "open it with the newer Segue that wrote it."
         )
-    if found == 0 and (
-        strangers := sorted(set(inspector.get_table_names()) & set(metadata.tables) - {"schema_version"})
-    ):
+    return int(found)
+
+
+def _refuse_strangers(connection: sa.Connection, place: str) -> None:
+    there = set(sa.inspect(connection).get_table_names())
+    if strangers := sorted(there & set(metadata.tables) - {schema_version.name}):
         raise SessionError(
             f"{place}: expected an empty database or one of Segue's, found tables of another program by the names "
             f"{', '.join(strangers)}; make a database for Segue alone."
         )
-    return found

@@ -174,7 +174,7 @@ def test_a_role_that_owns_nothing_runs_sessions_and_cannot_take_the_guard_away(
     postgres_server.administer("DROP ROLE IF EXISTS writer; CREATE ROLE writer LOGIN PASSWORD 'w'")
     rights = (
         "GRANT SELECT, INSERT, DELETE ON ALL TABLES IN SCHEMA public TO writer",
-        "GRANT UPDATE ON participants TO writer",
+        "GRANT UPDATE ON participants, sessions TO writer",  # sessions to lock, for no row of them can be changed
         "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO writer",
     )
     owner = sa.create_engine(postgres_url)
