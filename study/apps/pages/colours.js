@@ -4,6 +4,7 @@
 const INKS = [[22, 27, 40], [255, 255, 255], [0, 0, 0]];
 const WARNINGS = [[138, 46, 10], [255, 190, 150]];
 const LEGIBLE = 4.5;
+const VISIBLE = 3; // of borders: section 1.4.11
 
 const linear = (value) => (value <= 0.04045 * 255 ? value / 255 / 12.92 : ((value / 255 + 0.055) / 1.055) ** 2.4);
 const luminance = ([red, green, blue]) => 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);
@@ -15,17 +16,17 @@ export function contrast(one, other) {
 
 const mix = (from, to, share) => from.map((value, i) => Math.round(value + share * (to[i] - value)));
 const css = (colour) => `rgb(${colour.join(", ")})`;
-const legible = (colours, ground) => colours.find((colour) => contrast(colour, ground) >= LEGIBLE);
+const legible = (colours, ground, least = LEGIBLE) => colours.find((colour) => contrast(colour, ground) >= least);
+const towards = (ground, ink, shares) => shares.map((share) => mix(ground, ink, share));
 
 export function palette(ground) {
-  const ink = [...INKS].sort((a, b) => contrast(b, ground) - contrast(a, ground))[0];
-  const best = legible(INKS, ground) ?? ink;
+  const best = legible(INKS, ground); // black or white is, on every colour
   // As soft as stays legible.
-  const shares = [0.7, 0.8, 0.9, 1];
-  const soft = legible(shares.map((share) => mix(ground, best, share)), ground) ?? best;
+  const soft = legible(towards(ground, best, [0.7, 0.8, 0.9]), ground) ?? best;
+  const line = legible(towards(ground, best, [0.5, 0.6, 0.7, 0.8, 0.9]), ground, VISIBLE) ?? best;
   const dark = luminance(best) > luminance(ground);
   const raised = dark ? mix(ground, [255, 255, 255], 0.1) : mix(ground, [255, 255, 255], 0.7);
-  return { stage: ground, ink: best, soft, raised: contrast(best, raised) >= LEGIBLE ? raised : ground, warn: legible(WARNINGS, ground) ?? best, line: mix(ground, best, 0.5) };
+  return { stage: ground, ink: best, soft, raised: contrast(best, raised) >= LEGIBLE ? raised : ground, warn: legible(WARNINGS, ground) ?? best, line };
 }
 
 export function surround(ground) {
