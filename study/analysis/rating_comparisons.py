@@ -18,7 +18,7 @@ from study.analysis.anova import two_way
 from study.analysis.ordinal import OrdinalFit, fit_ordinal
 from study.analysis.rank_tests import anova_type, friedman, signed_rank
 from study.analysis.ratings import rated
-from study.analysis.repeated_measures import mixed_design
+from study.analysis.repeated_measures import likeness, mixed_design
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -47,8 +47,9 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: boo
         be had), `balanced` (whether all combinations have as many answers), `type_ii` (the same by type II where they
         have not, else None), `difference` (of each participant's mean ratings, where there are two methods: `of`,
         `mean`, `low`, `high`, `t`, `degrees_of_freedom`, `p_value`), `mixed_design` (`effects`, `participants`,
-        `left_out`, `factors`, `note`), `ranks` (`between`, `participants`, `note`), `ordinal` (`effects`, `spread`,
-        `likelihood_ratio`, `degrees_of_freedom`, `p_value`, `note`; None without models), `note`.
+        `left_out`, `factors`, `intraclass_correlation` with what that does to the published test, `note`), `ranks`
+        (`between`, `participants`, `note`), `ordinal` (`effects`, `spread`, `likelihood_ratio`, `degrees_of_freedom`,
+        `p_value`, `note`; None without models), `note`.
 
     Raises
     ------
@@ -127,6 +128,7 @@ def _mixed_design(part: pd.DataFrame, alpha: float) -> dict[str, Any]:
     )
     return {
         "effects": [] if isinstance(found, str) else found,
+        **likeness(values, group[who].to_numpy()),
         "factors": factors,
         "participants": len(who),
         "left_out": people - len(who),
@@ -229,7 +231,7 @@ def _shown_later(part: pd.DataFrame) -> FloatArray | None:
 
 
 def anova_sentences(questions: list[dict[str, Any]], alpha: float) -> list[str]:
-    """Each effect of each question in words, degrees of freedom always with it."""
+    """Each effect of each question in words, degrees of freedom always with it, and what holds over participants."""
     found = []
     for question in questions:
         for row in question["anova"]:
@@ -241,4 +243,18 @@ def anova_sentences(questions: list[dict[str, Any]], alpha: float) -> list[str]:
                 f"{row['error_degrees_of_freedom']}) = {row['f']:.2f}, MS = {row['mean_square']:.2f}, "
                 f"p = {row['p_value']:.3g} ({verdict} at {alpha:g})"
             )
+        found += _difference_in_words(question, alpha)
     return found
+
+
+def _difference_in_words(question: dict[str, Any], alpha: float) -> list[str]:
+    """The difference of two methods over participants; nothing where it can't be tested."""
+    test = question["difference"]
+    if not test or test["p_value"] is None:
+        return []
+    verdict = "significant" if test["p_value"] < alpha else "not significant"
+    return [
+        f"{question['item'] or 'rating'}: {test['of']} over participants {test['mean']:.2f} ({test['low']:.2f} to "
+        f"{test['high']:.2f}), t({test['degrees_of_freedom']}) = {test['t']:.2f}, p = {test['p_value']:.3g} "
+        f"({verdict} at {alpha:g})"
+    ]

@@ -8,6 +8,7 @@ and is corrected by how far that fails (Greenhouse & Geisser 1959; Huynh & Feldt
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
@@ -75,6 +76,47 @@ def mixed_design(
         rows += _stratum(scores, design, within, between, left)
     errors = float(sum(row["error_sum_of_squares"] for row in rows if row["leads"]))
     return [_finished(row, errors, alpha) for row in rows if row["source"]]
+
+
+def likeness(values: ArrayLike, groups: Sequence[Any] | NDArray[Any]) -> dict[str, float | None]:
+    """Return how alike the values of one participant are, and what that does to tests that take them for independent.
+
+    Parameters
+    ----------
+    values : array_like, shape (participants, ...)
+        As `mixed_design` takes them.
+    groups : sequence, shape (participants,)
+
+    Returns
+    -------
+    dict
+        `intraclass_correlation` (consistency, groups and columns taken out; below zero where people are more alike
+        than chance would have it), `between_effect` and `within_effect`: by how much the error variance of a comparison
+        between groups is larger, and of one within participants smaller, than that of independent values.
+        None where that can't be told.
+    """
+    table = np.asarray(values, dtype=np.float64)
+    people, columns = len(table), math.prod(table.shape[1:])
+    table = table.reshape(people, columns)
+    _, code = np.unique(np.asarray(groups).astype(str), return_inverse=True)
+    count = int(code.max()) + 1 if people else 0
+    nothing = dict.fromkeys(("intraclass_correlation", "between_effect", "within_effect"))
+    if people - count < 1 or columns < 2:
+        return nothing
+    means = np.array([table[code == group].mean(axis=0) for group in range(count)])
+    apart = table - means[code]
+    own = apart.mean(axis=1)
+    between = columns * float((own**2).sum()) / (people - count)
+    within = float(((apart - own[:, None]) ** 2).sum()) / ((people - count) * (columns - 1))
+    spread = between + (columns - 1) * within
+    if spread <= 1e-12:
+        return nothing
+    correlation = (between - within) / spread
+    return {
+        "intraclass_correlation": correlation,
+        "between_effect": 1 + (columns - 1) * correlation,
+        "within_effect": 1 - correlation,
+    }
 
 
 def _subsets(factors: int) -> list[tuple[int, ...]]:

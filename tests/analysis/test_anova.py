@@ -133,8 +133,11 @@ def test_the_rating_study_is_analysed_as_published_and_by_participants() -> None
     paired = stats.ttest_rel(wide["cut-wang2003"], wide["cut-lee2002"])
     assert question["difference"]["t"] == pytest.approx(paired.statistic)
     assert question["difference"]["p_value"] == pytest.approx(paired.pvalue)
-    for sentence in anova_sentences(found, 0.05):
-        assert "F(1, 48) = " in sentence
+    sentences = anova_sentences(found, 0.05)
+    assert len(sentences) == 8
+    assert sum("F(1, 48) = " in sentence for sentence in sentences) == 6
+    assert "cut-wang2003 minus cut-lee2002 over participants" in sentences[3]
+    assert "t(25) = " in sentences[3]
 
 
 def test_known_effects_are_found_as_often_as_they_should_be() -> None:
