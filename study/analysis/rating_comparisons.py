@@ -97,12 +97,17 @@ def _as_published(part: pd.DataFrame, alpha: float) -> tuple[list[dict[str, Any]
     return table, two_way(*factors, squares="II", alpha=alpha) if uneven else None, ""
 
 
+def _means(part: pd.DataFrame) -> pd.DataFrame:
+    """Each participant's mean rating of each method, NaN where there is none."""
+    return part.groupby(["participant", "method_a"])["rating"].mean().unstack()
+
+
 def _difference(part: pd.DataFrame, confidence: float) -> dict[str, Any] | None:
     """The difference of the two methods over participants; None where there are not two."""
     methods = sorted(part["method_a"].unique())
     if len(methods) != 2:
         return None
-    means = part.pivot_table(index="participant", columns="method_a", values="rating", aggfunc="mean")
+    means = _means(part)
     apart = (means[methods[1]] - means[methods[0]]).dropna().to_numpy(dtype=np.float64)
     test = estimates.mean_test(apart, 0.0, confidence)
     return {
@@ -141,11 +146,10 @@ def _complete(part: pd.DataFrame, people: int) -> tuple[FloatArray, list[str], t
 
     Motions are a factor only where that costs no participant who rated every method.
     """
-    wide = part.pivot_table(index="participant", columns="method_a", values="rating", aggfunc="mean").dropna()
+    wide = _means(part).dropna()
     if "motion" in part.columns and part["motion"].nunique() > 1:
-        cells = part.pivot_table(
-            index="participant", columns=["method_a", "motion"], values="rating", aggfunc="mean"
-        ).dropna()
+        cells = part.groupby(["participant", "method_a", "motion"])["rating"].mean().unstack([1, 2])
+        cells = cells.sort_index(axis=1).dropna()
         levels = part["method_a"].nunique(), part["motion"].nunique()
         if len(cells) == min(people, len(wide)) and cells.shape[1] == levels[0] * levels[1]:
             return cells.to_numpy(dtype=np.float64).reshape(-1, *levels), list(cells.index), ("method", "motion")
@@ -177,7 +181,7 @@ def _ranks(part: pd.DataFrame) -> dict[str, Any]:
 
 
 def _ranks_over_participants(part: pd.DataFrame) -> dict[str, Any] | None:
-    wide = part.pivot_table(index="participant", columns="method_a", values="rating", aggfunc="mean").dropna()
+    wide = _means(part).dropna()
     if len(wide) < 2:
         return None
     if wide.shape[1] == 2:
