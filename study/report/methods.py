@@ -71,6 +71,12 @@ ORDERS = {
 }
 
 
+SINGLE_ORDERS = {
+    **dict.fromkeys(("both", "random", "balanced"), "Transitions were shown one at a time, in random order"),
+    "by-group": "Transitions were shown one at a time; which method came first followed from the participant’s group",
+}
+
+
 def methods_paragraphs(
     protocol: Protocol, manifest: Manifest, analysis: Result, presentations: pd.DataFrame, who: str
 ) -> list[tuple[str, str]]:
@@ -138,7 +144,8 @@ def _study(study: StudySpec) -> str:
         asked = words.number(len(study.items), "question")
         what = f"participants rated {_against(study)} on a scale of 0 to {study.scale_points - 1} in {asked}"
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
-    return f"In “{title}”, {what}. {ORDERS[study.order]}{repeated}."
+    order = (SINGLE_ORDERS if study.task == "rating" else ORDERS)[study.order]
+    return f"In “{title}”, {what}. {order}{repeated}."
 
 
 def _against(study: StudySpec) -> str:

@@ -226,7 +226,7 @@ def variance_table(name: str, questions: Sequence[Result]) -> Table:
         "As published: two-way analysis of variance between subjects, method by order of presentation. 2003 section "
         "4.2, "
         "type III sums of squares. It takes the ratings of one participant for independent; the next table does not. "
-        "Effect sizes with 90% intervals where the level is 5%.",
+        "Effect sizes with 90% intervals.",
         f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
         _by_question(questions, lambda question: question["anova"]),
     )
