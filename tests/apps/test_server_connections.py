@@ -11,7 +11,7 @@ import pytest
 import uvicorn
 from serving import free_port
 
-from study.apps.server import connections
+from study.apps.server import connections, running
 from study.apps.server.running import configuration
 
 LARGE = b"x" * 20_000_000
@@ -37,6 +37,7 @@ def port(monkeypatch):
     """A server that waits a third of a second for a request, and a second and a half for a reply to be taken."""
     monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.3)
     monkeypatch.setattr(connections, "REPLY_SECONDS", 1.5)
+    monkeypatch.setattr(running, "MOST_CONNECTIONS", 150)
     free = free_port()
     config = configuration(app)
     config.host, config.port, config.lifespan = "127.0.0.1", free, "off"
@@ -162,3 +163,13 @@ def test_nonsense_is_refused(connect):
         client.sendall(nonsense)
         reply = client.recv(1000)
         assert reply == b"" or reply.startswith(b"HTTP/1.1 400"), nonsense
+
+
+def test_more_connections_than_are_taken_are_told_to_come_again(connect):
+    kept = [connect() for _ in range(149)]
+    late = connect()
+    assert ask(late).startswith(b"HTTP/1.1 503")
+    for client in kept:
+        client.close()
+    time.sleep(0.2)
+    assert ask(connect()).startswith(b"HTTP/1.1 200")
