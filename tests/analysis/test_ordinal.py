@@ -52,11 +52,12 @@ def test_a_known_group_is_found_again() -> None:
 
 
 def test_without_spread_it_is_the_proportional_odds_model_of_statsmodels() -> None:
-    ordered = pytest.importorskip("statsmodels.miscmodels.ordinal_model").OrderedModel
+    from statsmodels.miscmodels.ordinal_model import OrderedModel
+
     ratings, design, who = drawn(np.random.default_rng(3), 60, 0.8, 0.0)
     fit = fit_ordinal(design, ratings, who)
     assert isinstance(fit, OrdinalFit)
-    expected = ordered(ratings, design, distr="logit").fit(method="bfgs", disp=False)
+    expected = OrderedModel(ratings, design, distr="logit").fit(method="bfgs", disp=False)
     assert fit.spread < 0.05
     assert fit.effects[0].value == pytest.approx(expected.params[0], abs=2e-3)
     assert fit.log_likelihood == pytest.approx(expected.llf, abs=1e-3)

@@ -17,12 +17,13 @@ def rows_of(values: np.ndarray, groups: list[int], names: list[str]) -> dict[str
 
 
 def test_two_factors_within_against_statsmodels() -> None:
-    anova_rm = pytest.importorskip("statsmodels.stats.anova").AnovaRM
+    from statsmodels.stats.anova import AnovaRM
+
     values = np.random.default_rng(1).normal(size=(10, 3, 4)) + np.arange(4) * 0.3
     found = rows_of(values, [0] * 10, ["method", "motion"])
     index = pd.MultiIndex.from_product([range(10), range(3), range(4)], names=["who", "method", "motion"])
     long = pd.DataFrame({"y": values.ravel()}, index=index).reset_index()
-    expected = anova_rm(long, "y", "who", within=["method", "motion"]).fit().anova_table
+    expected = AnovaRM(long, "y", "who", within=["method", "motion"]).fit().anova_table
     for name, row in zip(["method", "motion", "method x motion"], expected.itertuples(), strict=True):
         assert found[name]["f"] == pytest.approx(row[1])
         assert (found[name]["degrees_of_freedom"], found[name]["error_degrees_of_freedom"]) == (row[2], row[3])
