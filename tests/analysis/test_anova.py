@@ -60,10 +60,9 @@ def test_an_unbalanced_design_compares_with_and_without_each_effect() -> None:
 
 @pytest.mark.parametrize(("squares", "typ"), [("II", 2), ("III", 3)])
 def test_both_types_of_squares_against_statsmodels(squares: Squares, typ: int) -> None:
-    smf, anova_lm = (
-        pytest.importorskip("statsmodels.formula.api"),
-        pytest.importorskip("statsmodels.stats.anova").anova_lm,
-    )
+    import statsmodels.formula.api as smf
+    from statsmodels.stats.anova import anova_lm
+
     rng = np.random.default_rng(6)
     a, b = rng.integers(0, 3, 70), rng.integers(0, 2, 70)
     data = pd.DataFrame({"y": 0.4 * a * b + rng.normal(size=70), "a": a, "b": b})
