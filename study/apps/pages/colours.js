@@ -30,6 +30,8 @@ export function palette(ground) {
 }
 
 export function surround(ground) {
+  // What browsers draw by themselves, such as lists to choose from, follows.
+  document.documentElement.style.colorScheme = contrast(ground, [255, 255, 255]) > contrast(ground, [0, 0, 0]) ? "dark" : "light";
   for (const [name, colour] of Object.entries(palette(ground))) document.documentElement.style.setProperty(`--${name}`, css(colour));
 }
 

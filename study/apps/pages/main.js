@@ -43,6 +43,7 @@ async function act(view, study, state) {
     await state.pauseOver;
     return next;
   }
+  if (view.kind !== "feedback") status("");
   const pages = { consent: screens.consent, form: screens.form, instructions: screens.instructions };
   const message = await (pages[view.kind] ?? screens.read)(view, study);
   return send("api/done", { step: view.step, ...message }, texts.waiting);
