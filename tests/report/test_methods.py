@@ -1,0 +1,53 @@
+"""The methods say what was run, and cite what was used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from study.analysis.summary import analyse
+from study.report.material import Material, gather
+from study.report.methods import methods_paragraphs, references
+
+MakeFolder = Callable[..., Path]
+
+
+def paragraphs(material: Material) -> tuple[dict[str, str], list[str]]:
+    """The methods by heading, and the references."""
+    analysis = analyse(material.answers, resamples=10)
+    who = "two observers"
+    told = methods_paragraphs(material.protocol, material.manifest, analysis, material.presentations, who)
+    return dict(told), references(material.protocol, analysis)
+
+
+def test_methods_follow_from_the_protocol(results_folder: MakeFolder) -> None:
+    def edit(text: str) -> str:
+        return text.replace("height = 120\n", "height = 120\nfloor = true\ntrack_s = 0.5\nentry_s = 1.5\n")
+
+    material = gather(results_folder(2, videos=0, edit=edit))
+    told, cited = paragraphs(material)
+    assert told["Participants and design"].startswith("Two observers took part in one sitting of 3 studies.")
+    assert (
+        "longer by −15, −10, −5, 0, +5, +10, +20 frames. Each pair was shown in both orders."
+        in told["Participants and design"]
+    )
+    assert "blends of 10 frames" in told["Participants and design"]
+    assert (
+        "a camera travelling with it (smoothed over 0.5 s) above a ground plane, with 1.5 s before" in told["Stimuli"]
+    )
+    assert "No stimulus was shown: observers were simulated." in told["Apparatus and procedure"]
+    assert "profile-likelihood intervals are given beside them" in told["Analysis"]
+    assert told["Exclusions"].startswith("No rule of exclusion was stated beforehand")
+    assert material.protocol.sha256[:12] in told["Software"]
+    assert any(work.startswith("Macmillan") for work in cited)
+    assert cited == sorted(cited)
+
+
+def test_works_whose_methods_were_not_used_are_not_cited(results_folder: MakeFolder) -> None:
+    def edit(text: str) -> str:
+        start, end = text.index('[[studies]]\nname = "jnd"'), text.index('[[studies]]\nname = "geodesic_vs_fixed"')
+        return text[:start] + text[end:]
+
+    _, cited = paragraphs(gather(results_folder(2, videos=0, edit=edit)))
+    assert not any(work.startswith(("Macmillan", "Fieller", "Koyama", "Bradley")) for work in cited)
+    assert any(work.startswith("Schuirmann") for work in cited)
