@@ -125,9 +125,9 @@ def test_a_window_that_is_left_in_mid_film_flags_the_trial_and_asks_before_the_n
     playing.ended()
     assert playing.process.returncode == 0, playing.said
     assert [one["focused"] for one in happened(out, "focus")][-2:] == [False, True]
-    assert [one["trial"] for one in happened(out, "focus") if not one["focused"]][-1] == 1
+    assert 1 in [one["trial"] for one in happened(out, "focus") if not one["focused"]]
     # It was queued again, and seen.
-    assert [(one.trial, one.attempt) for one in answers(out)][-1] == (1, 2)
+    assert (1, 2) in [(one.trial, one.attempt) for one in answers(out)]
     assert "focus lost" in shown(out)[0]["detail_json"]
 
 
