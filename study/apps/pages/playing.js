@@ -18,7 +18,8 @@ class Frames {
 
   add(data) {
     const index = Math.round(data.mediaTime * this.fps);
-    const at = data.expectedDisplayTime;
+    // An expectation, which a busy machine does not always meet: no frame is seen before the one before it.
+    const at = Math.max(data.expectedDisplayTime, this.times.at(-1) ?? 0);
     if (this.indices.length > 0 && index <= this.indices.at(-1)) {
       // Told of one frame twice, as of the first one, which stood before the film started: no further frame.
       this.first += data.presentedFrames - this.latest;

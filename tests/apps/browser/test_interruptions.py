@@ -107,7 +107,8 @@ def test_a_window_that_loses_the_focus_flags_the_trial(make_site, make_tab):
     to_question(tab)
     press(tab)
     go_on(tab)
-    assert len(answers(site, all_attempts=True)) == TRIALS + 1
+    table = answers(site, all_attempts=True)
+    assert list(table[table["trial"] == table["trial"].iloc[0]]["attempt"]) == [1, 2]
     assert details(site)[0]["detail"]["faults"] == "focus lost"
 
 
@@ -136,9 +137,8 @@ def test_an_answer_survives_a_minute_without_network(make_site, make_tab, closed
     tab.wait(f"document.getElementById('main') && !({KEPT})")
     assert len(answers(site)) == 1
     go_on(tab)
-    table = answers(site, all_attempts=True)
-    assert len(table) == TRIALS
-    assert not table["missed"].any()
+    assert len(answers(site)) == TRIALS
+    assert not answers(site)["missed"].any()
 
 
 def test_nobodys_answer_is_sent_as_anothers(make_site, make_tab):
@@ -172,8 +172,8 @@ def test_going_back_and_forth_loses_nothing(make_site, make_tab):
     tab.wait("document.getElementById('code') !== null")
     tab.run("history.back(); 1")
     go_on(tab)
+    assert len(answers(site)) == TRIALS
     table = answers(site, all_attempts=True)
-    assert len(table) == TRIALS
     assert not table.duplicated(["trial", "item", "attempt"]).any()
 
 
@@ -185,7 +185,7 @@ def test_a_page_that_is_brought_back_as_it_was_left_starts_again(make_site, make
     tab.run("window.old = true; window.dispatchEvent(new PageTransitionEvent('pageshow', { persisted: true })); 1")
     tab.wait("window.old === undefined")
     go_on(tab)
-    assert len(answers(site, all_attempts=True)) == TRIALS
+    assert len(answers(site)) == TRIALS
 
 
 def test_keys_before_the_question_and_keys_held_down_answer_nothing(make_site, make_tab):

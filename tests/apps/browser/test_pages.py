@@ -205,7 +205,7 @@ def test_the_keyboard_alone_leads_through_a_session(make_site, make_tab):
     tab.key("Tab")
     assert tab.run("document.activeElement.innerText").startswith("Different")
     tab.key("Enter")
-    tab.wait(f"!({QUESTION})")
+    tab.wait(f"!({QUESTION}) && !({KEPT})")
     # Progress and messages are announced without taking the focus.
     tab.wait("document.querySelector('main button') !== null")
     live = tab.run("[...document.querySelectorAll('[role=status]')].map((one) => one.id)")

@@ -8,12 +8,14 @@ import time
 import pytest
 import sqlalchemy as sa
 from serving import QUESTIONS, TOKEN
-from walking import KEPT, LOOK, QUESTION, ROLES, answers, go_on, happened, press, read_on, to_question
+from walking import KEPT, LOOK, QUESTION, ROLES, SHORT, answers, go_on, happened, press, read_on, to_question
 
 from study.experiment.response_tables import presentations
 from study.experiment.responses import answers_frame
 
 pytestmark = pytest.mark.gl
+
+TRIALS = 4  # of SHORT
 
 
 @pytest.mark.parametrize("keys", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["keys", "buttons"])
@@ -52,7 +54,7 @@ def test_a_whole_session_of_every_task(make_site, make_tab, keys):
 
 
 def test_reloads_lose_nothing(make_site, make_tab):
-    site, tab = make_site(), make_tab()
+    site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
     for number in range(1, 4):
         to_question(tab)
@@ -63,12 +65,12 @@ def test_reloads_lose_nothing(make_site, make_tab):
         assert len(answers(site)) == number
     go_on(tab)
     table = answers(site)
-    assert len(table) == QUESTIONS
+    assert len(table) == TRIALS
     assert not table.duplicated(["trial", "item"]).any()
 
 
 def test_a_restarted_server_gets_the_answer_that_waited(make_site, make_tab):
-    site, tab = make_site(), make_tab()
+    site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
     to_question(tab, 2)
     site.stop()
@@ -79,26 +81,9 @@ def test_a_restarted_server_gets_the_answer_that_waited(make_site, make_tab):
     tab.wait(f"!({KEPT})")
     go_on(tab)
     table = answers(site)
-    assert len(table) == QUESTIONS
+    assert len(table) == TRIALS
     assert not table.duplicated(["trial", "item"]).any()
     assert happened(site, "waited")
-
-
-def test_an_answer_waits_through_a_reload_of_the_page(make_site, make_tab):
-    """The server is away, the page is loaded again by a service in front of it: the answer is still there."""
-    site, tab = make_site(), make_tab()
-    tab.open(site.address)
-    to_question(tab)
-    tab.call("Network.setBlockedURLs", urls=["*/api/answer"])
-    press(tab, keys=True)
-    tab.wait(KEPT)
-    assert len(answers(site)) == 0
-    tab.call("Network.setBlockedURLs", urls=[])
-    tab.reload()
-    tab.wait(f"!({KEPT})")
-    assert len(answers(site)) == 1
-    go_on(tab)
-    assert len(answers(site)) == QUESTIONS
 
 
 @pytest.mark.parametrize("fault", ["truncated", pytest.param("stalled", marks=pytest.mark.slow)])
