@@ -171,6 +171,7 @@ def test_going_back_and_forth_loses_nothing(make_site, make_tab):
     tab.open(f"{site.address}/withdraw")
     tab.wait("document.getElementById('code') !== null")
     tab.run("history.back(); 1")
+    tab.wait("document.getElementById('code') === null && document.querySelector('.stage, button.answer') !== null")
     go_on(tab)
     assert len(answers(site)) == TRIALS
     table = answers(site, all_attempts=True)
