@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ from study.analysis import estimates
 from study.analysis.exclusions import Rules, exclude
 from study.analysis.jnd import analyse_jnd
 from study.analysis.no_effect import MARGIN
+from study.analysis.pair_ratings import of_pairs, pair_ratings
 from study.analysis.preference import compare, confirmatory, strengths
 from study.analysis.quality import quality
 from study.analysis.rating_cells import rating_cells
@@ -34,6 +35,7 @@ class _Settings:
     seed: int
     margin: float
     family: tuple[str, ...] | None
+    scale_points: Mapping[str, int]
 
 
 def analyse(
@@ -48,6 +50,7 @@ def analyse(
     family: Sequence[str] | None = None,
     rules: Rules | None = None,
     checks: pd.DataFrame | None = None,
+    scale_points: Mapping[str, int] | None = None,
 ) -> dict[str, Any]:
     """Analyse every study in a table of answers.
 
@@ -71,6 +74,8 @@ def analyse(
         it is None.
     rules, checks
         What is left out, as stated before there was data, and the answers to attention checks.
+    scale_points
+        Points of the scale of each rating study, by its name; needed where pairs were rated.
 
     Returns
     -------
@@ -78,7 +83,8 @@ def analyse(
         `jnd` (by name of a same-different study), `preference` (by name of a preference study, a list of compared
         pairs of methods), `confirmatory` (their default tests, adjusted together by Holm's method), `bradley_terry`
         (strengths by study, where more than two methods were compared), `ratings`, `rating_anova` and `rating_cells`
-        (by name of a rating study), each empty where there is none;
+        (by name of a rating study), `pair_ratings` (by name of a study in which pairs were rated), each empty where
+        there is none;
         `exclusions` (what was left out by which rule), `without_exclusions` (the same results of all answers; None
         where none was left out), `quality` (of all answers),
         `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
@@ -96,7 +102,7 @@ def analyse(
         raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {strange[0]!r}")
     kept = exclude(answers, rules or Rules(), checks)
     declared = None if family is None else tuple(family)
-    settings = _Settings(threshold, confidence, alpha, resamples, seed, margin, declared)
+    settings = _Settings(threshold, confidence, alpha, resamples, seed, margin, declared, scale_points or {})
     result = _studies_analysed(kept.answers, settings)
     left_out = {name: getattr(kept, name) for name in ("rules", "participants", "answers_left_out")}
     result |= {
@@ -113,7 +119,7 @@ def analyse(
 def _studies_analysed(answers: pd.DataFrame, settings: _Settings) -> dict[str, Any]:
     """Every study of a table of answers."""
     confidence = settings.confidence
-    kinds = ("jnd", "preference", "bradley_terry", "ratings", "rating_anova", "rating_cells")
+    kinds = ("jnd", "preference", "bradley_terry", "ratings", "rating_anova", "rating_cells", "pair_ratings")
     result: dict[str, Any] = {kind: {} for kind in kinds}
     for (task, study), part in answers.groupby([answers["task"].astype(str), _studies(answers)], sort=False):
         if task == "same-different":
@@ -127,12 +133,23 @@ def _studies_analysed(answers: pd.DataFrame, settings: _Settings) -> dict[str, A
         elif task == "preference":
             result["preference"][study] = compare(part, confidence, settings.alpha, margin=settings.margin)
             result["bradley_terry"][study] = strengths(part, confidence)
+        elif of_pairs(part):
+            result["pair_ratings"][study] = pair_ratings(part, _points(str(study), settings), confidence)
         else:
             result["ratings"][study] = rating_table(part, confidence)
             result["rating_anova"][study] = rating_anova(part, confidence)
             result["rating_cells"][study] = rating_cells(part, confidence)
     result["confirmatory"] = confirmatory(result["preference"], settings.family)
     return result
+
+
+def _points(study: str, settings: _Settings) -> int:
+    if study not in settings.scale_points:
+        raise AnalysisError(
+            f"expected how many points the scale of {study!r} has, where pairs were rated, found none; name them in "
+            "scale_points"
+        )
+    return settings.scale_points[study]
 
 
 def _studies(answers: pd.DataFrame) -> pd.Series[str]:

@@ -118,7 +118,8 @@ def analyse_results(folder: Path, database: str | None = None) -> dict[str, Any]
     from study.experiment.rendering import PROTOCOL
     from study.experiment.responses import answers_frame, open_answers
 
-    settings = load_protocol(folder / PROTOCOL).analysis
+    protocol = load_protocol(folder / PROTOCOL)
+    settings = protocol.analysis
     with open_answers(folder, database) as responses:
         answers, checks = answers_frame(responses), answers_frame(responses, roles=("check",))
     rules = rules_of(settings.exclusions.model_dump())
@@ -130,17 +131,21 @@ def analyse_results(folder: Path, database: str | None = None) -> dict[str, Any]
         family=settings.confirmatory or None,
         rules=rules,
         checks=checks,
+        scale_points=protocol.scale_points,
     )
 
 
 def headlines(analysis: dict[str, Any]) -> list[str]:
     """The answers of an analysis in sentences."""
+    from study.analysis.pair_ratings import pair_sentences
     from study.analysis.rating_comparisons import anova_sentences
 
     sentences = [study["answer"] for study in analysis["jnd"].values()]
     sentences += [compared["answer"] for study in analysis["preference"].values() for compared in study]
     for study in analysis["rating_anova"].values():
         sentences += anova_sentences(study, analysis["alpha"])
+    for study in analysis["pair_ratings"].values():
+        sentences += pair_sentences(study, analysis["alpha"])
     return sentences
 
 

@@ -78,7 +78,11 @@ class PreferenceObserver:
 
 @dataclass(frozen=True)
 class RatingObserver:
-    """Ratings: a normal variable around the middle of the scale plus the method's utility, cut into points."""
+    """Ratings: a normal variable around the middle of the scale plus the method's utility, cut into points.
+
+    Of a pair, the utility of the second less that of the first. `participant_sd` is how participants differ in how high
+    they rate; of pairs, in by how much they find the comparison the better.
+    """
 
     noise_sd: float = 0.9
     utility_weight: float = 0.3
@@ -188,6 +192,8 @@ def truth(protocol: Protocol, settings: ObserverSettings) -> dict[str, Any]:
             studies[study.name] = {**jnd, **_interpolated(observer, study.differences_frames, level)}
         elif study.task == "preference":
             studies[study.name] = {"favouring_a": round(preference_probability(settings.preference, study), 6)}
+        elif study.paired:
+            studies[study.name] = {"mean_score": round(mean_score(settings, study), 6)}
     return {**found, "studies": studies}
 
 
@@ -208,6 +214,17 @@ def preference_probability(observer: PreferenceObserver, study: StudySpec) -> fl
     both = 0.5 * (logistic(leaning + observer.order_bias) + logistic(leaning - observer.order_bias))
     chosen = float((both * weights).sum() / weights.sum())
     return observer.lapse / 2 + (1 - observer.lapse) * chosen
+
+
+def mean_score(settings: ObserverSettings, study: StudySpec) -> float:
+    """Mean over participants of how the comparison is rated against the reference, in points from 0."""
+    from scipy.special import ndtr
+
+    apart = lean(settings.preference, study.comparison or study.reference, study.reference)
+    middle = (study.scale_points - 1) / 2 + settings.rating.utility_weight * apart
+    spread = np.hypot(settings.rating.noise_sd, settings.rating.participant_sd)
+    # The mean of a whole number from 0 is the sum of the chances to reach each point; points are reached by rounding.
+    return float(ndtr((middle - np.arange(study.scale_points - 1) - 0.5) / spread).sum())
 
 
 def lean(observer: PreferenceObserver, method_a: str, method_b: str) -> float:

@@ -135,10 +135,17 @@ def _judge(who: Person, trial: Trial, step: sitting.Step, rng: np.random.Generat
         chance = preference.lapse / 2 + (1 - preference.lapse) * float(logistic(towards_first))
         return ("first" if rng.random() < chance else "second"), abs(2 * chance - 1)
     rating = who.settings.rating
-    utility = who.settings.preference.utility.get(trial.method_a, 0.0)
-    middle = (len(step.legal) - 1) / 2 + rating.utility_weight * utility + who.leniency
+    higher = rating.utility_weight * _rated(who.settings.preference, trial) + who.leniency
+    middle = (len(step.legal) - 1) / 2 + (higher if trial.a_first is not False else -higher)
     point = int(np.clip(round(middle + rating.noise_sd * float(rng.standard_normal())), 0, len(step.legal) - 1))
     return step.legal[point], 0.5
+
+
+def _rated(preference: PreferenceObserver, trial: Trial) -> float:
+    """Utility of what is rated: of the one stimulus, or of method b over method a."""
+    if trial.second:
+        return lean(preference, trial.method_b, trial.method_a)
+    return preference.utility.get(trial.method_a, 0.0)
 
 
 class StimulusSource(Shape):

@@ -33,8 +33,8 @@ class Pair:
     study, task, motion, category
         The study, its task, the transition's name and its type of motion.
     a, b
-        Stimulus ids: reference and comparison (same-different), methods a and b (preference); `b` is empty where
-        one stimulus is rated.
+        Stimulus ids: reference and comparison (same-different), methods a and b (preference, rating of a pair); `b` is
+        empty where one stimulus is rated.
     method_a, method_b
         How the blend lengths were found.
     difference_frames
@@ -58,8 +58,8 @@ class Trial:
     """One trial: what is shown first and second, and what the answer will mean.
 
     `trial` counts from 1 over the whole sitting, `repeat` from 1. `reference_first` is None outside same-different
-    studies, `a_first` outside preference studies, and `second` is empty where one stimulus is rated. `role` is `trial`,
-    `practice` (counts for nothing) or `check` (asks for `expected`, whatever is shown).
+    studies, `a_first` but where two methods are compared, and `second` is empty where one stimulus is rated. `role` is
+    `trial`, `practice` (counts for nothing) or `check` (asks for `expected`, whatever is shown).
     """
 
     trial: int
@@ -180,11 +180,11 @@ def _draw_set(
 ) -> list[Trial]:
     """One repeat of a study: each pair in its order or orders, shuffled."""
     count = len(pairs)
-    if study.task == "rating":
+    if not study.paired:
         if study.order == "by-group":
             turn = group % count
-            return [_rating(pair, repeat) for pair in [*pairs[turn:], *pairs[:turn]]]
-        return [_rating(pairs[i], repeat) for i in rng.permutation(count)]
+            return [_single(pair, repeat) for pair in [*pairs[turn:], *pairs[:turn]]]
+        return [_single(pairs[i], repeat) for i in rng.permutation(count)]
     if study.order == "both":
         shown = [(pair, a_first) for pair in pairs for a_first in (True, False)]
     elif study.order == "random":
@@ -195,7 +195,7 @@ def _draw_set(
         shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.permutation(halves), strict=True)]
     else:
         shown = [(pair, group % 2 == 0) for pair in pairs]
-    return [_comparison(shown[i][0], shown[i][1], repeat) for i in rng.permutation(len(shown))]
+    return [_both(shown[i][0], shown[i][1], repeat) for i in rng.permutation(len(shown))]
 
 
 def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Generator) -> list[Trial]:
@@ -213,10 +213,10 @@ def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Gener
     chosen = [chosen[i % len(chosen)] for i in range(study.practice)]
     order = rng.permutation(study.practice)
     sides = rng.integers(0, 2, study.practice)
-    if study.task == "rating":
-        trials = [_rating(chosen[i], 0) for i in order]
+    if study.paired:
+        trials = [_both(chosen[i], bool(sides[i]), 0) for i in order]
     else:
-        trials = [_comparison(chosen[i], bool(sides[i]), 0) for i in order]
+        trials = [_single(chosen[i], 0) for i in order]
     return [replace(trial, role="practice") for trial in trials]
 
 
@@ -246,15 +246,15 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
     for study in protocol.studies:
         if study.order == "by-group":
             own = len(_pairs_of(study, pairs)[0])
-            groups = math.lcm(groups, max(own, 1) if study.task == "rating" else 2)
+            groups = math.lcm(groups, 2 if study.paired else max(own, 1))
     return groups
 
 
-def _comparison(pair: Pair, a_first: bool, repeat: int) -> Trial:
+def _both(pair: Pair, a_first: bool, repeat: int) -> Trial:
     first, second = (pair.a, pair.b) if a_first else (pair.b, pair.a)
     same_different = pair.task == "same-different"
     return replace(
-        _rating(pair, repeat),
+        _single(pair, repeat),
         first=first,
         second=second,
         reference_first=a_first if same_different else None,
@@ -262,7 +262,7 @@ def _comparison(pair: Pair, a_first: bool, repeat: int) -> Trial:
     )
 
 
-def _rating(pair: Pair, repeat: int) -> Trial:
+def _single(pair: Pair, repeat: int) -> Trial:
     return Trial(
         trial=0,
         study=pair.study,

@@ -119,9 +119,14 @@ class Protocol(Part):
         shown = len(self.transitions_of(study))
         if study.task == "same-different":
             shown *= len(study.differences_frames)
-        if study.task == "rating":
+        if not study.paired:
             return shown * len(study.methods) * study.repeats
         return shown * study.repeats * (2 if study.order == "both" else 1)
+
+    @property
+    def scale_points(self) -> dict[str, int]:
+        """Points of the scale of each rating study, by its name."""
+        return {study.name: study.scale_points for study in self.studies if study.task == "rating"}
 
     def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
         """The transitions that a study's practice alone shows."""

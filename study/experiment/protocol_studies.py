@@ -20,6 +20,7 @@ Method = Literal[
 ]
 Task = Literal["same-different", "preference", "rating"]
 Order = Literal["both", "random", "balanced", "by-group"]
+Show = Literal["single", "pair"]
 
 OPTIMUM_CUTS = {"cut-lee2002": "lee2002", "cut-wang2003": "wang2003", "cut-pointcloud": "pointcloud"}
 """Methods that cut where a metric is least over both motions, and the metric of each (2003 section 4.2)."""
@@ -65,6 +66,11 @@ class StudySpec(Part):
     )
     comparison: Method | None = Field(
         default=None, description="Method b of a preference study; a second one to rate in a rating study."
+    )
+    show: Show | None = Field(
+        default=None,
+        description="Rating: each transition by itself (`single`, as where it is left out), or both methods' "
+        "transitions as a `pair`, with items that compare the second with the first.",
     )
     differences_frames: Annotated[tuple[int, ...], Field(strict=False)] = Field(
         default=(),
@@ -119,6 +125,11 @@ class StudySpec(Part):
         """The methods whose blend lengths this study shows."""
         return (self.reference,) if self.comparison is None else (self.reference, self.comparison)
 
+    @property
+    def paired(self) -> bool:
+        """Whether a trial shows two stimuli, one after the other."""
+        return self.task != "rating" or self.show == "pair"
+
     def levels_of(self, transition: str) -> tuple[int, ...]:
         """The differences that are shown of a transition: all in trials, the plainest in practice."""
         levels = self.differences_frames
@@ -153,20 +164,22 @@ def _check_task(study: StudySpec) -> None:
             f"{study.reference!r} and {study.comparison!r}; change one",
             "comparison",
         )
-    if study.task == "preference" and study.comparison in (None, study.reference):
+    if study.task != "same-different" and study.paired and study.comparison in (None, study.reference):
         raise KeyMismatchError(f"expected a comparison other than {study.reference!r} in {who}; name one", "comparison")
     if study.task == "rating":
         if not study.items:
             raise KeyMismatchError(f"expected at least one [[studies.items]] in {who}, found none; add one")
         check_once([item.name for item in study.items], "item's name", "items")
-        if study.order in ("both", "balanced"):
+        if not study.paired and study.order in ("both", "balanced"):
             raise KeyMismatchError(
                 f"expected 'random' or 'by-group' in {who}, where stimuli are shown singly, found {study.order!r}; "
-                "change it",
+                'change it, or write show = "pair"',
                 "order",
             )
-    elif study.items:
-        raise KeyMismatchError(f"expected items in rating studies only; remove them from {who}", "items")
+        return
+    for key in ("items", "show"):
+        if getattr(study, key):
+            raise KeyMismatchError(f"expected {key} in rating studies only; remove it from {who}", key)
 
 
 def check_once(values: Sequence[object], what: str, *location: int | str) -> None:

@@ -205,7 +205,7 @@ def _draft_pairs(
         for difference in study.levels_of(settled.transition.name):
             reference = need(study.reference)
             yield _DraftPair(study, settled, reference, need(study.reference, difference), study.reference, difference)
-    elif study.task == "preference":
+    elif study.paired:
         other = study.comparison or study.reference
         yield _DraftPair(study, settled, need(study.reference), need(other), other, None)
     else:
@@ -386,7 +386,7 @@ def _pair(draft: _DraftPair, stimuli: dict[_Key, Stimulus]) -> Pair:
     name = f"{study.name}/{transition.name}"
     if study.task == "same-different":
         name += f"/{draft.difference_frames:+d}"
-    elif study.task == "rating":
+    elif not study.paired:
         name += f"/{draft.method_b}"
     return Pair(
         name=name,
@@ -396,7 +396,7 @@ def _pair(draft: _DraftPair, stimuli: dict[_Key, Stimulus]) -> Pair:
         category=transition.category,
         a=stimuli[draft.a].id,
         b="" if draft.b is None else stimuli[draft.b].id,
-        method_a=draft.method_b if study.task == "rating" else study.reference,
-        method_b="" if study.task == "rating" else draft.method_b,
+        method_a=study.reference if study.paired else draft.method_b,
+        method_b=draft.method_b if study.paired else "",
         difference_frames=draft.difference_frames,
     )

@@ -41,16 +41,26 @@ def consent_text(protocol: Protocol) -> str:
 
 def welcome_text(protocol: Protocol) -> str:
     """What is read first; empty for nothing."""
-    pairs = any(study.task != "rating" for study in protocol.studies)
-    standard = _standard(protocol, "welcome_pairs" if pairs else "welcome_films")
+    standard = _standard(protocol, _welcome(protocol))
     if len(protocol.studies) > 1:
         standard += "\n\n" + _standard(protocol, "parts")
     return _filled(protocol.texts.welcome, standard, _slots(protocol))
 
 
+def _welcome(protocol: Protocol) -> str:
+    """Name of the built-in welcome: by whether films are shown in pairs, one at a time, or both."""
+    kinds = {study.paired for study in protocol.studies}
+    return "welcome_films_and_pairs" if len(kinds) > 1 else "welcome_pairs" if kinds == {True} else "welcome_films"
+
+
+def _task(study: StudySpec) -> str:
+    """Name of a study's built-in instructions."""
+    return "rating_pairs" if study.task == "rating" and study.paired else study.task
+
+
 def instructions_text(protocol: Protocol, study: StudySpec) -> str:
     """What is read before a study; empty for nothing."""
-    standard = _standard(protocol, study.task)
+    standard = _standard(protocol, _task(study))
     if study.practice:
         standard += "\n\n" + _standard(protocol, "practice")
     return _filled(study.instructions, standard, _slots(protocol))
@@ -115,16 +125,15 @@ def duration_s(protocol: Protocol, *, at_most: bool = False) -> float:
 def _trial_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
     stimuli, timing = protocol.stimuli, protocol.timing
     film_s = stimuli.entry_s + stimuli.exit_s + _FILM_BESIDES_S
-    if study.task == "rating":
-        return film_s + _ITEM_S * len(study.items) + timing.pause_s
+    shown_s = 2 * film_s + timing.gap_s if study.paired else film_s
     answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
-    return 2 * film_s + timing.gap_s + answer_s + timing.pause_s
+    return shown_s + (_ITEM_S * len(study.items) or answer_s) + timing.pause_s
 
 
 def _letters(protocol: Protocol) -> int:
     """How much there is to read before, between and after the trials."""
-    texts = [(protocol.consent.text, "consent"), (protocol.texts.welcome, "welcome_pairs")]
-    texts += [(study.instructions, study.task) for study in protocol.studies]
+    texts = [(protocol.consent.text, "consent"), (protocol.texts.welcome, _welcome(protocol))]
+    texts += [(study.instructions, _task(study)) for study in protocol.studies]
     texts.append((protocol.texts.debrief, "debrief"))
     return sum(len(text.strip().replace("{standard}", _standard(protocol, name))) for text, name in texts)
 

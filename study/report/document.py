@@ -69,6 +69,7 @@ def write_report(results_folder: str | Path, *, database: str | None = None, res
             resamples=resamples,
             rules=rules_of(settings.exclusions.model_dump()),
             checks=material.checks,
+            scale_points=material.protocol.scale_points,
         )
         page = compose(material, analysis, pictures.result())
     _write_files(folder, page, analysis)

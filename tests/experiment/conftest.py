@@ -12,7 +12,7 @@ from study.experiment.protocol import Protocol, parse_protocol
 # Tests are imported by path, without packages: this makes `toys` importable, here and in the processes they start.
 sys.path.insert(0, str(Path(__file__).parent))
 
-from toys import TOY_PROTOCOL, TOY_RATING, FakeStimuli, Toy, ToyLibrary, pairs_of
+from toys import TOY_PAIR_RATING, TOY_PROTOCOL, TOY_RATING, FakeStimuli, Toy, ToyLibrary, pairs_of
 
 
 @pytest.fixture
@@ -30,6 +30,11 @@ def toy_protocol() -> Protocol:
 @pytest.fixture
 def rating_protocol() -> Protocol:
     return parse_protocol(TOY_PROTOCOL + TOY_RATING)
+
+
+@pytest.fixture
+def pair_rating_protocol() -> Protocol:
+    return parse_protocol(TOY_PROTOCOL + TOY_PAIR_RATING)
 
 
 @pytest.fixture

@@ -247,6 +247,24 @@ def test_ratings_stay_on_their_scale_and_follow_utility(tmp_path, rating_protoco
     assert means["geodesic"] > means["cut"] + 0.5
 
 
+def test_rated_pairs_are_compared_second_with_first(tmp_path, pair_rating_protocol, make_stimuli):
+    """Turned by order, the answers have the mean that the truth names; as given, they lean either way."""
+    with open_responses(tmp_path) as responses:
+        simulate(pair_rating_protocol, make_stimuli(pair_rating_protocol), responses, 100, seed=1)
+        table = answers_frame(responses)
+    compared = table[table["study"] == "compared"].astype({"answer": float, "a_first": bool})
+    assert len(compared) == 100 * 2 * 2
+    assert compared["chose_a"].isna().all()
+    given = compared.groupby("a_first")["answer"].mean()
+    assert given[True] < 1.2  # the second is the cut, and the first is better
+    assert given[False] > 2.8
+    score = compared["answer"].where(compared["a_first"], 4 - compared["answer"])
+    expected = truth(pair_rating_protocol, default_observer())["studies"]["compared"]["mean_score"]
+    assert expected < 1.0
+    by_person = score.groupby(compared["participant"]).mean()
+    assert by_person.mean() == pytest.approx(expected, abs=4 * by_person.std() / 10)
+
+
 def test_front_ends_and_simulation_drive_the_same_session(toy_protocol, toy_stimuli):
     """What a simulated participant is asked is what the session asks: by hand the same trials come."""
     from study.experiment.observers import respond

@@ -9,7 +9,7 @@ from collections import Counter
 import pytest
 
 from study.errors import SessionError
-from study.experiment.plan import TRIAL_COLUMNS, draw_plan, plan_from_json, trial_table
+from study.experiment.plan import TRIAL_COLUMNS, draw_plan, groups_of, plan_from_json, trial_table
 
 
 def real(plan):
@@ -131,6 +131,23 @@ def test_rating_trials_rotate_by_group(rating_protocol, make_stimuli):
         shown = [trial.first for trial in trials if trial.study == "rating"]
         assert shown == rated[group:] + rated[:group]
         assert all(trial.second == "" for trial in trials if trial.study == "rating")
+
+
+def test_rated_pairs_say_which_method_is_first(pair_rating_protocol, make_stimuli):
+    """2003 section 4.2: half the participants see the original first, half the optimised one."""
+    pairs = make_stimuli(pair_rating_protocol).pairs
+    own = {pair.motion: pair for pair in pairs if pair.study == "compared"}
+    assert len(own) == 2
+    assert groups_of(pair_rating_protocol, pairs) == 2
+    for group in range(2):
+        plan = draw_plan(pair_rating_protocol, pairs, "p01", group=group)
+        trials = [trial for trial in plan.trials if trial.study == "compared"]
+        assert {trial.motion for trial in trials} == set(own)
+        for trial in trials:
+            a, b = own[trial.motion].a, own[trial.motion].b
+            assert (trial.method_a, trial.method_b, trial.a_first) == ("geodesic", "cut", group == 0)
+            assert (trial.first, trial.second) == ((a, b) if group == 0 else (b, a))
+            assert trial.reference_first is None
 
 
 def test_a_plan_survives_its_json(rating_protocol, make_stimuli):

@@ -111,6 +111,19 @@ def test_rating_studies_have_items_and_single_stimuli(rating_protocol):
     assert "shown singly" in refused('order = "by-group"', 'order = "both"', base)
 
 
+def test_ratings_of_pairs_compare_two_methods_in_any_order(pair_rating_protocol, rating_protocol):
+    study, single = pair_rating_protocol.study("compared"), rating_protocol.study("rating")
+    assert (study.paired, single.paired) == (True, False)
+    base = pair_rating_protocol.text
+    for order, trials in (("both", 4), ("random", 2), ("balanced", 2), ("by-group", 2)):
+        other = parse_protocol(base.replace('order = "by-group"', f'order = "{order}"'))
+        assert other.trials_of(other.study("compared")) == trials
+    assert "expected a comparison other than 'geodesic'" in refused('comparison = "cut"\n', "", base)
+    assert "expected 'single' or 'pair'" in refused('show = "pair"', 'show = "pairs"', base)
+    said = refused('question = "Which is more natural?"', 'question = "Which?"\nshow = "pair"', base)
+    assert "expected show in rating studies only; remove it from the preference study 'liking'" in said
+
+
 def test_a_sitting_may_hold_the_four_studies_of_2004():
     """Section 4.1: all in a single session; 42 + 8 + 8 + 8 pairs (here with the methods that there are)."""
     text = GOOD.split("[[transitions]]")[0]

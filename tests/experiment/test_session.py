@@ -146,6 +146,19 @@ def test_a_trial_is_not_repeated_for_ever(opened):
     assert current(open_session(opened.protocol, opened.plan, answers)).kind == "debrief"
 
 
+def test_a_rated_pair_shows_both_and_then_asks_every_item(pair_rating_protocol, make_stimuli):
+    plan = draw_plan(pair_rating_protocol, make_stimuli(pair_rating_protocol).pairs, "p01")
+    seen = []
+    run(open_session(pair_rating_protocol, plan), choose=lambda step: step.legal[-1], seen=seen)
+    asked = [step for step in seen if step.study == "compared" and step.kind == "answer"]
+    assert [step.item for step in asked] == ["better", "natural"] * 2
+    assert {(step.legal, step.duration_s) for step in asked} == {(("0", "1", "2", "3", "4"), None)}
+    steps = [step for step in seen if step.trial == asked[0].trial]
+    assert [step.kind for step in steps] == ["first", "gap", "second", "answer", "answer", "pause"]
+    trial = plan.trial(asked[0].trial)
+    assert (steps[0].stimulus, steps[2].stimulus) == (trial.first, trial.second)
+
+
 def test_rating_asks_every_item_without_time_limit(rating_protocol, make_stimuli):
     plan = draw_plan(rating_protocol, make_stimuli(rating_protocol).pairs, "p01")
     seen = []

@@ -204,6 +204,17 @@ def test_rating_pairs_hold_one_stimulus_each(rating_protocol, toys):
     ]
 
 
+def test_rated_pairs_hold_both_methods(pair_rating_protocol, toys):
+    made = prepare(pair_rating_protocol, toys)
+    rated = [pair for pair in made.pairs if pair.study == "compared"]
+    assert [(pair.name, pair.method_a, pair.method_b) for pair in rated] == [
+        ("compared/slow_quick", "geodesic", "cut"),
+        ("compared/still_slow", "geodesic", "cut"),
+    ]
+    for pair in rated:
+        assert [made.stimulus(name).record.method for name in (pair.a, pair.b)] == ["geodesic", "cut"]
+
+
 # --- refusals ------------------------------------------------------------------------------------------------------
 
 

@@ -14,7 +14,7 @@ from study.experiment.proofreading import to_do
 from study.experiment.protocol import parse_protocol
 from study.experiment.protocol_parts import Consent, Texts
 from study.experiment.session import current, open_session
-from study.experiment.wording import all_texts, duration_s, minutes
+from study.experiment.wording import all_texts, duration_s, instructions_text, minutes, welcome_text
 
 LANGUAGES = languages()
 FORM = 'form = [{ name = "age", required = true }, { name = "gender" }, { name = "vision" }, { name = "animation" }]\n'
@@ -188,11 +188,25 @@ def test_a_sitting_lasts_as_long_as_its_parts(toy_protocol):
     assert [minutes(s) for s in (1, 60, 61, 599, 601, 960)] == [1, 1, 2, 10, 15, 20]
 
 
-def test_the_number_of_trials_is_that_of_the_plan(toy_protocol, rating_protocol, make_stimuli):
+def test_rated_pairs_take_the_time_of_two_films_and_have_words_of_their_own(pair_rating_protocol, rating_protocol):
+    pairs, films = pair_rating_protocol.text, rating_protocol.text
+    apart = duration_s(parse_protocol(pairs)) - duration_s(
+        parse_protocol(pairs.replace('show = "pair"\n', ""))
+    )  # two pairs of films with a gap, two items each, against four films with two items each
+    assert apart == pytest.approx(2 * (2 * 1.6 + 1 + 12 + 1) - 4 * (1.6 + 12 + 1))
+    asked = 'instructions = "{standard}"'
+    own = parse_protocol(pairs.replace('show = "pair"', f'show = "pair"\n{asked}'))
+    assert "how the second film was, compared with the first" in instructions_text(own, own.study("compared"))
+    for text, said in ((pairs, "pairs of short films"), (films, "in some parts one at a time")):
+        standard = parse_protocol(text.replace('welcome = "Welcome."', 'welcome = "{standard}"'))
+        assert said in welcome_text(standard)
+
+
+def test_the_number_of_trials_is_that_of_the_plan(toy_protocol, rating_protocol, pair_rating_protocol, make_stimuli):
     more = toy_protocol.text.replace(
         'order = "both"', 'order = "both"\nrepeats = 2\npractice = 3\nattention_checks = 2'
     )
-    for protocol in (toy_protocol, rating_protocol, parse_protocol(more)):
+    for protocol in (toy_protocol, rating_protocol, pair_rating_protocol, parse_protocol(more)):
         plan = draw_plan(protocol, make_stimuli(protocol).pairs, "p01")
         for study in protocol.studies:
             shown = [trial for trial in plan.trials if trial.study == study.name and trial.role == "trial"]

@@ -185,7 +185,7 @@ def pairs_of(protocol: Protocol) -> tuple[Pair, ...]:
                 for d in study.levels_of(transition.name):
                     b = f"{transition.name}{d:+d}" if d else base.a
                     pairs.append(replace(base, name=f"{base.name}/{d:+d}", b=b, difference_frames=d))
-            elif study.task == "preference":
+            elif study.paired:
                 pairs.append(base)
             else:
                 for m in study.methods:
@@ -201,3 +201,26 @@ class FakeStimuli:
     pairs: tuple[Pair, ...]
     library: str = "toy"
     synthetic: bool = True
+
+
+TOY_PAIR_RATING = """
+[[studies]]
+name = "compared"
+task = "rating"
+show = "pair"
+reference = "geodesic"
+comparison = "cut"
+order = "by-group"
+
+[[studies.items]]
+name = "better"
+question = "Compared with the first, the second was:"
+low = "much worse"
+high = "much better"
+
+[[studies.items]]
+name = "natural"
+question = "Compared with the first, the second looked:"
+low = "much less natural"
+high = "much more natural"
+"""
