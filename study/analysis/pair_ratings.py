@@ -1,8 +1,8 @@
 """Ratings of one method compared with another: answers of a rating task on pairs in, a table by question out.
 
 Wang & Bodenheimer 2003, Table 2: how the optimised motion compares with the original one, from 0 (much worse) to 4
-(much better), as mean and standard deviation. Participants compare the second of a pair with the first; their answers are
-turned by the order of presentation, so that a score says how method b, the comparison, compares with method a, the
+(much better), as mean and standard deviation. Participants compare the second of a pair with the first; their answers
+are turned by the order of presentation, so that a score says how method b, the comparison, compares with method a, the
 reference. The middle of the scale means no difference, and stays where it is.
 """
 

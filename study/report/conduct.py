@@ -142,7 +142,7 @@ def exclusion_tables(analysis: Result) -> tuple[tables.Table, ...]:
 
 
 def _main_results(analysis: Result) -> Iterator[dict[str, Any]]:
-    """One row a result: thresholds, preferences, mean ratings."""
+    """One row a result: thresholds, preferences, comparisons on a scale, mean ratings."""
     for study, found in analysis["jnd"].items():
         thresholds = found["model"]["jnd"] if found["model"] else found["published"]
         for side, threshold in thresholds.items():
@@ -155,6 +155,12 @@ def _main_results(analysis: Result) -> Iterator[dict[str, Any]]:
             methods = f"{words.readable(compared['method_a'])} over {words.readable(compared['method_b'])}"
             ends = {end: people[end] for end in ("low", "high", "p_value")}
             yield {"result": f"{words.readable(study)}: {methods} [%]", "value": people["mean_percent"], **ends}
+    for study, questions in analysis["pair_ratings"].items():
+        for question in questions:
+            people = question["participants"]
+            what = words.readable(": ".join(filter(None, (question["item"], question["of"]))))
+            ends = {end: people[end] for end in ("low", "high", "p_value")}
+            yield {"result": f"{words.readable(study)}: {what}", "value": people["mean"], **ends}
     for study, ratings in analysis["ratings"].items():
         for rated in ratings:
             what = words.readable(": ".join(filter(None, (rated["item"], rated["method"]))))

@@ -108,7 +108,7 @@ def references(protocol: Protocol, analysis: Result) -> list[str]:
     methods = {method for study in protocol.studies for method in study.methods}
     cuts = {method for method in methods if method.startswith("cut")}
     used = {"slerp"} if methods - cuts else set()
-    used |= {"2003"} if cuts or analysis["ratings"] else set()
+    used |= {"2003"} if cuts or analysis["ratings"] or analysis["pair_ratings"] else set()
     used |= {"2004"} if methods & {"geodesic", "velocity", "timewarp", "fixed"} or analysis["jnd"] else set()
     used |= {"2019"} if "one-hop" in methods else set()
     used |= {"fieller", "differencing", "wilson"} if analysis["jnd"] else set()
@@ -142,9 +142,10 @@ def _study(study: StudySpec) -> str:
         what = f"participants chose the more natural of two transitions, {_against(study)}"
     else:
         asked = words.number(len(study.items), "question")
-        what = f"participants rated {_against(study)} on a scale of 0 to {study.scale_points - 1} in {asked}"
+        done = "compared the second of two transitions with the first," if study.paired else "rated"
+        what = f"participants {done} {_against(study)}, on a scale of 0 to {study.scale_points - 1} in {asked}"
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
-    order = (SINGLE_ORDERS if study.task == "rating" else ORDERS)[study.order]
+    order = (ORDERS if study.paired else SINGLE_ORDERS)[study.order]
     return f"In “{title}”, {what}. {order}{repeated}."
 
 
@@ -174,7 +175,7 @@ def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
 
 def _procedure(protocol: Protocol, analysis: Result, presentations: pd.DataFrame) -> str:
     timing = protocol.timing
-    paired = any(study.task != "rating" for study in protocol.studies)
+    paired = any(study.paired for study in protocol.studies)
     pair = f"The two stimuli of a pair followed each other after {timing.gap_s:g} s. " if paired else ""
     rest = (
         f" A break was offered after every {words.number(timing.break_after, 'trial')}." if timing.break_after else ""
@@ -232,6 +233,12 @@ def _analysis(protocol: Protocol, analysis: Result) -> str:
         parts.append(
             "Ratings were compared by the two-way between-subjects analysis of variance of 2003 (method by order; type "
             "III sums of squares), and by Student’s t of each participant’s own difference."
+        )
+    if analysis["pair_ratings"]:
+        parts.append(
+            "Comparisons on a scale were turned by the order of presentation, so that they say how the comparison was "
+            "rated against the reference; one mean score a participant was tested against the middle of the scale by "
+            "Student’s t and Wilcoxon’s signed ranks, and between the orders by analysis of variance."
         )
     parts.append(
         f"Intervals are of {100 * analysis['confidence']:g}%, the level of significance is {analysis['alpha']:g}. "

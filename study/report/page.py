@@ -13,6 +13,7 @@ from study.report import (
     course,
     figures,
     methods,
+    pair_ratings_section,
     planning,
     preference_section,
     ratings_section,
@@ -141,6 +142,12 @@ def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
             comparisons = [_in_order(comparison, names) for comparison in analysis["preference"][name]]
             made = preference_section.preference_section(
                 name, title, comparisons, mark=mark, strengths=analysis["bradley_terry"].get(name)
+            )
+        elif analysis["pair_ratings"].get(name):
+            questions = [_in_order(question, names) for question in analysis["pair_ratings"][name]]
+            ends = {item.name: (item.low, item.high) for item in study.items}
+            made = pair_ratings_section.pair_ratings_section(
+                name, title, questions, ends, mark=mark, alpha=float(analysis["alpha"])
             )
         elif analysis["ratings"].get(name):
             compared, cells = analysis["rating_anova"].get(name, ()), analysis["rating_cells"].get(name, ())

@@ -24,6 +24,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     # What a row is about.
     "study": ("study", "text"),
     "motion": ("motion", "text"),
+    "point": ("point", "count"),
     "transition": ("transition", "text"),
     "result": ("result", "text"),
     "comparison": ("comparison", "text"),
@@ -64,6 +65,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "p_value": ("p", "p"),
     "exact_p_value": ("exact p", "p"),
     "holm_p_value": ("Holm p", "p"),
+    "signed_rank_p_value": ("signed-rank p", "p"),
     "sum_of_squares": ("SS", "two"),
     "mean_square": ("MS", "two"),
     "partial_eta_squared": ("partial η²", "two"),
