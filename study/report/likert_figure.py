@@ -97,7 +97,7 @@ def _percent_axis(axes: Axes, widest: float, question: Result) -> None:
     steps = range(-edge, edge + 1, 25 if edge <= 75 else 50)
     axes.set_xlim(-edge - 3, edge + 3)
     axes.set_xticks(list(steps), [f"{abs(step)}{'%' if step == steps[-1] else ''}" for step in steps])
-    axes.axvline(0, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=3)
+    axes.axvline(0, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=0)
     axes.set_xlabel(f"← {readable(question['method_a'])} · answers for · {readable(question['method_b'])} →")
 
 

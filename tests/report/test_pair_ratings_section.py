@@ -1,0 +1,101 @@
+"""The section of a study in which pairs were rated: headline, figure, tables, what can't be told."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import pandas as pd
+import pytest
+
+from study.analysis.pair_ratings import pair_ratings
+from study.report.likert_figure import likert_figure, shades
+from study.report.pair_ratings_section import pair_ratings_section
+from study.report.sections import Section
+
+ENDS = {"better": ("much worse", "much better"), "natural": ("much less natural", "much more natural")}
+
+
+def answers(scores: dict[str, list[int]]) -> pd.DataFrame:
+    rows = [
+        {"participant": f"p{person}", "item": item, "method_a": "old_cut", "method_b": "new_cut", "motion": "dance"}
+        | {"a_first": person % 2 == 0, "answer": score if person % 2 == 0 else 4 - score}
+        for item, own in scores.items()
+        for person, score in enumerate(own)
+    ]
+    return pd.DataFrame(rows)
+
+
+def section_of(scores: dict[str, list[int]], mark: str = "") -> Section:
+    return pair_ratings_section("compared", "Compared", pair_ratings(answers(scores), 5), ENDS, mark=mark, alpha=0.05)
+
+
+TWO = {"better": [4, 3, 3, 4, 3, 2, 3, 4], "natural": [2, 3, 2, 3, 2, 2, 1, 3]}
+
+
+def test_the_headline_counts_the_questions_and_gives_each_test() -> None:
+    section = section_of(TWO)
+    (headline,) = section.headlines
+    assert headline.statement == (
+        "Compared with old cut, new cut was rated above the middle of the scale in 2 of 2 questions, in 1 of them "
+        "significantly at 0.05 across 8 participants."
+    )
+    size = "16 answers of 8 participants, on a scale of 0 to 4, where 2 means no difference."
+    assert headline.detail.startswith(f"{size} Better: 3.25 [2.66, 3.84], t(7) = ")
+    assert [row["result"] for row in section.readings] == [
+        "better: new cut compared with old cut",
+        "natural: new cut compared with old cut",
+    ]
+    assert section.readings[0]["published"] == "3.25 (SD 0.71)"
+    assert section.readings[0]["corrected"].startswith("3.25 [2.66, 3.84], t(7) = 5.00, p = .002")
+
+
+def test_what_is_worse_is_called_worse_and_one_question_is_told_by_its_mean() -> None:
+    (headline,) = section_of({"better": [0, 1, 1, 0, 1, 2]}).headlines
+    assert headline.statement == (
+        "Compared with old cut, new cut was rated 0.83 on average, on a scale of 0 to 4, where 2 means no difference; "
+        "across participants this is not chance (p = .013)."
+    )
+    (both,) = section_of({"better": [0, 1, 1, 0], "natural": [1, 1, 0, 1]}).headlines
+    assert "was rated below the middle of the scale in 2 of 2 questions" in both.statement
+
+
+def test_the_tables_hold_published_and_corrected_orders_and_motions() -> None:
+    section = section_of(TWO)
+    assert [table.name for table in section.tables] == ["compared_published", "compared_corrected"]
+    assert [table.name for table in section.folded] == [
+        "compared_points",
+        "compared_orders",
+        "compared_order_effect",
+        "compared_motions",
+    ]
+    points = {(row["item"], row["point"]): row["answers"] for row in section.folded[0].rows}
+    assert points[("better", 3)] == 4
+    assert sum(points.values()) == 16
+    assert [row["order"] for row in section.folded[1].rows[:2]] == ["old cut", "new cut"]
+    assert section.folded[2].rows[0]["error_degrees_of_freedom"] == 6
+
+
+def test_what_can_not_be_told_is_said() -> None:
+    section = section_of({"better": [3]})
+    assert section.headlines[0].statement.endswith("where 2 means no difference.")
+    assert "no test can be made" in section.headlines[0].detail
+    assert "One participant: no spread to judge by." in section.notes
+    assert any(note.startswith("One order of presentation") for note in section.notes)
+    section = section_of({"better": [2, 2, 2, 2], "natural": [2, 2, 2, 2]})
+    assert section.headlines[0].statement == "New cut was rated the same as old cut on average."
+
+
+def test_the_figure_says_its_numbers_and_its_mark() -> None:
+    (drawing,) = section_of(TWO, "simulated answers, no people").drawings
+    ET.fromstring(drawing.svg)
+    assert "better: 0 at 0, 0 at 1, 1 at 2, 4 at 3, 3 at 4; mean 3.25" in drawing.svg
+    for words in ("simulated answers, no people", "much worse – much better", "new cut →", "points of the scale"):
+        assert words in drawing.svg
+
+
+@pytest.mark.parametrize("points", [2, 4, 5, 11])
+def test_every_point_has_a_colour_of_its_own(points: int) -> None:
+    found = shades(points)
+    assert len(set(found)) == points
+    few = pair_ratings(answers({"better": [0, 0, 0]}).assign(answer=[0, points - 1, 0]), points)
+    assert "mean 0.00" in likert_figure(few, "place", "", {})  # all at one end
