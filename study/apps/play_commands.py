@@ -64,8 +64,8 @@ def play(
     from study.experiment.stimuli import record
 
     pixels = _size(size)
-    loaded = load_for_people(protocol)
     check_display(monitor)
+    loaded = load_for_people(protocol)
     stimuli = prepare_stimuli(loaded, library)
     folder = results_folder(loaded, out)
     check_database(database, stimuli)

@@ -115,8 +115,8 @@ def read_on(tab, keys=True):
         tab.key("Enter")
     elif seen.startswith("Continue") or seen == "form":
         tab.try_click("Continue")
-    elif seen.startswith("Try again"):
-        tab.try_click("Try again")
+    elif seen.startswith(("Try again", "Go on here instead")):
+        tab.try_click(seen)
     time.sleep(0.03)
 
 
