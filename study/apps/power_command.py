@@ -81,10 +81,12 @@ def planned(
         run = made.rating_study(design(settings), alpha, options["difference"])
         said = {
             "icc": options["correlation"],
-            "test": f"Student's t of participants' differences at {alpha:g}, one question",
+            "test": f"Student's t of participants' {'mean scores' if study.paired else 'differences'} at {alpha:g}, "
+            "one question",
             "aim": f"find a difference of {options['difference']:g} points in one question at the level {alpha:g}",
         }
-        verdict = _rating_verdict(study, options["difference"], alpha)
+        made_verdict = _pair_rating_verdict if study.paired else _rating_verdict
+        verdict = made_verdict(study, options["difference"], alpha)
     else:
         effect = {key: options[key] for key in ("shorter", "longer", "spread", "precision")}
         settings = made.same_different_observer(options["shorter"], options["longer"], options["spread"], missed)
@@ -120,6 +122,17 @@ def _rating_verdict(study: StudySpec, difference: float, alpha: float) -> Callab
         # Differences are of the later method by name from the earlier; the effect is of the comparison.
         sign = 1 if str(test["of"]).startswith(f"{study.comparison} minus") else -1
         return test["p_value"] < alpha and (difference == 0 or (sign * test["mean"] > 0) == (difference > 0))
+
+    return found
+
+
+def _pair_rating_verdict(study: StudySpec, difference: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        questions = result["pair_ratings"].get(study.name) or []
+        test = questions[0]["participants"] if questions else None
+        if test is None or test["p_value"] is None:
+            return False
+        return test["p_value"] < alpha and (difference == 0 or (test["t"] > 0) == (difference > 0))
 
     return found
 

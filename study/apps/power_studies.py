@@ -132,7 +132,13 @@ def _found(chosen: FloatArray, shown: FloatArray, share: float, alpha: float) ->
 
 
 def rating_study(design: Design, alpha: float, difference: float) -> Run:
-    """Whether the t test of the participants' own differences of the two methods finds them, for one question."""
+    """Whether the t test over participants finds how the methods differ, for one question.
+
+    Of each participant's own difference of the two methods' ratings; where pairs are rated, of the mean score less the
+    middle of the scale.
+    """
+    if design.study.paired:
+        return _pair_rating_study(design, alpha, difference)
     trials, rating = design.trials(), design.settings.rating
     sides = np.array([[1.0 if trial.method_a == design.study.comparison else 0.0 for trial in own] for own in trials])
     points = design.study.scale_points
@@ -150,17 +156,40 @@ def rating_study(design: Design, alpha: float, difference: float) -> Run:
             count = rows.sum(axis=2)
             seen &= count > 0
             means.append((given * rows).sum(axis=2) / np.maximum(count, 1))
-        apart = means[0] - means[1]
-        found = []
-        for size in sizes:
-            there = seen[:, :size]
-            p_value = student_p_values(apart[:, :size], there, 0.0)
-            mean = (apart[:, :size] * there).sum(axis=1)
-            towards = (mean > 0) == (difference > 0) if difference else np.ones(studies, dtype=bool)
-            found.append((p_value < alpha) & towards)
-        return np.column_stack(found)
+        return _apart(means[0] - means[1], seen, sizes, alpha, difference)
 
     return run
+
+
+def _pair_rating_study(design: Design, alpha: float, difference: float) -> Run:
+    """Scores of the comparison against the reference; whether a trial showed one or the other first changes nothing."""
+    trials, rating = design.trials(), design.settings.rating
+    shown, points = len(trials[0]), design.study.scale_points
+
+    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        people, middle = max(sizes), (points - 1) / 2
+        leaning = middle + difference + rating.participant_sd * rng.standard_normal((studies, people, 1))
+        noise = rating.noise_sd * rng.standard_normal((studies, people, shown))
+        given = np.clip(np.round(leaning + noise), 0, points - 1)
+        response_s, answered = _times(design, rng, np.full(given.shape, 0.5))
+        kept = _kept(design, rng, response_s, answered)
+        count = kept.sum(axis=2)
+        apart = (given * kept).sum(axis=2) / np.maximum(count, 1) - middle
+        return _apart(apart, count > 0, sizes, alpha, difference)
+
+    return run
+
+
+def _apart(apart: FloatArray, seen: BoolArray, sizes: Sequence[int], alpha: float, difference: float) -> BoolArray:
+    """Significant, and in the right direction (either way where there is no difference), for each number of people."""
+    found = []
+    for size in sizes:
+        there = seen[:, :size]
+        p_value = student_p_values(apart[:, :size], there, 0.0)
+        mean = (apart[:, :size] * there).sum(axis=1)
+        towards = (mean > 0) == (difference > 0) if difference else np.ones(len(apart), dtype=bool)
+        found.append((p_value < alpha) & towards)
+    return np.column_stack(found)
 
 
 def same_different_study(design: Design, precision: float, level: float) -> Run:
@@ -273,6 +302,7 @@ def whole_sessions(design: Design, verdict: Any) -> Run:
                     alpha=settings.alpha,
                     rules=design.rules,
                     checks=checks,
+                    scale_points=design.protocol.scale_points,
                     resamples=10,
                 )
                 found[number, place] = verdict(result)
@@ -298,7 +328,8 @@ def _sitting(design: Design, plan: Plan, seed: int) -> pd.DataFrame:
         trial = state.plan.trial(step.trial)
         value, response_s = respond(who, trial, step)
         state = (sitting.missed(state) if value is None else sitting.answered(state, value, response_s or 0.0))[0]
-        chose_a = None if value is None or trial.a_first is None else (value == "first") == trial.a_first
+        chosen = value is not None and trial.task == "preference"
+        chose_a = (value == "first") == trial.a_first if chosen else None
         rows.append(
             {
                 "participant": plan.participant, "task": trial.task, "study": trial.study, "role": trial.role,

@@ -105,9 +105,23 @@ high = "very"
 [[studies.items]]
 name = "noticeable"
 question = "How noticeable was the passage?"
+
+[[studies]]
+name = "compared"
+task = "rating"
+show = "pair"
+reference = "geodesic"
+comparison = "cut"
+order = "by-group"
+
+[[studies.items]]
+name = "better"
+question = "Compared with the first, the second was:"
+low = "much worse"
+high = "much better"
 """
 
-QUESTIONS = 1 + 4 + 1 + 1 + 2 * 2
+QUESTIONS = 1 + 4 + 1 + 1 + 2 * 2 + 1
 
 
 def protocol_of(text: str = PROTOCOL) -> Protocol:

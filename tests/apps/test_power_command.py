@@ -15,7 +15,13 @@ from scipy.stats import binom, nct, t
 from study.analysis.exclusions import Rules
 from study.apps import power_studies
 from study.apps.cli import run
-from study.apps.power_command import _preference_verdict, _rating_verdict, _threshold_verdict, plans_of
+from study.apps.power_command import (
+    _pair_rating_verdict,
+    _preference_verdict,
+    _rating_verdict,
+    _threshold_verdict,
+    plans_of,
+)
 from study.apps.power_studies import Design
 from study.apps.study_commands import load
 
@@ -100,6 +106,18 @@ def test_ratings_at_once_are_those_of_whole_sessions() -> None:
 
 
 @pytest.mark.slow
+def test_rated_pairs_at_once_are_those_of_whole_sessions() -> None:
+    protocol = load("transition_points")
+    study = protocol.study("compared")
+    protocol = protocol.model_copy(update={"studies": (study.model_copy(update={"items": study.items[:1]}),)})
+    settings = power_studies.rating_observer(study, 0.6, 0.2, 0.0)
+    design = Design(protocol, protocol.studies[0], plans_of(protocol, None, 12), settings, Rules())
+    fast = power_studies.rating_study(design, 0.05, 0.6)
+    found = both_ways(design, fast, _pair_rating_verdict(study, 0.6, 0.05), 12, 60)
+    assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(60))
+
+
+@pytest.mark.slow
 def test_thresholds_are_those_of_whole_sessions() -> None:
     protocol = load("blend_length_jnd")
     study = protocol.studies[0]
@@ -129,7 +147,11 @@ def test_the_verb_writes_what_the_report_reads(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_every_task_has_a_curve(capsys: pytest.CaptureFixture[str]) -> None:
-    for name, more in (("transition_points", ["--difference", "1.5"]), ("blend_length_jnd", ["--precision", "3"])):
+    for name, more in (
+        ("transition_points", ["--study", "cuts", "--difference", "1.5"]),
+        ("transition_points", ["--study", "compared", "--difference", "0.7"]),
+        ("blend_length_jnd", ["--precision", "3"]),
+    ):
         assert run(["power", name, "--participants", "5,26", "--studies", "10", *more, "--json"]) == 0
         powers = [point["power"] for point in json.loads(capsys.readouterr().out)["points"]]
         assert powers[0] < powers[1]

@@ -149,6 +149,10 @@ def test_window_browser_and_simulation_have_the_same_trials(
     assert [group for group, _ in plans["window"]] == [0, 1]
     tasks = {trial["task"] for _, trials in plans["window"] for trial in trials}
     assert tasks == {"same-different", "preference", "rating"}
+    # A pair is rated after both its films, in the order of the group.
+    compared = [trial for _, trials in plans["window"] for trial in trials if trial["study"] == "compared"]
+    assert [trial["a_first"] for trial in compared] == [True, False]
+    assert all(trial["second"] for trial in compared)
 
     # The tables of answers: the same columns of the same types, the same rows, but for answers and marks.
     assert {tuple(one.columns) for one in tables.values()} == {ANSWER_COLUMNS}

@@ -38,7 +38,7 @@ def test_a_whole_session_of_every_task(serve, responses):
     assert stored_form(responses, 1) == {"age": "33"}
     with responses.engine.connect() as connection:
         shown = connection.execute(sa.select(presentations)).mappings().all()
-    assert len(shown) == 2 * 7 + 2
+    assert len(shown) == 2 * 8 + 2
     assert {row["frames_presented"] == row["frames_expected"] for row in shown} == {True}
     assert happenings(responses, "finished") == [None]
     assert happenings(responses, "consent") == [None]
@@ -188,7 +188,7 @@ def test_a_page_learns_nothing_of_what_answers_mean(serve, stimuli):
         said.append(json.dumps(view))
         films += [film["url"] for film in view.get("films", [])]
         view = person.step(view)
-    assert len(films) == len(set(films)) == 2 * 7 + 2
+    assert len(films) == len(set(films)) == 2 * 8 + 2
     words = {record.id for record in stimuli.records} | {"difference_frames", "geodesic", "fixed", "cut", "expected"}
     assert not [word for word in words for text in said if word in text]
 

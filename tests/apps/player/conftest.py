@@ -79,6 +79,21 @@ name = "smooth"
 question = "How smooth was it?"
 """
 
+COMPARED = """
+[[studies]]
+name = "compared"
+task = "rating"
+show = "pair"
+reference = "geodesic"
+comparison = "cut"
+
+[[studies.items]]
+name = "better"
+question = "Compared with the first film, the second one was:"
+low = "much worse"
+high = "much better"
+"""
+
 ABOUT_YOU = """
 [consent]
 text = "We store your answers."
@@ -162,7 +177,7 @@ def store() -> ListStore:
 @pytest.fixture(scope="session")
 def texts() -> dict[str, str]:
     """The pieces of TOML that tests put together, by name."""
-    return {"small": SMALL, "rating": RATING, "about_you": ABOUT_YOU}
+    return {"small": SMALL, "rating": RATING, "compared": COMPARED, "about_you": ABOUT_YOU}
 
 
 @pytest.fixture

@@ -24,9 +24,11 @@ def test_a_session_from_start_to_end(
     start: Start, protocol_file: Path, tmp_path: Path, make_small: Any, texts: Any
 ) -> None:
     out = tmp_path / "results"
+    more = texts["rating"] + texts["compared"]
+    protocol_file.write_text(texts["small"] + more)
     playing = start(protocol_file, "--participant", "p1", "--out", out, "--json")
     playing.opened()
-    playing.press_all(("space", "s", "7", "Left", "Return"), 120)
+    playing.press_all(("space", "s", "7", "3", "Left", "Return"), 120)
     result = json.loads(playing.ended())
     assert playing.process.returncode == 0, playing.said
     assert result["end"] == "finished"
@@ -34,7 +36,7 @@ def test_a_session_from_start_to_end(
     assert result["window"]["viewport"] == [800, 600]
     assert not result["window"]["timing_measured"]
     assert any("TIMING WAS NOT MEASURED" in line for line in playing.said)
-    small = make_small(texts["rating"])
+    small = make_small(more)
     with open_responses(out) as responses:
         record = find_session(responses, "p1")
         assert record is not None
@@ -47,7 +49,7 @@ def test_a_session_from_start_to_end(
         assert given == Counter(
             (trial.trial, item)
             for trial in record.plan.trials
-            for item in (("natural", "smooth") if trial.task == "rating" else ("",))
+            for item in [item.name for item in small.protocol.study(trial.study).items] or [""]
         )
         assert set(table.answer[table.task == "same-different"]) <= {"same", "different", None}
         assert (table.response_s.dropna() > 0).all()
