@@ -32,6 +32,7 @@ class Item(Part):
     name: Slug = Field(description="What the answers call it; unique in its study.")
     question: str = Field(min_length=1, description="What the participant reads.")
     low: str = Field(default="", description="Words at the lowest point of the scale.")
+    middle: str = Field(default="", description="Words at the middle of a scale with an odd number of points.")
     high: str = Field(default="", description="Words at the highest point of the scale.")
 
 
@@ -175,6 +176,12 @@ def _check_task(study: StudySpec) -> None:
                 f"expected 'random' or 'by-group' in {who}, where stimuli are shown singly, found {study.order!r}; "
                 'change it, or write show = "pair"',
                 "order",
+            )
+        if named := [item.name for item in study.items if item.middle and study.scale_points % 2 == 0]:
+            raise KeyMismatchError(
+                f"expected an odd number of scale_points in {who}, where {named[0]!r} has words for the middle, found "
+                f"{study.scale_points}; change it, or remove middle",
+                "scale_points",
             )
         return
     for key in ("items", "show"):

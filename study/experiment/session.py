@@ -103,8 +103,8 @@ class Step:
         The rating item that is asked.
     legal
         The answers that count.
-    low, high
-        Words at the ends of a rating scale.
+    low, middle, high
+        Words at the ends and in the middle of a rating scale.
     role
         What the trial is for: `trial`, `practice` or `check`; empty outside trials.
     """
@@ -119,6 +119,7 @@ class Step:
     item: str = ""
     legal: tuple[str, ...] = ()
     low: str = ""
+    middle: str = ""
     high: str = ""
     role: str = ""
 
@@ -443,7 +444,7 @@ def _trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset
         steps.append(replace(ask, text=words))
     elif study.items:
         steps += [
-            replace(ask, item=item.name, text=item.question, low=item.low, high=item.high)
+            replace(ask, item=item.name, text=item.question, low=item.low, middle=item.middle, high=item.high)
             for item in study.items
             if item.name not in done
         ]

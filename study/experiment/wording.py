@@ -156,7 +156,8 @@ def all_texts(protocol: Protocol) -> tuple[Read, ...]:
         found.append(Read(f"{study.name}: instructions", instructions_text(protocol, study)))
         found.append(Read(f"{study.name}: question", question_text(protocol, study)))
         for item in study.items:
-            ends = f" [{item.low} ... {item.high}]" if item.low or item.high else ""
+            scale = " ... ".join(filter(None, (item.low, item.middle, item.high)))
+            ends = f" [{scale}]" if scale else ""
             found.append(Read(f"{study.name}: item {item.name}", item.question + ends))
     found.append(Read("texts.debrief", debrief_text(protocol)))
     small = [name for name in type(protocol.texts).model_fields if name not in ("welcome", "debrief")]

@@ -120,6 +120,7 @@ def test_ratings_of_pairs_compare_two_methods_in_any_order(pair_rating_protocol,
         assert other.trials_of(other.study("compared")) == trials
     assert "expected a comparison other than 'geodesic'" in refused('comparison = "cut"\n', "", base)
     assert "expected 'single' or 'pair'" in refused('show = "pair"', 'show = "pairs"', base)
+    assert "an odd number of scale_points" in refused('show = "pair"', 'show = "pair"\nscale_points = 4', base)
     said = refused('question = "Which is more natural?"', 'question = "Which?"\nshow = "pair"', base)
     assert "expected show in rating studies only; remove it from the preference study 'liking'" in said
 

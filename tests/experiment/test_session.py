@@ -153,6 +153,7 @@ def test_a_rated_pair_shows_both_and_then_asks_every_item(pair_rating_protocol, 
     asked = [step for step in seen if step.study == "compared" and step.kind == "answer"]
     assert [step.item for step in asked] == ["better", "natural"] * 2
     assert {(step.legal, step.duration_s) for step in asked} == {(("0", "1", "2", "3", "4"), None)}
+    assert (asked[0].low, asked[0].middle, asked[0].high) == ("much worse", "the same", "much better")
     steps = [step for step in seen if step.trial == asked[0].trial]
     assert [step.kind for step in steps] == ["first", "gap", "second", "answer", "answer", "pause"]
     trial = plan.trial(asked[0].trial)

@@ -216,6 +216,7 @@ order = "by-group"
 name = "better"
 question = "Compared with the first, the second was:"
 low = "much worse"
+middle = "the same"
 high = "much better"
 
 [[studies.items]]

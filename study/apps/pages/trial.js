@@ -116,7 +116,8 @@ function question(asked, study, from) {
       resolve({ value, at, began });
     };
     const row = options(asked, study, finish);
-    const ends = asked.low || asked.high ? element("div", { class: "ends" }, element("span", {}, asked.low), element("span", {}, asked.high)) : null;
+    const named = asked.middle ? [asked.low, asked.middle, asked.high] : [asked.low, asked.high];
+    const ends = named.some(Boolean) ? element("div", { class: asked.middle ? "ends thirds" : "ends" }, ...named.map((words) => element("span", {}, words))) : null;
     show([heading(asked.text, { class: "question" }), element("div", { class: "scale" }, row, ends)], { trial: true });
     const asks = performance.now();
     const began = from ?? asks;

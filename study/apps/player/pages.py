@@ -38,8 +38,8 @@ class Page:
         What is asked, set larger, under the text.
     buttons
         In a row, from left to right.
-    low, high
-        Words at the ends of a row of buttons that is a scale.
+    low, middle, high
+        Words at the ends and in the middle of a row of buttons that is a scale.
     note
         A few words at the top, such as that this is practice.
     progress
@@ -60,6 +60,7 @@ class Page:
     question: str = ""
     buttons: tuple[Button, ...] = ()
     low: str = ""
+    middle: str = ""
     high: str = ""
     note: str = ""
     progress: tuple[int, int] | None = None

@@ -44,7 +44,7 @@ def answer_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Pa
         # A digit on its own button says which key it is.
         buttons.append(Button(value, words, key, "" if words == key else key.upper()))
     note = protocol.texts.practice if step.role == "practice" else ""
-    page = Page("", step.text, tuple(buttons), step.low, step.high, note)
+    page = Page("", step.text, tuple(buttons), step.low, step.middle, step.high, note)
     return _with_progress(protocol, page, progress, step.role != "practice")
 
 

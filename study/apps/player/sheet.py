@@ -89,7 +89,7 @@ class _Sheet:
         if self.rows:
             gap = _ROW_GAP * em
             parts.append(("buttons", (self._button_height() + gap) * len(self.rows) - gap))
-        if self.page.low or self.page.high:
+        if self.page.low or self.page.middle or self.page.high:
             parts.append(("ends", 1.2 * em))
         return parts
 
@@ -219,13 +219,18 @@ class _Sheet:
         self._middle(pen, words, y, 0.68, 0.66, x)
 
     def _draw_ends(self, pen: ImageDraw, top: float, boxes: Sequence[Box]) -> None:
-        """Words under the ends of a scale."""
+        """Words under the ends and the middle of a scale."""
         left, right = min(box[0] for box in boxes), max(box[2] for box in boxes)
         y, font, ink = top + 0.6 * self.em, self._font(0.85), self.look.mix(0.75)
-        wide = font.getlength(self.page.low) + font.getlength(self.page.high) + 2 * self.em
+        ends = [font.getlength(words) for words in (self.page.low, self.page.high)]
+        wide = sum(ends) + 2 * self.em
+        if self.page.middle:
+            # The middle stands in the middle, however long the ends are.
+            wide = 2 * max(ends) + font.getlength(self.page.middle) + 2 * self.em
         spread = max(0.0, (wide - (right - left)) / 2)
         font.draw(pen, (left - spread, y), self.page.low, ink, "l")
         font.draw(pen, (right + spread, y), self.page.high, ink, "r")
+        font.draw(pen, ((left + right) / 2, y), self.page.middle, ink, "m")
 
     def _draw_entry(self, pen: ImageDraw, top: float) -> None:
         em, middle = self.em, self.size[0] / 2

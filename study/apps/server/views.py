@@ -127,6 +127,7 @@ def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
         "item": step.item,
         "text": step.text,
         "low": step.low,
+        "middle": step.middle,
         "high": step.high,
         "window_s": step.duration_s,
         "options": _options(protocol, step.legal),

@@ -91,6 +91,7 @@ comparison = "cut"
 name = "better"
 question = "Compared with the first film, the second one was:"
 low = "much worse"
+middle = "the same"
 high = "much better"
 """
 

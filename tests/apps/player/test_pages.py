@@ -83,6 +83,19 @@ def test_a_scale_of_eleven_points_is_one_row_with_its_words_at_the_ends() -> Non
         assert all(one[2] < other[0] for one, other in pairwise(boxes))
 
 
+def test_words_for_the_middle_of_a_scale_stand_under_its_middle() -> None:
+    points = tuple(Button(str(i), str(i), str(i)) for i in range(5))
+    bare = Page(question="How was it?", buttons=points, low="worse", high="very much better indeed")
+    drawn = [draw_page(page, (1280, 800), LIGHT) for page in (bare, replace(bare, middle="the same"))]
+    middle = drawn[1].boxes[2]
+    across, below = (middle[0] + middle[2]) / 2, middle[3]
+    found = [np.argwhere(ink(one.rgb, LIGHT.ground)[round(below) + 2 :, :] > 60) for one in drawn]
+    added = {tuple(place) for place in found[1]} - {tuple(place) for place in found[0]}
+    columns = sorted(column for _, column in added if abs(column - across) < 60)
+    assert columns[0] + columns[-1] == pytest.approx(2 * across, abs=8)
+    assert columns[-1] - columns[0] > 40
+
+
 def test_many_long_choices_take_several_rows() -> None:
     choices = tuple(Button(f"c{i}", f"a rather long choice, number {i}", str(i), str(i)) for i in range(1, 7))
     boxes = draw_page(Page(question="Which?", buttons=choices), (1000, 700), LIGHT).boxes
