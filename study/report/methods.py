@@ -180,11 +180,13 @@ def _procedure(protocol: Protocol, analysis: Result, presentations: pd.DataFrame
     rest = (
         f" A break was offered after every {words.number(timing.break_after, 'trial')}." if timing.break_after else ""
     )
-    return (
-        f"{pair}Participants had {timing.answer_s:g} s to answer; an answer not given in time was recorded as "
-        "missed. A "
-        f"pause of {timing.pause_s:g} s followed.{rest} {_shown(analysis, presentations)}"
+    limit = (
+        f"Participants had {timing.answer_s:g} s to answer; an answer not given in time was recorded as missed. "
+        if any(study.task != "rating" for study in protocol.studies)
+        else ""
     )
+    free = "Ratings had no time limit. " if any(study.task == "rating" for study in protocol.studies) else ""
+    return f"{pair}{limit}{free}A pause of {timing.pause_s:g} s followed.{rest} {_shown(analysis, presentations)}"
 
 
 def _shown(analysis: Result, presentations: pd.DataFrame) -> str:

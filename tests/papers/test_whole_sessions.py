@@ -129,7 +129,8 @@ def test_the_study_of_2003_cuts_where_each_metric_is_least(library, tmp_path):
     assert orders == [("cut-lee2002", "cut-wang2003"), ("cut-wang2003", "cut-lee2002")]
     with open_responses(tmp_path) as responses:
         simulate(protocol, prepared, responses, 26, seed=3)
-        found = analyse(answers_frame(responses))["rating_anova"]["cuts"]
+        result = analyse(answers_frame(responses), scale_points=protocol.scale_points)
+    found = result["rating_anova"]["cuts"]
     assert len(found) == 6
     for question in found:
         effects = question["anova"][:3]
@@ -138,3 +139,10 @@ def test_the_study_of_2003_cuts_where_each_metric_is_least(library, tmp_path):
     # The simulated observers prefer the optimised weights, by about as much as the paper's participants did.
     assert np.mean([question["difference"]["mean"] for question in found]) == pytest.approx(0.7, abs=0.35)
     assert max(question["anova"][0]["f"] for question in found) > 4.0
+    # Table 2: 2.73 (1.00) and 2.69 (0.84); within three standard errors of 26 people.
+    for question, mean, spread in zip(result["pair_ratings"]["compared"], (2.73, 2.69), (1.00, 0.84), strict=True):
+        assert question["of"] == "cut-wang2003 compared with cut-lee2002"
+        assert question["published"]["mean"] == pytest.approx(mean, abs=3 * spread / np.sqrt(26))
+        assert question["published"]["standard_deviation"] == pytest.approx(spread, rel=0.45)
+        assert [row["participants"] for row in question["order"]["rows"]] == [13, 13]
+        assert question["order"]["error_degrees_of_freedom"] == 24

@@ -121,7 +121,7 @@ def _pairs(protocol: Protocol, record: Callable[[str, str, int], StimulusRecord]
             if study.comparison:
                 b = record(transition.name, study.comparison, 0)
                 name = f"{study.name}/{transition.name}"
-                if study.task == "preference":
+                if study.paired:
                     pairs.append(Pair(name, *base, a.id, b.id, study.reference, study.comparison))
                 else:
                     pairs.append(Pair(f"{name}/a", *base, a.id, "", study.reference, ""))

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from study.analysis.pair_ratings import pair_ratings
+from study.report.document import write_report
 from study.report.likert_figure import likert_figure, shades
 from study.report.pair_ratings_section import pair_ratings_section
 from study.report.sections import Section
@@ -99,3 +104,36 @@ def test_every_point_has_a_colour_of_its_own(points: int) -> None:
     assert len(set(found)) == points
     few = pair_ratings(answers({"better": [0, 0, 0]}).assign(answer=[0, points - 1, 0]), points)
     assert "mean 0.00" in likert_figure(few, "place", "", {})  # all at one end
+
+
+@pytest.mark.parametrize(("people", "left_out"), [(4, False), (1, True)])
+def test_a_whole_report_of_rated_pairs(results_folder: Callable[..., Path], people: int, left_out: bool) -> None:
+    """From simulated sessions through the real database to the page, its files and its methods."""
+
+    def edit(text: str) -> str:
+        rules = "\n[analysis.exclusions]\nfastest_s = 1.2\n" if left_out else ""
+        ask = 'items = [{ name = "natural", question = "Compared:", low = "worse", high = "better" }]'
+        changed = text.replace('items = [{ name = "natural", question = "How natural?" }]', f'show = "pair"\n{ask}')
+        return changed.replace("alpha = 0.01\n", "alpha = 0.01\n" + rules)
+
+    folder = results_folder(people, videos=0, edit=edit)
+    page = write_report(folder, resamples=10).read_text(encoding="utf-8")
+    for words in (
+        "Compared with geodesic, fixed was rated",
+        "participants compared the second of two transitions with the first",
+        "Ratings had no time limit.",
+        "simulated answers, no people",
+        "worse – better",
+    ):
+        assert words in page
+    (question,) = json.loads((folder / "tables" / "analysis.json").read_text(encoding="utf-8"))["pair_ratings"][
+        "naturalness"
+    ]
+    with (folder / "tables" / "naturalness_corrected.csv").open(encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["mean"]) == pytest.approx(question["participants"]["mean"])
+    assert (folder / "figures" / "naturalness_compared.svg").exists()
+    if left_out:
+        with (folder / "tables" / "exclusions.csv").open(encoding="utf-8") as file:
+            results = [line["result"] for line in csv.DictReader(file)]
+        assert "naturalness: natural: fixed compared with geodesic" in results
