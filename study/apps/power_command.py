@@ -250,8 +250,9 @@ def _in_words(found: Power, aim: str, answers: int) -> str:
         bar = "#" * round(30 * point.power)
         lines.append(f"{point.participants:12}  {point.power:5.2f}  {low:.2f} to {high:.2f}   {bar}")
     who = f"{found.needed} participants" if found.needed else "no number tried"
+    asked = "answer" if answers == 1 else "answers"
     lines.append(
-        f"To {aim} in {100 * found.target:g}% of studies, {answers} answers each: {who}"
+        f"To {aim} in {100 * found.target:g}% of studies, {answers} {asked} each: {who}"
         + (f" ({found.note})." if found.note else ".")
     )
     return "\n".join(lines)

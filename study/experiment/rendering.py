@@ -143,7 +143,8 @@ def made_from(protocol: Protocol, library: Library) -> str:
     program = [path for folder in ("study", "renderer") for path in sorted((root / folder).rglob("*.*"))]
     digest = hashlib.sha256(f"{protocol.sha256} {library.name}\n".encode())
     for path in (*program, *library.files()):
-        if path.suffix != ".pyc" and path.is_file():
+        # Python writes what it compiled under passing names, at any time.
+        if path.parent.name != "__pycache__" and path.is_file():
             state = path.stat()
             digest.update(f"{path} {state.st_size} {state.st_mtime_ns}\n".encode())
     return digest.hexdigest()

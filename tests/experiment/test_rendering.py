@@ -10,13 +10,23 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
 from study.errors import StimulusError
+from study.experiment import rendering
 from study.experiment.protocol import load_protocol, parse_protocol
-from study.experiment.rendering import read_manifest, record, render, rendered_already, rendered_before, write_whole
+from study.experiment.rendering import (
+    made_from,
+    read_manifest,
+    record,
+    render,
+    rendered_already,
+    rendered_before,
+    write_whole,
+)
 from study.experiment.stimuli import prepare
 
 MOTIONS = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
@@ -283,6 +293,18 @@ def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path):
     assert done == replace(rendered[1], rendered=0, reused=rendered[1].videos)
     assert rendered_already(parse_protocol(TOY_PROTOCOL + "\n# changed\n"), library, folder) is None
     assert rendered_already(protocol, library, tmp_path / "elsewhere") is None
+
+
+def test_what_python_compiles_meanwhile_changes_nothing():
+    protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
+    before = made_from(protocol, library)
+    compiled = Path(rendering.__file__).parent / "__pycache__" / "rendering.cpython-311.pyc.139872"
+    compiled.parent.mkdir(exist_ok=True)
+    try:
+        compiled.write_bytes(b"half written")
+        assert made_from(protocol, library) == before
+    finally:
+        compiled.unlink()
 
 
 def test_a_changed_motion_file_or_a_damaged_video_is_noticed(prepared, rendered, tmp_path):
