@@ -210,5 +210,5 @@ def test_the_keyboard_alone_leads_through_a_session(make_site, make_tab):
     tab.wait("document.querySelector('main button') !== null")
     live = tab.run("[...document.querySelectorAll('[role=status]')].map((one) => one.id)")
     assert sorted(live) == ["progress", "status"]
-    assert "0 of 9 done" in json.dumps(sorted(spoken(tab)))
+    assert "0 of 10 done" in json.dumps(sorted(spoken(tab)))
     assert list(answers(site)["answer"]) == ["different"]
