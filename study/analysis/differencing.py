@@ -34,6 +34,7 @@ ROOT_TWO = float(np.sqrt(2.0))
 LARGEST_LAPSE = 0.1
 SMALLEST_PROBABILITY = 1e-9
 WIDEST_DELTA = 60.0
+MOST_STEPS = 100
 WIDEST_D_PRIME = 12.0
 D_PRIME_POINTS = 40
 
@@ -216,13 +217,31 @@ def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind, level:
         return np.full(len(criterion), criterion_free_delta(level))
     alarms = lapse / 2 + (1 - lapse) * detected(np.zeros(1), criterion)
     target = np.full(len(criterion), level) if kind == "different" else alarms + level * (1 - alarms)
-    low, high = np.zeros(len(criterion)), np.full(len(criterion), WIDEST_DELTA)
-    for _ in range(60):
-        middle = (low + high) / 2
-        below = lapse / 2 + (1 - lapse) * detected(middle, criterion) < target
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    found = np.where(alarms >= target, 0.0, (low + high) / 2)
+    reached = (alarms < target) & (target < 1 - lapse / 2)
+    found = np.zeros(len(criterion))
+    found[reached] = _delta_detected(((target - lapse / 2) / (1 - lapse))[reached], criterion[reached])
     return np.asarray(np.where(target >= 1 - lapse / 2, np.inf, found), dtype=np.float64)
+
+
+def _delta_detected(share: FloatArray, criterion: FloatArray) -> FloatArray:
+    """The d-prime that is detected in this share of the trials, shape (fits,): Newton's steps, kept between bounds."""
+    from scipy.special import ndtri
+
+    low, high = np.zeros(len(criterion)), np.full(len(criterion), WIDEST_DELTA)
+    # Where the far tail is left out, which is right but for small criteria.
+    delta = np.clip(criterion + ROOT_TWO * ndtri(share), 0.1, WIDEST_DELTA)
+    for _ in range(MOST_STEPS):
+        off = detected(delta, criterion) - share
+        low, high = np.where(off < 0, delta, low), np.where(off < 0, high, delta)
+        above, below = density((delta - criterion) / ROOT_TWO), density((delta + criterion) / ROOT_TWO)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = delta - off * ROOT_TWO / (above - below)
+        following = np.where((step > low) & (step < high), step, (low + high) / 2)
+        settled = np.abs(following - delta) <= 1e-12 * delta
+        delta = np.where(off == 0, delta, following)
+        if (settled | (np.abs(off) < 1e-15)).all():
+            break
+    return delta
 
 
 def threshold_frames(fits: Fits, kind: Kind = "different", level: float = 0.75) -> FloatArray:

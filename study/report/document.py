@@ -10,6 +10,7 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,7 +58,7 @@ def write_report(results_folder: str | Path, *, database: str | None = None, res
     folder = Path(results_folder)
     material = gather(folder, database)
     settings = material.protocol.analysis
-    # Decoding and packing pictures lets other threads run, so it takes place beside the analysis.
+    # Decoding and packing pictures lets other threads run, so it takes place beside all else.
     with ThreadPoolExecutor(max_workers=1) as beside:
         pictures = beside.submit(embed, material.manifest)
         analysis = analyse(
@@ -71,7 +72,7 @@ def write_report(results_folder: str | Path, *, database: str | None = None, res
             checks=material.checks,
             scale_points=material.protocol.scale_points,
         )
-        page = compose(material, analysis, pictures.result())
+        page = replace(compose(material, analysis), pictures=pictures.result())
     _write_files(folder, page, analysis)
     path = folder / "report.html"
     _write_whole(path, to_html(page))

@@ -89,8 +89,8 @@ class Page:
         return tuple(drawing for part in self._parts for drawing in part.drawings)
 
 
-def compose(material: Material, analysis: Result, pictures: Pictures) -> Page:
-    """Turn material, analysis and pictures into what the page shows."""
+def compose(material: Material, analysis: Result) -> Page:
+    """Turn material and analysis into what the page shows; pictures come later."""
     protocol, manifest = material.protocol, material.manifest
     data, quality = str(analysis["data"]), analysis["quality"]
     mark = words.mark_of(data, manifest.synthetic)
@@ -110,7 +110,7 @@ def compose(material: Material, analysis: Result, pictures: Pictures) -> Page:
             sentences=(_shown_sentence(material),),
             folded=(shown.stimulus_table(manifest), shown.motion_table(manifest)),
         ),
-        pictures=pictures,
+        pictures=Pictures((), ()),
         methods=tuple(methods.methods_paragraphs(protocol, manifest, analysis, material.presentations, who(analysis))),
         references=tuple(methods.references(protocol, analysis)),
         versions=_versions(material),
