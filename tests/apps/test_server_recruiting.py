@@ -8,7 +8,7 @@ from datetime import timedelta
 
 import pytest
 import sqlalchemy as sa
-from serving import TOKEN, Person, answer_to, make_host
+from serving import QUESTIONS, TOKEN, Person, answer_to, make_host
 from starlette.testclient import TestClient
 
 from study.apps.server.web import make_app
@@ -118,7 +118,7 @@ def test_withdrawing_deletes_and_the_server_forgets(serve, responses):
     assert serving.ask("overview").json()["withdrawn"] == 1
     with responses.engine.connect() as connection:
         lines = connection.execute(sa.select(withdrawals)).mappings().all()
-    assert [(line["session_id"], line["answers"]) for line in lines] == [(2, 11)]
+    assert [(line["session_id"], line["answers"]) for line in lines] == [(2, QUESTIONS)]
 
 
 def test_the_researchers_page_needs_the_token(serve):
