@@ -150,7 +150,7 @@ def test_the_researcher_sees_who_is_where_and_takes_the_tables(serve):
     assert overview["faults"][0]["detail"] == '{"what": "stalled"}'
     person.answer(view)
     answers = list(csv.DictReader(io.StringIO(serving.ask("answers.csv").text)))
-    assert len(answers) == 12
+    assert len(answers) == QUESTIONS + 1
     assert {answer["participant"] for answer in answers} == {one["participant"] for one in overview["sessions"]}
     for table in overview["tables"]:
         assert serving.ask(f"{table}.csv").status_code == 200
