@@ -163,13 +163,20 @@ def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
     motions = "synthetic motions" if manifest.synthetic else f"motions of the library {words.library(manifest.library)}"
     camera = f"a camera travelling with it (smoothed over {shown.track_s:g} s)" if shown.track_s else "a fixed camera"
     ground = "above a ground plane" if shown.floor else "without a ground plane"
-    feet = " Sliding of planted feet was removed after blending." if shown.clean_feet else ""
+    blended = sum(record.blend_frames > 0 for record in manifest.records)
+    cuts = len(manifest.records) - blended
+    how, joint = "were cuts from a frame of the source to a frame of the destination.", "cut"
+    if blended:
+        how = (
+            f"were blended by spherical linear interpolation under a {shown.weight} weight, between a start frame in "
+            f"the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}."
+        )
+        how += " Sliding of planted feet was removed after blending." if shown.clean_feet else ""
+        joint = "blend or the cut" if cuts else "blend"
     return (
-        f"{words.number(len(manifest.records), 'transition')} between {motions} were blended by spherical linear "
-        f"interpolation under a {shown.weight} weight, between a start frame in the source and an end frame in the "
-        f"destination (cuts were not blended).{feet} Each was rendered as a {shown.style} figure of {shown.width} × "
-        f"{shown.height} pixels at {protocol.fps:g} frames per second, seen by {camera} {ground}, with "
-        f"{shown.entry_s:g} s before and {shown.exit_s:g} s after the blend."
+        f"{words.number(len(manifest.records), 'transition')} between {motions} {how} Each was rendered as a "
+        f"{shown.style} figure of {shown.width} × {shown.height} pixels at {protocol.fps:g} frames per second, seen by "
+        f"{camera} {ground}, with {shown.entry_s:g} s before and {shown.exit_s:g} s after the {joint}."
     )
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+
+import pytest
 
 from study.analysis.summary import analyse
 from study.report.material import Material, gather
@@ -41,6 +44,19 @@ def test_methods_follow_from_the_protocol(results_folder: MakeFolder) -> None:
     assert material.protocol.sha256[:12] in told["Software"]
     assert any(work.startswith("Macmillan") for work in cited)
     assert cited == sorted(cited)
+
+
+@pytest.mark.parametrize("cuts", ["none", "some", "all"])
+def test_cuts_are_not_called_blends(results_folder: MakeFolder, cuts: str) -> None:
+    material = gather(results_folder(2, videos=0))
+    shown = tuple(
+        replace(record, blend_frames=0) if cuts == "all" or (cuts == "some" and record.method == "fixed") else record
+        for record in material.manifest.records
+    )
+    told, _ = paragraphs(replace(material, manifest=replace(material.manifest, records=shown)))
+    assert ("were blended by spherical linear" in told["Stimuli"]) == (cuts != "all")
+    assert ("(cuts were not blended)" in told["Stimuli"]) == (cuts == "some")
+    assert ("were cuts from a frame" in told["Stimuli"]) == (cuts == "all")
 
 
 def test_works_whose_methods_were_not_used_are_not_cited(results_folder: MakeFolder) -> None:
