@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,15 +51,13 @@ def write_report(results_folder: str | Path, *, database: str | None = None, res
     """
     from study.analysis.exclusions import rules_of
     from study.analysis.summary import analyse
-    from study.report.media import embed
+    from study.report.media import embedding
     from study.report.page import compose
 
     folder = Path(results_folder)
     material = gather(folder, database)
     settings = material.protocol.analysis
-    # Decoding and packing pictures lets other threads run, so it takes place beside all else.
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        pictures = beside.submit(embed, material.manifest)
+    with embedding(material.manifest) as pictures:
         analysis = analyse(
             material.answers,
             threshold=settings.threshold,
@@ -72,7 +69,7 @@ def write_report(results_folder: str | Path, *, database: str | None = None, res
             checks=material.checks,
             scale_points=material.protocol.scale_points,
         )
-        page = replace(compose(material, analysis), pictures=pictures.result())
+        page = replace(compose(material, analysis), pictures=pictures())
     _write_files(folder, page, analysis)
     path = folder / "report.html"
     _write_whole(path, to_html(page))

@@ -7,8 +7,12 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Sequence
-from dataclasses import dataclass
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +54,48 @@ class Pictures:
 def embed(manifest: Manifest) -> Pictures:
     """Return everything that stands in the page to show what participants saw."""
     return Pictures(tuple(embed_strips(manifest)), tuple(tuple(pair) for pair in embed_videos(manifest)))
+
+
+@contextmanager
+def embedding(manifest: Manifest) -> Iterator[Callable[[], Pictures]]:
+    """Make the pictures in a process of its own, from here on; what is given waits for them.
+
+    They take as long as a third of all else in a report, and a thread would take turns with the analysis. The process
+    is a plain one: those of `multiprocessing` would run a script again that has no guard. Where it can't run, or fails,
+    the pictures are made here, and what is wrong is raised here.
+    """
+    command = [sys.executable, "-c", _BESIDE, json.dumps(sys.path), str(manifest.folder)]
+    try:
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    except OSError:
+        yield lambda: embed(manifest)
+        return
+
+    def pictures() -> Pictures:
+        told, _ = process.communicate()
+        return embed(manifest) if process.returncode else _from_json(told)
+
+    with process:
+        try:
+            yield pictures
+        finally:
+            process.kill()
+
+
+_BESIDE = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); import study.report.media as m; m.tell(sys.argv[2])"
+
+
+def tell(folder: str) -> None:
+    """Print the pictures of a results folder as JSON: what the process of `embedding` does."""
+    from study.experiment.rendering import read_manifest
+
+    json.dump(asdict(embed(read_manifest(folder))), sys.stdout)
+
+
+def _from_json(text: bytes) -> Pictures:
+    found = json.loads(text)
+    strips = tuple(Preview(**one) for one in found["strips"])
+    return Pictures(strips, tuple(tuple(Preview(**one) for one in pair) for pair in found["videos"]))
 
 
 def data_uri(content: bytes, kind: str) -> str:
