@@ -1,4 +1,4 @@
-"""Fixtures for all tests: the real motion capture where there is some, and a refusal to skip where CI requires all."""
+"""Fixtures for all tests: the real motion capture where there is some, virtual displays, PostgreSQL."""
 
 from __future__ import annotations
 
@@ -11,20 +11,13 @@ from pathlib import Path
 
 import pytest
 
-# Tests are imported by path, without packages: this makes `postgres_server` importable.
+# Tests are imported by path, without packages: this makes the modules beside this file importable.
 sys.path.append(str(Path(__file__).parent))
 
+from parts import unavailable
 from postgres_server import PostgresServer, find_binaries
 
 MOCAP = Path(os.environ.get("SEGUE_MOCAP", Path(__file__).parents[1].parent / "shared" / "motions"))
-
-
-def unavailable(part: str, how: str) -> None:
-    """Skip a test whose optional part is missing; fail it where every part is required (SEGUE_REQUIRE_ALL=1)."""
-    message = f"{part} is missing: {how}"
-    if os.environ.get("SEGUE_REQUIRE_ALL") == "1":
-        pytest.fail(message)
-    pytest.skip(message)
 
 
 @pytest.fixture(scope="session")

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from parts import unavailable
 
 from renderer import context as contexts
 from renderer.errors import RendererError
@@ -48,10 +49,7 @@ def require(kind: str) -> None:
         how = {"osmesa": "libosmesa6 (Mesa before 25.1)", "osmesa-wheel": "pip install lavavu-osmesa"}.get(
             kind, "libegl1"
         )
-        # Mesa has dropped OSMesa, so a machine that requires all parts still can't be asked for this one.
-        if os.environ.get("SEGUE_REQUIRE_ALL") == "1" and kind != "osmesa":
-            pytest.fail(f"the context {kind} is missing: {how}")
-        pytest.skip(f"the context {kind} is missing: {how}")
+        unavailable(f"the context {kind}", how, package="libosmesa6" if kind == "osmesa" else None)
 
 
 def draw_in_process(**environment: str) -> list[str]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -13,6 +11,7 @@ from typing import Any
 import pytest
 from bidi import Firefox, FirefoxTab, firefox
 from devtools import Browser, Tab, chromium
+from parts import unavailable
 from serving import PROTOCOL, Site, prepared
 from webdriver import WebKitTab, webkit
 
@@ -22,37 +21,20 @@ EXECUTABLES = ("chromium", "chromium-browser", "google-chrome")
 MINI_BROWSERS = "/usr/lib/*/webkit2gtk-4.1/MiniBrowser", "/usr/lib/*/webkitgtk-6.0/MiniBrowser"
 
 
-def missing(part: str, how: str) -> None:
-    message = f"{part} is missing: {how}"
-    if os.environ.get("SEGUE_REQUIRE_ALL") == "1":
-        pytest.fail(message)
-    pytest.skip(message)
-
-
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     executable = next((found for name in EXECUTABLES if (found := shutil.which(name))), None)
     if executable is None:
-        missing("Chromium", "on Debian, apt-get install chromium")
+        unavailable("Chromium", "on Debian, apt-get install chromium")
     with chromium(str(executable), tmp_path_factory.mktemp("profile")) as started:
         yield started
-
-
-def packaged(name: str) -> bool:
-    """Whether this system's distribution has a package; where it has none, nobody can be asked to install it."""
-    if shutil.which("apt-cache") is None:
-        return True
-    policy = subprocess.run(["apt-cache", "policy", name], capture_output=True, text=True, check=True).stdout
-    return "Candidate: (none)" not in policy and "Candidate:" in policy
 
 
 @pytest.fixture(scope="session")
 def gecko(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
     executable = shutil.which("firefox-esr")
-    if executable is None and not packaged("firefox-esr"):
-        pytest.skip("this distribution has no package firefox-esr")
     if executable is None:
-        missing("Firefox", "on Debian, apt-get install firefox-esr libavcodec-extra")
+        unavailable("Firefox", "on Debian, apt-get install firefox-esr libavcodec-extra", package="firefox-esr")
     with firefox(str(executable), tmp_path_factory.mktemp("profile")) as started:
         yield started
 
@@ -91,7 +73,7 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         try:
             render(prepared(text), folder, workers=1)
         except (RendererError, StimulusError) as error:
-            missing("a context to draw films with", str(error))
+            unavailable("a context to draw films with", str(error))
         return folder
 
     return drawn
