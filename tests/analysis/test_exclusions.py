@@ -68,3 +68,19 @@ def test_everybody_left_out_is_no_crash(answers: pd.DataFrame) -> None:
     assert result["data"] == "simulated"
     assert result["preference"] == {}
     assert len(result["without_exclusions"]["preference"]["geodesic"]) == 1
+
+
+def test_what_lies_exactly_on_a_limit_is_kept(answers: pd.DataFrame) -> None:
+    """Rules say "more than" and "sooner than"."""
+    answers["response_s"] = 1.0
+    answers["shown_well"] = True
+    assert exclude(answers, Rules(fastest_s=1.0)).answers_left_out == 0
+    assert exclude(answers, Rules(fastest_s=1.0 + 1e-9)).answers_left_out == 80
+    assert exclude(answers, Rules(most_missed=0.5)).participants == ()
+    assert [row["participant"] for row in exclude(answers, Rules(most_missed=0.499)).participants] == ["p00"]
+    answers.loc[answers.index[8:12], "response_s"] = 0.05
+    assert exclude(answers, Rules(most_too_fast=0.5)).participants == ()
+    assert [row["participant"] for row in exclude(answers, Rules(most_too_fast=0.499)).participants] == ["p01"]
+    assert exclude(answers, Rules(most_too_fast=0.4, fastest_s=0.05)).participants == ()
+    checks = pd.DataFrame({"participant": ["p05"] * 2, "answer": ["first", None], "expected": ["first"] * 2})
+    assert exclude(answers, Rules(most_failed_checks=0.5), checks).participants == ()

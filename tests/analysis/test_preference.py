@@ -52,6 +52,12 @@ def test_participants_against_scipy() -> None:
     assert result["mean_percent"] == pytest.approx(100 * chosen.mean() / 8)
 
 
+def test_the_robust_chi_square_of_equal_numbers_of_trials_is_the_square_of_students_t() -> None:
+    chosen = np.array([3.0, 5, 7, 8, 4, 6, 6])
+    result = participant_tests(chosen, np.full(7, 8.0))
+    assert result["robust_chi_square"] == pytest.approx(stats.ttest_1samp(chosen / 8, 0.5).statistic ** 2)
+
+
 def test_wilcoxon_is_exact_with_ties() -> None:
     """Against all assignments of signs, written out."""
     chosen = np.array([7.0, 6, 6, 3, 8, 2, 5])

@@ -7,6 +7,7 @@ import json
 import sqlalchemy as sa
 from serving import PROTOCOL, QUESTIONS, answer_to, protocol_of
 
+from study.apps.server import views
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
 from study.experiment.response_tables import events, presentations
@@ -212,6 +213,22 @@ def test_films_are_for_the_participant_whose_trial_it_is(serve):
     view = person.until(person.step(view), "trial")
     view = person.until(person.step(view), "trial")
     assert person.client.get(url).status_code == 404
+
+
+def test_a_page_may_load_the_films_of_this_trial_and_of_the_next_and_no_others(serve):
+    serving = serve()
+    person = serving.person()
+    person.until(person.begin(), "trial")
+    (sitting,) = serving.host.sittings.values()
+    showings = [step for step in sitting.state.steps if step.kind in ("first", "second") and step.role != "practice"]
+    due = [step.trial for step in views.films_due(sitting.state)]
+    assert len(set(due)) == 2
+    assert due == [trial for trial in dict.fromkeys(due) for _ in range(2)]
+    later = [step for step in showings if step.trial not in due]
+    assert later
+    for step in later:
+        name = views.film_name(sitting.participant, step)
+        assert person.client.get(f"/films/{name}.mp4").status_code == 404
 
 
 def test_identical_films_look_different_from_outside(serve, stimuli):

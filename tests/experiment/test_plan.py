@@ -10,6 +10,7 @@ import pytest
 
 from study.errors import SessionError
 from study.experiment.plan import TRIAL_COLUMNS, draw_plan, groups_of, plan_from_json, trial_table
+from study.experiment.protocol import parse_protocol
 
 
 def real(plan):
@@ -111,6 +112,30 @@ def test_balanced_order_shows_half_each_way(toy_protocol, toy_stimuli):
     for number in range(8):
         plan = draw_plan(balanced, toy_stimuli.pairs, f"p{number}")
         assert sorted(trial.a_first for trial in plan.trials[6:]) == [False, True]
+
+
+def test_the_odd_pair_of_a_balanced_order_goes_either_way(toy_protocol, make_stimuli):
+    """Three pairs: one way is shown twice, and which way is drawn anew for every participant."""
+    third = """
+[[transitions]]
+name = "quick_slow"
+category = "walking"
+source = "quick"
+destination = "slow"
+
+[[studies]]"""
+    text = toy_protocol.text.replace("\n[[studies]]", third, 1)
+    text = text.replace('comparison = "fixed"', 'comparison = "fixed"\norder = "balanced"')
+    protocol = parse_protocol(text)
+    pairs = make_stimuli(protocol).pairs
+    first = Counter()
+    for number in range(60):
+        trials = draw_plan(protocol, pairs, f"p{number}").trials
+        shown = [trial.a_first for trial in trials if trial.study == "liking"]
+        assert len(shown) == 3
+        first[sum(shown)] += 1
+    assert set(first) == {1, 2}
+    assert min(first.values()) > 15  # 30 expected, standard deviation 3.9
 
 
 def test_preference_trials_say_which_method_is_first(toy_protocol, toy_stimuli):

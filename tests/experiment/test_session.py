@@ -177,16 +177,17 @@ def test_rating_asks_every_item_without_time_limit(rating_protocol, make_stimuli
     assert half + rest == answers
 
 
-def test_breaks_come_after_so_many_trials(toy_protocol, toy_stimuli):
-    text = toy_protocol.text.replace("[points]", '[timing]\nbreak_after = 3\n\n[points]').replace(
+@pytest.mark.parametrize(("every", "expected"), [(3, [3, 6]), (4, [4]), (2, [2, 4, 6]), (8, []), (1, [*range(1, 8)])])
+def test_breaks_come_after_so_many_of_eight_trials_and_never_after_the_last(toy_protocol, toy_stimuli, every, expected):
+    text = toy_protocol.text.replace("[points]", f"[timing]\nbreak_after = {every}\n\n[points]").replace(
         "[texts]", '[texts]\nbreak_text = "Rest."'
-    )  # fmt: skip
+    )
     protocol = parse_protocol(text)
     session = open_session(protocol, draw_plan(protocol, toy_stimuli.pairs, "p01"))
     seen = []
     run(session, seen=seen)
     before = [seen[i - 1].trial for i, step in enumerate(seen) if step.kind == "break"]
-    assert before == [3, 6]
+    assert before == expected
 
 
 def test_another_protocol_or_stray_answers_are_refused(opened):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -115,6 +116,21 @@ def test_frames_on_frames_of_the_original_come_back_exactly(clip: Clip) -> None:
     assert resample(clip, 120.0) is clip
     with pytest.raises(MotionError, match="above 0 to resample"):
         resample(clip, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("fps", "other"), [(120.0, 30.0), (30.0, 120.0), (0.1, 0.3), (0.3, 0.1), (29.97, 59.94), (0.7, 0.1)]
+)
+def test_the_last_frame_survives_rounding(clip: Clip, fps: float, other: float) -> None:
+    """Whole numbers of frames by exact fractions, where a quotient of floats may fall short of them."""
+    ratio = Fraction(str(fps)) / Fraction(str(other))
+    for frames in range(2, 42):
+        short = replace(trim(clip, 0, frames), fps=fps)
+        again = resample(short, other)
+        assert again.frames == (frames - 1) // ratio + 1
+        for frame in range(again.frames):
+            if (frame * ratio).denominator == 1:
+                assert np.array_equal(again.rotations[frame], short.rotations[int(frame * ratio)])
 
 
 def test_samples_between_frames_and_their_limits(clip: Clip) -> None:

@@ -48,6 +48,25 @@ def test_nothing_of_a_group_ever_leaves_the_frame(seed: int) -> None:
         assert (1.0 / nearness >= 0.5).all()
 
 
+@pytest.mark.parametrize("fill", [0.5, 0.86, 1.0])
+@pytest.mark.parametrize("size", [(640, 480), (480, 640)])
+def test_the_padding_is_a_distance_to_the_edge_of_what_is_seen(fill: float, size: tuple[int, int]) -> None:
+    """In space: a ball of that radius around the outermost point just touches the plane through the eye and the edge.
+
+    The bounds of pixels alone do not tell: a ball seen aslant reaches further than its radius.
+    """
+    rows = np.random.default_rng(4).uniform(-1, 1, (5, 20, 3)) * [3.0, 3.0, 1.0]
+    camera = frame_group([rows], size=size, view=0.0, elevation=0.0, fill=fill, padding_m=0.3, field_of_view=1.2)
+    seen = (rows.reshape(-1, 3) - camera.eye) @ camera.axes.T
+    angles = [np.arctan(fill * 0.5 * size[axis] / camera.focal_pixels) for axis in (0, 1)]
+    distances = [
+        np.min(-seen[:, 2] * np.sin(angle) - side * seen[:, axis] * np.cos(angle))
+        for axis, angle in enumerate(angles)
+        for side in (-1.0, 1.0)
+    ]
+    assert min(distances) == pytest.approx(0.3, abs=1e-9)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_the_group_fills_the_stated_share(seed: int) -> None:
     random = np.random.default_rng(seed)
