@@ -12,7 +12,8 @@ import pytest
 from bidi import Firefox, FirefoxTab, firefox
 from devtools import Browser, Tab, chromium
 from parts import unavailable
-from serving import PROTOCOL, Site, prepared
+from serving import Site, prepared
+from walking import PATIENT
 from webdriver import WebKitTab, webkit
 
 from study.experiment.rendering import render
@@ -84,7 +85,7 @@ def make_site(films: Callable[[str], Path], tmp_path: Path) -> Iterator[Callable
     """`make_site(protocol, **settings)`: a running server on a copy of a study."""
     sites: list[Site] = []
 
-    def make(text: str = PROTOCOL, **settings: Any) -> Site:
+    def make(text: str = PATIENT, **settings: Any) -> Site:
         folder = tmp_path / f"site-{len(sites)}"
         shutil.copytree(films(text), folder)
         sites.append(Site(folder, text, **settings))

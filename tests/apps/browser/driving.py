@@ -41,7 +41,7 @@ class Driven(ABC):
     def text(self) -> str:
         return self.run("document.body ? document.body.innerText : ''") or ""
 
-    def wait(self, script: str, timeout: float = 30, every: float = 0.05) -> Any:
+    def wait(self, script: str, timeout: float = 60, every: float = 0.05) -> Any:
         """Wait until an expression is true."""
         end = time.monotonic() + timeout
         while time.monotonic() < end:
@@ -53,12 +53,12 @@ class Driven(ABC):
             time.sleep(every)
         raise AssertionError(f"waited {timeout} s in vain for {script}; the page says: {self.text()!r}")
 
-    def wait_text(self, text: str, timeout: float = 30) -> None:
+    def wait_text(self, text: str, timeout: float = 60) -> None:
         self.wait(f"document.body && document.body.innerText.includes({json.dumps(text)})", timeout)
 
     def click(self, text: str) -> None:
         """A real click, at the middle of the button or link with a text, as soon as it is there."""
-        end = time.monotonic() + 30
+        end = time.monotonic() + 60
         while not self.try_click(text):
             assert time.monotonic() < end, f"no {text!r} to click; the page says: {self.text()!r}"
             time.sleep(0.05)

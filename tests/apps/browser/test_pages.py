@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from serving import PROTOCOL
-from walking import END, KEPT, LOOK, QUESTION, SHORT, answers, press, read_on, to_films, to_question
+from walking import END, KEPT, LOOK, PATIENT, QUESTION, SHORT, answers, press, read_on, to_films, to_question
 
 pytestmark = pytest.mark.gl
 
@@ -50,7 +49,7 @@ CONTRASTS = """(() => {
 
 
 def coloured(background: str) -> str:
-    return PROTOCOL.replace("[timing]", f'[stimuli.colours]\nbackground = "{background}"\n\n[timing]')
+    return PATIENT.replace("[timing]", f'[stimuli.colours]\nbackground = "{background}"\n\n[timing]')
 
 
 @pytest.mark.parametrize(
@@ -110,7 +109,7 @@ def test_nothing_flashes_between_films_and_pages(make_site, make_tab, tmp_path):
 
 
 def test_reduced_motion_is_told_of_and_hides_no_film(make_site, make_tab):
-    site, tab = make_site(PROTOCOL), make_tab()
+    site, tab = make_site(), make_tab()
     tab.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
     tab.open(site.address)
     tab.wait_text("asks for little motion")

@@ -7,8 +7,23 @@ import time
 
 import pytest
 import sqlalchemy as sa
-from serving import QUESTIONS, TOKEN
-from walking import KEPT, LOOK, QUESTION, ROLES, SHORT, answers, go_on, happened, press, read_on, to_question
+from serving import PROTOCOL, QUESTIONS, TOKEN
+from walking import (
+    KEPT,
+    LOOK,
+    QUESTION,
+    ROLES,
+    SHORT,
+    answers,
+    check_frames,
+    details,
+    eventually,
+    go_on,
+    happened,
+    press,
+    read_on,
+    to_question,
+)
 
 from study.experiment.response_tables import presentations
 from study.experiment.responses import answers_frame
@@ -29,24 +44,17 @@ def test_a_whole_session_of_every_task(make_site, make_tab, keys):
             scrolled.append(tab.text())
 
     tab.open(site.address)
-    go_on(tab, keys, on_step=look)
+    slowest = go_on(tab, keys, on_step=look)
     assert "C0DE" in tab.text()
     assert scrolled == []
     table = answers(site)
     assert len(table) == QUESTIONS
     assert set(table["task"]) == {"same-different", "preference", "rating"}
     assert not table["missed"].any()
-    assert ((table["response_s"] > 0) & (table["response_s"] < 3.5)).all()
+    assert ((table["response_s"] > 0) & (table["response_s"] < slowest + 1)).all()
     with site.responses.engine.connect() as connection:
         shown = connection.execute(sa.select(presentations)).mappings().all()
-    assert {row["method"] for row in shown} == {"requestVideoFrameCallback"}
-    for row in shown:
-        detail = json.loads(row["detail_json"])
-        assert row["frames_presented"] == row["frames_expected"] or not row["shown_well"]
-        assert detail["times_ms"] == sorted(detail["times_ms"])
-        # Frames stand as far apart in time as they do in the film, whatever was dropped.
-        span = (detail["times_ms"][-1] - detail["times_ms"][1]) / 1000
-        assert span == pytest.approx((detail["frames"][-1] - detail["frames"][1]) / 30, abs=0.1)
+    check_frames(shown)
     display = happened(site, "display")[0]
     assert display["viewport"] == [1280, 640]
     assert display["refresh_hz"] > 10
@@ -84,7 +92,7 @@ def test_a_restarted_server_gets_the_answer_that_waited(make_site, make_tab):
     table = answers(site)
     assert len(table) == TRIALS
     assert not table.duplicated(["trial", "item"]).any()
-    assert happened(site, "waited")
+    eventually(lambda: happened(site, "waited"))
 
 
 @pytest.mark.parametrize("fault", ["truncated", pytest.param("stalled", marks=pytest.mark.slow)])
@@ -95,10 +103,7 @@ def test_films_that_fail_are_tried_again_then_said_clearly(make_site, make_tab, 
     to_fault(tab)
     assert site.films_served >= 3
     # The page says so at once; the message about the last try is still on its way.
-    end = time.monotonic() + 10
-    while len(happened(site, "fault")) < 3 and time.monotonic() < end:
-        time.sleep(0.05)
-    assert len(happened(site, "fault")) >= 3
+    eventually(lambda: len(happened(site, "fault")) >= 3)
     site.film_fault = None
     tab.click("Try again")
     to_question(tab)
@@ -121,10 +126,7 @@ def test_a_film_that_can_not_be_shown_can_be_passed_over(make_site, make_tab):
     for number in (1, 2):
         to_fault(tab)
         tab.click("Go on without it")
-        end = time.monotonic() + 20
-        while len(answers(site)) < number:
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        eventually(lambda number=number: len(answers(site)) >= number)
     site.film_fault = None
     assert list(answers(site)["missed"]) == [True, True]
     assert not answers(site)["shown_well"].any()
@@ -152,10 +154,11 @@ def test_a_second_tab_is_refused_and_can_take_over(make_site, make_tab):
 
 
 def test_a_missed_answer_is_recorded_as_missed(make_site, make_tab):
-    site, tab = make_site(), make_tab()
+    site, tab = make_site(PROTOCOL), make_tab()
     tab.open(site.address)
     to_question(tab)
-    tab.wait_text("The time to answer was over", timeout=10)
+    tab.wait_text("The time to answer was over")
+    eventually(lambda: len(answers(site)) == 1)
     row = answers(site).iloc[0]
     assert row["missed"]
     assert tab.run("document.querySelectorAll('button.answer:not(:disabled)').length") == 0
@@ -241,26 +244,27 @@ def test_a_page_for_eyes_and_ears(make_site, make_tab):
 
 
 def test_reaction_times_are_those_of_the_keys(make_site, make_tab):
-    """Keys injected at known times: what is recorded differs from them by the way into the page, and little else."""
+    """A page that is busy for a while handles a key late; what is recorded is when the key was pressed."""
+    busy_s = 2.0
+    busy = (
+        f"setTimeout(() => {{ const end = performance.now() + {1000 * busy_s}; while (performance.now() < end); }}); 1"
+    )
     site, tab = make_site(), make_tab()
     tab.open(site.address)
-    injected = []
-    for _ in range(6):
+    pressed, handled = [], []
+    for _ in range(3):
         to_question(tab)
         option = tab.run("document.querySelector('button.answer').getAttribute('aria-keyshortcuts')")
-        injected.append(time.time())
+        tab.run(busy)
+        pressed.append(time.time())
         tab.key(option)
         tab.wait(f"!({QUESTION})", every=0.02)
+        handled.append(time.time())
     tab.wait(f"!({KEPT})")
-    with site.responses.engine.connect() as connection:
-        rows = connection.execute(sa.select(presentations.c.detail_json).distinct()).scalars().all()
-    details = [json.loads(row) for row in rows]
-    recorded = {(one["time_origin_ms"] + one["answer_ms"]) / 1000 for one in details}
-    nearest = [min(recorded, key=lambda at, key=key: abs(at - key)) for key in injected]
-    errors = [1000 * (at - key) for at, key in zip(nearest, injected, strict=True) if abs(at - key) < 1]
-    assert len(errors) >= 4
-    mean = sum(errors) / len(errors)
-    deviation = (sum((error - mean) ** 2 for error in errors) / (len(errors) - 1)) ** 0.5
-    print(f"recorded minus injected: mean {mean:.2f} ms, standard deviation {deviation:.2f} ms")
-    assert abs(mean) < 100
-    assert deviation < 40  # loosely, on a busy machine; docs/serving.md says what was measured on a quiet one
+    recorded = sorted(
+        {(one["time_origin_ms"] + one["answer_ms"]) / 1000 for one in (row["detail"] for row in details(site))}
+    )
+    assert len(recorded) == 3
+    for key, end, at in zip(pressed, handled, recorded, strict=True):
+        assert end - key > busy_s / 2
+        assert key - 0.1 < at < end - busy_s / 2

@@ -102,14 +102,14 @@ def test_a_session_in_which_everything_goes_wrong(make_site, make_tab, seed):
             done.append(happens.__name__)
             happens(site, tab, chance)
 
-    go_on(tab, on_step=disturb, at_most=400)
+    slowest = go_on(tab, on_step=disturb, at_most=600)
     print(f"seed {seed}: {', '.join(done)}")
     assert len(set(done)) >= 3
     heard = json.loads(tab.run("sessionStorage.getItem('heard')"))
-    check_records(site, heard)
+    check_records(site, heard, slowest)
 
 
-def check_records(site, heard):
+def check_records(site, heard, slowest):
     (session,) = all_sessions(site.responses)
     every = answers(site, all_attempts=True)
     assert not every.duplicated(["trial", "attempt", "item"]).any()
@@ -130,7 +130,7 @@ def check_records(site, heard):
         assert again == (not first["shown_well"].all() and role != "practice"), f"trial {trial}"
     # No clock ran while nothing was shown: answers given at once took no long time, unless they are flagged.
     quick = every[every["shown_well"] & ~every["missed"]]
-    assert (quick["response_s"] < 3).all()
+    assert (quick["response_s"] < slowest + 1).all()
     # Every film of every answer has its record, and what is called well has all its frames.
     shown = details(site)
     for row in shown:
