@@ -4,10 +4,10 @@
     python benchmarks/mutants.py --count 100 --seed 1
     python benchmarks/mutants.py --rooms analysis --count 50 --seed 2 --workers 1
 
-First the tests run once, to learn which test runs which line; that is kept in the folder `--keep`, for further seeds of the
-same code. Then mutants are drawn at random from all functions of the rooms, and each is met by the tests that run its line.
-What no test notices is printed: either a test is missing, or the change means nothing (an equivalent mutant, which only a
-reader can tell). A mutant on a line that no test runs counts as survived.
+First the tests run once, to learn which test runs which line; that is kept in the folder `--keep`, for further seeds of
+the same code. Then mutants are drawn at random from all functions of the rooms, and each is met by the tests that run
+its line. What no test notices is printed: either a test is missing, or the change means nothing (an equivalent mutant,
+which only a reader can tell). A mutant on a line that no test runs counts as survived.
 """
 
 from __future__ import annotations
