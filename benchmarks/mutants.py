@@ -140,7 +140,7 @@ def copy_to(folder: Path) -> None:
     files = subprocess.run(
         ["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    for name in files.stdout.splitlines():
+    for name in filter(lambda name: (ROOT / name).is_file(), files.stdout.splitlines()):
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / name, target)
