@@ -304,7 +304,7 @@ def lengths_at(
     found: dict[str, BlendLength | WarpLength] = {}
     for method in methods or study.methods:
         if method == "timewarp":
-            found[method] = warp_length(source, destination, start, end, restrict=True)
+            found[method] = warp_length(source, destination, start, end)
             continue
         if method == "cut":
             found[method] = BlendLength("cut", 0, 0.0, float("nan"))
@@ -317,7 +317,6 @@ def lengths_at(
             method="fixed" if method == "one-hop" else method,
             fixed_frames=study.fixed_frames,
             specification=protocol.stimuli.specification,
-            restrict=True,
         )
     return found
 

@@ -81,6 +81,19 @@ def shortfall(source: Clip, destination: Clip, frames: Window) -> str:
     return "; ".join(faults)
 
 
+def held(available: int, shortest: int, longest: int) -> tuple[int, str]:
+    """The longest length to consider where the clips supply `available` frames, and what to say of those left out.
+
+    The one rule for candidate lengths, whichever method chooses among them: what the clips don't supply is not
+    considered. Where they don't supply the shortest either, that is the one to refuse, with `shortfall`.
+    """
+    if available >= longest:
+        return longest, ""
+    if available < shortest:
+        return shortest, ""
+    return available, f"the clips supply blends of up to {available} frames; {longest} were asked for"
+
+
 def longest_available(
     source: Clip, destination: Clip, start_frame: int, end_frame: int, specification: str = "start-end"
 ) -> int:

@@ -1,0 +1,13 @@
+"""Counts in sentences: a number with its noun, so that no message speaks of 1 participants."""
+
+from __future__ import annotations
+
+
+def counted(count: float, singular: str, plural: str | None = None) -> str:
+    """A count with its noun, thousands apart: `counted(1, "participant")` is "1 participant"."""
+    return f"{count:,} {noun(count, singular, plural)}"
+
+
+def noun(count: float, singular: str, plural: str | None = None) -> str:
+    """The noun alone, or any words that go with one or with several, such as "is" and "are"."""
+    return singular if count == 1 else plural or f"{singular}s"
