@@ -32,6 +32,13 @@ CANDIDATES = 2000
 WARPS = 150
 """So many of them at most with all of their time-warped blends, which take a hundred times longer to cost."""
 
+HOPS = 20
+"""So many with a search for the hop, each."""
+
+ONE_FILM = "with one film for both methods"
+
+_FOLLOWING = ("geodesic", "velocity", "timewarp")
+
 LONGEST_BLEND_S = 2.0
 FREEDOM_S = 1.0
 """Points are drawn within a second or more of motion: a whole cycle of a gait."""
@@ -100,8 +107,16 @@ class Settled:
         return replace(self, start_frame=start, end_frame=end)
 
 
-def settle(protocol: Protocol, study: StudySpec, transition: TransitionSpec, library: Library) -> Settled:
+Alike = Callable[[StudySpec, "Settled"], bool]
+"""Whether the two methods of a study would show one film at some points; see `films.alike`."""
+
+
+def settle(
+    protocol: Protocol, study: StudySpec, transition: TransitionSpec, library: Library, alike: Alike | None = None
+) -> Settled:
     """Find the points of one transition of a study.
+
+    With `alike`, points at which both methods would show one film are drawn again, and given ones are refused.
 
     Raises
     ------
@@ -120,9 +135,16 @@ def settle(protocol: Protocol, study: StudySpec, transition: TransitionSpec, lib
         )
     if study.reference in OPTIMUM_CUTS:
         return _at_optima(study, transition, source, destination)
-    if points.choose == "given":
-        return _given(protocol, study, transition, points, source, destination)
-    return _drawn(protocol, study, transition, points, source, destination)
+    if points.choose == "random":
+        return _drawn(protocol, study, transition, points, source, destination, alike)
+    settled = _given(protocol, study, transition, points, source, destination)
+    if alike is not None and alike(study, settled):
+        raise StimulusError(
+            f"transition {transition.name!r}: expected two films by the methods {study.reference!r} and "
+            f"{study.comparison!r} of the study {study.name!r}, found one at these points, where both make the same "
+            "blend; give other points, or change a method or fixed_frames."
+        )
+    return settled
 
 
 def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs, Needs]:
@@ -131,8 +153,9 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
     after_exit = round(protocol.stimuli.exit_s * protocol.fps)
     search = round(LONGEST_BLEND_S * protocol.fps)
     longest = min(points.longest_frames or search, search) + max((0, *study.differences_frames))
+    fixed = protocol.fixed_frames_of(study)
     if "fixed" in study.methods:
-        longest = max(longest, study.fixed_frames + max((0, *study.differences_frames)))
+        longest = max(longest, fixed + max((0, *study.differences_frames)))
     if all(method.startswith("cut") for method in study.methods):
         longest = search = 1
     if "timewarp" in study.methods:
@@ -141,8 +164,8 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
     if "one-hop" in study.methods:
         # The source plays on for a stay, the destination for both stays and a second blend.
         stay = round(study.one_hop.stay_s * protocol.fps)
-        longest = max(longest, study.fixed_frames) if len(study.methods) > 1 else study.fixed_frames
-        longest, after_exit = longest + stay, after_exit + 2 * stay + study.fixed_frames
+        longest = max(longest, fixed) if len(study.methods) > 1 else fixed
+        longest, after_exit = longest + stay, after_exit + 2 * stay + fixed
     room = max(longest, search)
     blend, whole = f"blends of up to {longest} frames", study.reference in OPTIMUM_CUTS
     return (
@@ -315,7 +338,7 @@ def lengths_at(
             start,
             end,
             method="fixed" if method == "one-hop" else method,
-            fixed_frames=study.fixed_frames,
+            fixed_frames=protocol.fixed_frames_of(study),
             specification=protocol.stimuli.specification,
         )
     return found
@@ -370,7 +393,7 @@ def _room_problem(protocol: Protocol, study: StudySpec, settled: Settled) -> str
     longest = max(level_lengths(study, settled.lengths))
     if "one-hop" in study.methods:
         stay = round(study.one_hop.stay_s * protocol.fps)
-        longest, after = longest + stay, after + 2 * stay + study.fixed_frames
+        longest, after = longest + stay, after + 2 * stay + protocol.fixed_frames_of(study)
     rooms = (
         ("entry", entry, settled.start_frame, settled.source),
         ("the longest blend", longest, settled.source.clip.frames - settled.start_frame, settled.source),
@@ -391,6 +414,7 @@ def _drawn(
     points: Points,
     source: Supply,
     destination: Supply,
+    alike: Alike | None,
 ) -> Settled:
     """Pairs of frames at random, in the order drawn, until one meets the conditions."""
     starts, ends = np.arange(*source.window), np.arange(*destination.window)
@@ -399,30 +423,46 @@ def _drawn(
     rng = generator(protocol.seed, "points", transition.name)
     reasons: dict[str, int] = {}
     seen: list[int] = []
+    judged = judged_method(study)
     for tried, draw in enumerate(rng.choice(count, size=min(count, CANDIDATES), replace=False), start=1):
         start, end = int(starts[draw // len(ends)]), int(ends[draw % len(ends)])
         clips = source.clip, destination.clip
-        lengths = lengths_at(protocol, study, *clips, start, end, (study.reference,))
-        seen.append(lengths[study.reference].blend_frames)
-        reason = _unmet(study, points, lengths)
+        lengths = lengths_at(protocol, study, *clips, start, end, (judged,))
+        seen.append(lengths[judged].blend_frames)
+        reason = _unmet(study, points, lengths[judged])
         if not reason and study.comparison is not None:
-            lengths |= lengths_at(protocol, study, *clips, start, end, (study.comparison,))
+            lengths |= lengths_at(protocol, study, *clips, start, end, [m for m in study.methods if m != judged])
             reason = _unwarped(points, lengths)
         settled = Settled(transition, source, destination, start, end, lengths, tried)
         if not reason and _room_problem(protocol, study, settled):
             reason = "no room for the longest blend"
+        if not reason and alike is not None and alike(study, settled):
+            reason = ONE_FILM
         if not reason:
             return settled
         reasons[reason] = reasons.get(reason, 0) + 1
-        if reasons[reason] >= WARPS and reason.startswith("warped"):
+        if reasons[reason] >= _patience(study, reason):
             break
     raise StimulusError(_none_found(study, transition, reasons, seen))
 
 
-def _unmet(study: StudySpec, points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -> str:
+def judged_method(study: StudySpec) -> str:
+    """The method whose length the conditions are about: the first whose length follows from the points."""
+    return next((method for method in study.methods if method in _FOLLOWING), study.reference)
+
+
+def _patience(study: StudySpec, reason: str) -> int:
+    """How many draws may fail for a reason that takes long to see."""
+    if reason == ONE_FILM and "one-hop" in study.methods:
+        return HOPS
+    slow = reason.startswith("warped") or judged_method(study) == "timewarp"
+    return WARPS if slow else CANDIDATES
+
+
+def _unmet(study: StudySpec, points: Points, found: BlendLength | WarpLength) -> str:
     """The first condition that a drawn transition doesn't meet; empty where all are met."""
-    length = lengths[study.reference].blend_frames
-    if study.reference == "cut":
+    length = found.blend_frames
+    if length == 0:
         return ""
     least = max(points.shortest_frames or 1, 1 - min((0, *study.differences_frames)))
     if length < least:
@@ -446,7 +486,7 @@ def _unwarped(points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -
 def _none_found(study: StudySpec, transition: TransitionSpec, reasons: Mapping[str, int], seen: Sequence[int]) -> str:
     counts = ", ".join(f"{number} {reason}" for reason, number in reasons.items())
     return (
-        f"transition {transition.name!r}: expected points whose {study.reference} blend meets the conditions "
+        f"transition {transition.name!r}: expected points whose {judged_method(study)} blend meets the conditions "
         f"of the study {study.name!r}, found none among {len(seen)} drawn ({counts}; lengths from {min(seen)} to "
         f"{max(seen)} frames). Widen the conditions, or choose other motions."
     )

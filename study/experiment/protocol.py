@@ -123,6 +123,12 @@ class Protocol(Part):
             return shown * len(study.methods) * study.repeats
         return shown * study.repeats * (2 if study.order == "both" else 1)
 
+    def fixed_frames_of(self, study: StudySpec) -> int:
+        """The blend length of the method `fixed` in a study: its own, or 0.33 s (2004)."""
+        from study.transitions.blend_length import FIXED_S, default_frames
+
+        return study.fixed_frames or default_frames(self.fps, FIXED_S)
+
     @property
     def scale_points(self) -> dict[str, int]:
         """Points of the scale of each rating study, by its name."""

@@ -124,38 +124,41 @@ def _design(protocol: Protocol, analysis: Result, who: str) -> str:
     each = asked["trials"] / max(asked["participants"], 1)
     return (
         f"{words.sentence(who)} took part in one sitting of {studies}. "
-        f"{' '.join(_study(study) for study in protocol.studies)} Trials came in an order drawn anew for every "
-        f"participant (seed {protocol.seed}); a participant was asked {each:.0f} questions on average."
+        f"{' '.join(_study(protocol, study) for study in protocol.studies)} Trials came in an order drawn anew for "
+        f"every participant (seed {protocol.seed}); a participant was asked {each:.0f} questions on average."
     )
 
 
-def _study(study: StudySpec) -> str:
+def _study(protocol: Protocol, study: StudySpec) -> str:
     title = words.readable(study.title or study.name)
     if study.task == "same-different":
         levels = ", ".join(f"{value:+d}".replace("-", "−") if value else "0" for value in study.differences_frames)
         what = (
             f"participants judged whether two transitions were the same or different: "
-            f"{_blends(study, study.reference)}, "
+            f"{_blends(protocol, study, study.reference)}, "
             f"against blends longer by {levels} frames"
         )
     elif study.task == "preference":
-        what = f"participants chose the more natural of two transitions, {_against(study)}"
+        what = f"participants chose the more natural of two transitions, {_against(protocol, study)}"
     else:
         asked = words.number(len(study.items), "question")
         done = "compared the second of two transitions with the first," if study.paired else "rated"
-        what = f"participants {done} {_against(study)}, on a scale of 0 to {study.scale_points - 1} in {asked}"
+        what = (
+            f"participants {done} {_against(protocol, study)}, on a scale of 0 to {study.scale_points - 1} in {asked}"
+        )
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
     order = (ORDERS if study.paired else SINGLE_ORDERS)[study.order]
     return f"In “{title}”, {what}. {order}{repeated}."
 
 
-def _against(study: StudySpec) -> str:
-    first = _blends(study, study.reference)
-    return first if study.comparison is None else f"{first} and {_blends(study, study.comparison)}"
+def _against(protocol: Protocol, study: StudySpec) -> str:
+    first = _blends(protocol, study, study.reference)
+    return first if study.comparison is None else f"{first} and {_blends(protocol, study, study.comparison)}"
 
 
-def _blends(study: StudySpec, method: str) -> str:
-    return f"blends of {words.number(study.fixed_frames, 'frame')}" if method == "fixed" else BLENDS[method]
+def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:
+    fixed = words.number(protocol.fixed_frames_of(study), "frame")
+    return f"blends of {fixed}" if method == "fixed" else BLENDS[method]
 
 
 def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
