@@ -79,6 +79,11 @@ class Planned:
     settled: Settled
     showings: tuple[Showing, ...]
 
+    @property
+    def for_practice(self) -> bool:
+        """Whether practice alone shows it."""
+        return self.settled.transition.name in self.study.practice_transitions
+
 
 def plan_all(
     protocol: Protocol, library: Library, hops: Hops, progress: Callable[[int, int], None] | None = None

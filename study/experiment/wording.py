@@ -18,7 +18,7 @@ from study.experiment.languages import words
 if TYPE_CHECKING:
     from study.experiment.protocol import Protocol, StudySpec
 
-_FILM_BESIDES_S = 1.0
+_BLEND_S = 1.0
 _ANSWER_S = 2.0
 _ITEM_S = 6.0
 _FIELD_S = 8.0
@@ -34,6 +34,14 @@ class Read:
     text: str
 
 
+@dataclass(frozen=True)
+class FilmTimes:
+    """Seconds of film in a trial of a study, and in a practice trial, on average."""
+
+    trial_s: float
+    practice_s: float
+
+
 def consent_text(protocol: Protocol) -> str:
     """What is agreed to; empty where nobody is asked."""
     return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol))
@@ -41,29 +49,25 @@ def consent_text(protocol: Protocol) -> str:
 
 def welcome_text(protocol: Protocol) -> str:
     """What is read first; empty for nothing."""
-    standard = _standard(protocol, _welcome(protocol))
-    if len(protocol.studies) > 1:
-        standard += "\n\n" + _standard(protocol, "parts")
-    return _filled(protocol.texts.welcome, standard, _slots(protocol))
+    return _filled(protocol.texts.welcome, _welcome_standard(protocol), _slots(protocol))
 
 
-def _welcome(protocol: Protocol) -> str:
-    """Name of the built-in welcome: by whether films are shown in pairs, one at a time, or both."""
+def _welcome_standard(protocol: Protocol) -> str:
+    """The built-in welcome: by whether films are shown in pairs, one at a time, or both."""
     kinds = {study.paired for study in protocol.studies}
-    return "welcome_films_and_pairs" if len(kinds) > 1 else "welcome_pairs" if kinds == {True} else "welcome_films"
-
-
-def _task(study: StudySpec) -> str:
-    """Name of a study's built-in instructions."""
-    return "rating_pairs" if study.task == "rating" and study.paired else study.task
+    name = "welcome_films_and_pairs" if len(kinds) > 1 else "welcome_pairs" if kinds == {True} else "welcome_films"
+    parts = ["parts"] if len(protocol.studies) > 1 else []
+    return "\n\n".join(_standard(protocol, each) for each in (name, *parts))
 
 
 def instructions_text(protocol: Protocol, study: StudySpec) -> str:
     """What is read before a study; empty for nothing."""
-    standard = _standard(protocol, _task(study))
-    if study.practice:
-        standard += "\n\n" + _standard(protocol, "practice")
-    return _filled(study.instructions, standard, _slots(protocol))
+    return _filled(study.instructions, _instructions_standard(protocol, study), _slots(protocol))
+
+
+def _instructions_standard(protocol: Protocol, study: StudySpec) -> str:
+    task = "rating_pairs" if study.task == "rating" and study.paired else study.task
+    return "\n\n".join(_standard(protocol, each) for each in (task, *(["practice"] if study.practice else [])))
 
 
 def question_text(protocol: Protocol, study: StudySpec) -> str:
@@ -98,44 +102,61 @@ def _slots(protocol: Protocol) -> dict[str, str]:
     }
 
 
-def duration_s(protocol: Protocol, *, at_most: bool = False) -> float:
-    """How long a sitting takes, in seconds: films, gaps, answers, pauses, breaks, the form and reading.
+def duration_s(
+    protocol: Protocol, *, at_most: bool = False, films: Mapping[str, FilmTimes | None] | None = None
+) -> float:
+    """How long a sitting takes, in seconds: films, gaps, answers, pauses, breaks, practice, the form and reading.
 
     Parameters
     ----------
     at_most
         With every answer at the end of its window, and every trial shown again because its films stalled.
+    films
+        What is known of the films, by study. Where nothing is, they are taken to be a second longer than entry and
+        exit, and a film with a hop two blends and a stay longer.
 
     Notes
     -----
-    Reckoned with films a second longer than entry and exit, two seconds for an answer (six for an item of a rating)
-    and 15 letters read a second.
+    Two seconds for an answer (six for an item of a rating), and 15 letters read a second.
     """
     total, counted = 0.0, 0
     for study in protocol.studies:
         again = 1 + (protocol.timing.show_again if at_most else 0)
-        shown = again * (protocol.trials_of(study) + study.attention_checks) + study.practice
-        total += shown * _trial_s(protocol, study, at_most)
+        shown = again * (protocol.trials_of(study) + study.attention_checks)
+        known = (films or {}).get(study.name) or _estimated(protocol, study)
+        besides_s = _besides_s(protocol, study, at_most)
+        total += shown * (known.trial_s + besides_s) + study.practice * (known.practice_s + besides_s)
         counted += protocol.trials_of(study) + study.attention_checks
     if protocol.timing.break_after:
         total += _BREAK_S * ((counted - 1) // protocol.timing.break_after)
     return total + _FIELD_S * len(protocol.form) + _letters(protocol) / _LETTERS_A_SECOND
 
 
-def _trial_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
-    stimuli, timing = protocol.stimuli, protocol.timing
-    film_s = stimuli.entry_s + stimuli.exit_s + _FILM_BESIDES_S
-    shown_s = 2 * film_s + timing.gap_s if study.paired else film_s
+def _estimated(protocol: Protocol, study: StudySpec) -> FilmTimes:
+    stimuli = protocol.stimuli
+    hop_s = 2 * protocol.fixed_frames_of(study) / protocol.fps + study.one_hop.stay_s
+    film_s = stimuli.entry_s + stimuli.exit_s + (hop_s if "one-hop" in study.methods else _BLEND_S)
+    shown_s = (2 if study.paired else 1) * film_s
+    return FilmTimes(shown_s, shown_s)
+
+
+def _besides_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
+    """What a trial takes besides its films."""
+    timing = protocol.timing
     answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
-    return shown_s + (_ITEM_S * len(study.items) or answer_s) + timing.pause_s
+    gap_s = timing.gap_s if study.paired else 0.0
+    return gap_s + (_ITEM_S * len(study.items) or answer_s) + timing.pause_s
 
 
 def _letters(protocol: Protocol) -> int:
-    """How much there is to read before, between and after the trials."""
-    texts = [(protocol.consent.text, "consent"), (protocol.texts.welcome, _welcome(protocol))]
-    texts += [(study.instructions, _task(study)) for study in protocol.studies]
-    texts.append((protocol.texts.debrief, "debrief"))
-    return sum(len(text.strip().replace("{standard}", _standard(protocol, name))) for text, name in texts)
+    """How much there is to read before, between and after the trials, slots not filled in."""
+    texts = [
+        (protocol.consent.text, _standard(protocol, "consent")),
+        (protocol.texts.welcome, _welcome_standard(protocol)),
+        *((study.instructions, _instructions_standard(protocol, study)) for study in protocol.studies),
+        (protocol.texts.debrief, _standard(protocol, "debrief")),
+    ]
+    return sum(len(text.strip().replace("{standard}", standard)) for text, standard in texts)
 
 
 def minutes(seconds: float) -> int:
