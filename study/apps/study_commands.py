@@ -173,7 +173,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
     lines += table_of(checked, found)
     lines += found.problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]
     lines.append(
-        f"A participant sees {counted(found.trials, 'trial')} of {counted(found.films, 'film')} and takes about "
+        f"A participant sees {counted(found.trials, 'trial')} made of {counted(found.films, 'film')} and takes about "
         f"{counted(found.minutes, 'minute')}, {found.minutes_at_most} where every answer and every film takes its "
         "longest; practice, breaks and reading are included."
     )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from study.counting import counted, noun
-from study.experiment.films import Film, Planned, Showing, plan_all
+from study.experiment.films import Planned, Showing, plan_all
 from study.experiment.one_hop_stimuli import METHOD as HOP_METHOD
 from study.experiment.one_hop_stimuli import Hops
 from study.experiment.points import Supply
@@ -112,9 +112,7 @@ def _row(protocol: Protocol, planned: Planned) -> Row:
     study, settled, fps = planned.study, planned.settled, protocol.fps
     films = {film for showing in planned.showings for film in showing.films}
     seconds = [film.frames(protocol) / fps for film in films]
-    lengths: dict[str, tuple[int, ...]] = {
-        method: tuple(_lengths(planned.showings, method)) for method in study.methods
-    }
+    lengths: dict[str, tuple[int, ...]] = {method: _lengths(planned.showings, method) for method in study.methods}
     hops = [f"one-hop: {film.hop.words}" for film in films if film.hop is not None]
     gave_up = [f"{method}: {settled.lengths[method].note}" for method in study.methods if settled.lengths[method].note]
     k_frames = settled.lengths[study.reference].blend_frames
@@ -141,19 +139,11 @@ def _place(supply: Supply, frame: int) -> Place:
     return Place(supply.name, at, round(s, 6), round(file_frame(supply.clip, at), 3), supply.file)
 
 
-def _lengths(showings: Sequence[Showing], method: str) -> Iterator[int]:
-    """The lengths by one method, each once, in the order shown."""
-    seen = set()
-    for showing in showings:
-        for film, by in ((showing.a, showing.method_a), (showing.b, showing.method_b)):
-            frames = None if film is None or by != method else _blended(film)
-            if frames is not None and frames not in seen:
-                seen.add(frames)
-                yield frames
-
-
-def _blended(film: Film) -> int:
-    return film.blend_frames if film.hop is None else film.hop.frames
+def _lengths(showings: Sequence[Showing], method: str) -> tuple[int, ...]:
+    """The lengths by one method, each once, the shortest first."""
+    seen = ((film, by) for each in showings for film, by in ((each.a, each.method_a), (each.b, each.method_b)))
+    films = {film for film, by in seen if film is not None and by == method}
+    return tuple(sorted({film.blend_frames if film.hop is None else film.hop.frames for film in films}))
 
 
 def _times(protocol: Protocol, study: StudySpec, planned: Sequence[Planned]) -> FilmTimes | None:

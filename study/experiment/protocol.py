@@ -21,7 +21,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from study.errors import ProtocolError
 from study.experiment.languages import with_words
 from study.experiment.protocol_checks import check_whole
-from study.experiment.protocol_errors import explain, full_location, line_of
+from study.experiment.protocol_errors import explain, full_location, line_of, telling
 from study.experiment.protocol_parts import Consent, FormField, Keys, Part, Slug, Texts
 from study.experiment.protocol_stimuli import Points, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec
@@ -191,7 +191,7 @@ def parse_protocol(text: str, path: Path | None = None) -> Protocol:
         protocol = Protocol.model_validate(with_words(data))
     except ValidationError as error:
         lines = []
-        for detail in error.errors():
+        for detail in telling(Protocol, error.errors()):
             location = full_location(detail)
             line = line_of(text, location)
             lines.append(f"{where}{f':{line}' if line else ''}: {explain(Protocol, detail)}")
