@@ -88,6 +88,7 @@ def _filled(text: str, standard: str, slots: Mapping[str, str]) -> str:
     filled = text.strip().replace("{standard}", standard)
     for slot, value in slots.items():
         filled = filled.replace(f"{{{slot}}}", value.strip())
+        filled = re.sub(rf"\{{{slot}:(.*?)\|(.*?)\}}", r"\1" if value == "1" else r"\2", filled)
     # A slot that is empty leaves no hole.
     return re.sub(r"\n\s*\n(\s*\n)+", "\n\n", filled).strip()
 
