@@ -4,8 +4,15 @@ from __future__ import annotations
 
 
 def counted(count: float, singular: str, plural: str | None = None) -> str:
-    """A count with its noun, thousands apart: `counted(1, "participant")` is "1 participant"."""
-    return f"{count:,} {noun(count, singular, plural)}"
+    """A count with its noun, thousands set apart.
+
+    Examples
+    --------
+    >>> counted(1, "participant"), counted(2500, "answer"), counted(2, "study", "studies")
+    ('1 participant', '2,500 answers', '2 studies')
+    """
+    number = f"{int(count):,}" if count == int(count) else f"{count:,g}"
+    return f"{number} {noun(count, singular, plural)}"
 
 
 def noun(count: float, singular: str, plural: str | None = None) -> str:

@@ -11,6 +11,7 @@ import click
 from study.apps.clips import clip_pair
 from study.apps.console import emit, json_option, library_option
 from study.apps.moments import in_words, moment
+from study.counting import counted
 
 if TYPE_CHECKING:
     from study.transitions.cost_matrix import Block, Extremes
@@ -65,7 +66,9 @@ def cost_matrix(
         shape = (first.frames - window + 1, second.frames - window + 1)
         if min(shape) < 1:
             most = min(first.frames, second.frames)
-            raise click.UsageError(f"expected --window of 1 to {most} frames, which both clips have, found {window}.")
+            raise click.UsageError(
+                f"expected --window of 1 to {counted(most, 'frame')}, which both clips have, found {window}."
+            )
     if out is None:
         found = extremes(blocks)
     elif out.suffix.lower() == ".npy":

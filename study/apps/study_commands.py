@@ -208,8 +208,8 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
         else render_stimuli(prepare_stimuli(checked, library), folder, workers)
     )
     text = (
-        f"{summary['folder']}: {summary['videos']} videos, {summary['frames']} frames, {summary['seconds']:.0f} s of "
-        f"motion; {summary['rendered']} rendered now, {summary['reused']} reused"
+        f"{summary['folder']}: {counted(summary['videos'], 'video')}, {counted(summary['frames'], 'frame')}, "
+        f"{summary['seconds']:.0f} s of motion; {summary['rendered']} rendered now, {summary['reused']} reused"
     )
     emit(summary, as_json, text)
 
@@ -251,8 +251,8 @@ def simulate(
         record(stimuli, folder)
     summary = simulate_participants(checked, folder, participants, seed, database, **goes_wrong)
     text = (
-        f"{summary['folder']}: {summary['participants']} simulated participants, "
-        f"{summary['answers']} answers made now, {summary['found']} found"
+        f"{summary['folder']}: {counted(summary['participants'], 'simulated participant')}, "
+        f"{counted(summary['answers'], 'answer')} made now, {summary['found']} found"
     )
     emit(summary, as_json, text)
 
@@ -296,8 +296,9 @@ def demo(out: Path | None, workers: int | None, participants: int, as_json: bool
     analysis = analyse_results(folder)
     page = write_report(folder)
     lines = [
-        f"{rendered['videos']} stimulus videos ({rendered['frames']} frames) in {folder / 'stimuli'}",
-        f"{simulated['answers'] + simulated['found']} answers of {participants} simulated participants "
+        f"{counted(rendered['videos'], 'stimulus video')} ({counted(rendered['frames'], 'frame')}) in "
+        f"{folder / 'stimuli'}",
+        f"{simulated['answers'] + simulated['found']} answers of {counted(participants, 'simulated participant')} "
         f"in {folder / 'responses.sqlite'}",
         *headlines(analysis),
         f"The report: {page.resolve()}",

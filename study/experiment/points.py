@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from study.counting import counted, noun
 from study.errors import MotionError, StimulusError, TransitionError
 from study.experiment.plan import generator
 from study.experiment.protocol import OPTIMUM_CUTS, Points, Protocol, StudySpec, TransitionSpec
@@ -167,10 +168,17 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
         longest = max(longest, fixed) if len(study.methods) > 1 else fixed
         longest, after_exit = longest + stay, after_exit + 2 * stay + fixed
     room = max(longest, search)
-    blend, whole = f"blends of up to {longest} frames", study.reference in OPTIMUM_CUTS
+    blend, whole = f"blends of up to {counted(longest, 'frame')}", study.reference in OPTIMUM_CUTS
     return (
-        Needs(entry, room, entry, longest, f"{entry} frames of entry and {blend}", whole),
-        Needs(room - 1, after_exit + 1, longest - 1, after_exit + 1, f"{blend} and {after_exit} frames of exit", whole),
+        Needs(entry, room, entry, longest, f"{counted(entry, 'frame')} of entry and {blend}", whole),
+        Needs(
+            room - 1,
+            after_exit + 1,
+            longest - 1,
+            after_exit + 1,
+            f"{blend} and {counted(after_exit, 'frame')} of exit",
+            whole,
+        ),
     )
 
 
@@ -205,9 +213,9 @@ def _supply(
         return Supply(name, longer, first, first + clip.frames, window, library.where(entry), notes)
     missing = _missing(motion, needs.least_before, needs.least_after)
     raise StimulusError(
-        f"motion {name!r}: expected {needs.least_before + needs.least_after} frames at {protocol.fps:g} fps around a "
-        f"transition point ({needs.words}), found {clip.frames} in {library.name}: {missing} frames are missing. {why} "
-        "Or lower entry_s, exit_s or longest_frames."
+        f"motion {name!r}: expected {counted(needs.least_before + needs.least_after, 'frame')} at "
+        f"{protocol.fps:g} fps around a transition point ({needs.words}), found {clip.frames} in {library.name}: "
+        f"{counted(missing, 'frame is', 'frames are')} missing. {why} Or lower entry_s, exit_s or longest_frames."
     )
 
 
@@ -372,8 +380,8 @@ def _given(
     if study.differences_frames and shortest < 1:
         raise StimulusError(
             f"transition {transition.name!r}: a level below one frame: the {study.reference} blend here takes "
-            f"{lengths[study.reference].blend_frames} frames, the difference {min(study.differences_frames)} leaves "
-            f"{shortest}. Choose other points, or other differences_frames."
+            f"{counted(lengths[study.reference].blend_frames, 'frame')}, the difference "
+            f"{min(study.differences_frames)} leaves {shortest}. Choose other points, or other differences_frames."
         )
     settled = Settled(transition, source, destination, frames[0], frames[1], lengths, 1)
     if problem := _room_problem(protocol, study, settled):
@@ -401,7 +409,8 @@ def _room_problem(protocol: Protocol, study: StudySpec, settled: Settled) -> str
         ("exit", after, settled.destination.clip.frames - 1 - settled.end_frame, settled.destination),
     )
     return "; ".join(
-        f"expected {needed} frames for {what}, found {there} in {supply.name!r}: {needed - there} are missing"
+        f"expected {counted(needed, 'frame')} for {what}, found {there} in {supply.name!r}: {needed - there} "
+        f"{noun(needed - there, 'is', 'are')} missing"
         for what, needed, there, supply in rooms
         if there < needed
     )
@@ -466,11 +475,11 @@ def _unmet(study: StudySpec, points: Points, found: BlendLength | WarpLength) ->
         return ""
     least = max(points.shortest_frames or 1, 1 - min((0, *study.differences_frames)))
     if length < least:
-        return f"shorter than {least} frames"
+        return f"shorter than {counted(least, 'frame')}"
     if points.longest_frames is not None and length > points.longest_frames:
-        return f"longer than {points.longest_frames} frames"
+        return f"longer than {counted(points.longest_frames, 'frame')}"
     if points.avoid_frames is not None and abs(length - points.avoid_frames) <= (points.avoid_within_frames or 0):
-        return f"within {points.avoid_within_frames or 0} frames of {points.avoid_frames}"
+        return f"within {counted(points.avoid_within_frames or 0, 'frame')} of {points.avoid_frames}"
     return ""
 
 
@@ -479,7 +488,7 @@ def _unwarped(points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -
     least = points.least_warp_frames or 0
     for length in lengths.values():
         if isinstance(length, WarpLength) and abs(length.source_frames - length.destination_frames) < least:
-            return f"warped by less than {least} frames"
+            return f"warped by less than {counted(least, 'frame')}"
     return ""
 
 
@@ -488,5 +497,5 @@ def _none_found(study: StudySpec, transition: TransitionSpec, reasons: Mapping[s
     return (
         f"transition {transition.name!r}: expected points whose {judged_method(study)} blend meets the conditions "
         f"of the study {study.name!r}, found none among {len(seen)} drawn ({counts}; lengths from {min(seen)} to "
-        f"{max(seen)} frames). Widen the conditions, or choose other motions."
+        f"{counted(max(seen), 'frame')}). Widen the conditions, or choose other motions."
     )

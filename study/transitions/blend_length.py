@@ -197,8 +197,8 @@ def joint_costs(
     frames = window(start_frame, end_frame, longest, specification)
     if lacking := shortfall(source, destination, frames):
         raise TransitionError(
-            f"Expected clips with frames for blends of up to {longest} frames at source frame {start_frame} and "
-            f"destination frame {end_frame}, but {lacking}. Choose other frames, or use longer clips."
+            f"Expected clips with frames for blends of up to {counted(longest, 'frame')} at source frame "
+            f"{start_frame} and destination frame {end_frame}, but {lacking}. Choose other frames, or use longer clips."
         )
     a = source.rotations[frames.source_start : frames.source_stop, joints]
     b = destination.rotations[frames.destination_start : frames.destination_stop, joints]

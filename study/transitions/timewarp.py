@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, retarget, sample
 from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames
@@ -221,9 +222,9 @@ def _check_supply(
     if start_frame < 1:
         faults.append(f"{names[0]} lacks 1 frame before its first")
     if (lacking := start_frame + source_frames - source.frames) > 0:
-        faults.append(f"{names[0]} lacks {lacking} frames after its last")
+        faults.append(f"{names[0]} lacks {counted(lacking, 'frame')} after its last")
     if (lacking := destination_frames - end_frame) > 0:
-        faults.append(f"{names[1]} lacks {lacking} frames before its first")
+        faults.append(f"{names[1]} lacks {counted(lacking, 'frame')} before its first")
     if faults:
         raise TransitionError(
             f"Expected clips with frames for warped blends of {source_frames} source and {destination_frames} "

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
 
@@ -72,10 +73,10 @@ def shortfall(source: Clip, destination: Clip, frames: Window) -> str:
     ):
         name = f"the {kind} {clip.name}" if clip.name else f"the {kind}"
         if start < 0:
-            faults.append(f"{name} lacks {-start} frames before its first (needs frame {start})")
+            faults.append(f"{name} lacks {counted(-start, 'frame')} before its first (needs frame {start})")
         if stop > clip.frames:
             faults.append(
-                f"{name} lacks {stop - clip.frames} frames after its last "
+                f"{name} lacks {counted(stop - clip.frames, 'frame')} after its last "
                 f"(needs frames to {stop - 1}, has them to {clip.frames - 1})"
             )
     return "; ".join(faults)
@@ -91,7 +92,7 @@ def held(available: int, shortest: int, longest: int) -> tuple[int, str]:
         return longest, ""
     if available < shortest:
         return shortest, ""
-    return available, f"the clips supply blends of up to {available} frames; {longest} were asked for"
+    return available, f"the clips supply blends of up to {counted(available, 'frame')}; {longest} were asked for"
 
 
 def longest_available(
