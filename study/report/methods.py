@@ -126,7 +126,8 @@ def _design(protocol: Protocol, analysis: Result, who: str) -> str:
     return (
         f"{words.sentence(who)} took part in one sitting of {studies}. "
         f"{' '.join(_study(protocol, study) for study in protocol.studies)} Trials came in an order drawn anew for "
-        f"every participant (seed {protocol.seed}); a participant was asked {counted(round(each), 'question')} on average."
+        f"every participant (seed {protocol.seed}); a participant was asked {counted(round(each), 'question')} "
+        "on average."
     )
 
 

@@ -123,7 +123,8 @@ def _notes(comparison: Result) -> list[str]:
         correlation = words.signed(clusters["intraclass_correlation"], 3, plus=False)
         notes.append(
             f"Answers of one participant correlate by {correlation}: the pooled test counts "
-            f"{counted(comparison['published']['answers'], 'answer')} that are worth {clusters['effective_answers'] or 0:.0f} "
+            f"{counted(comparison['published']['answers'], 'answer')} that are worth "
+            f"{clusters['effective_answers'] or 0:.0f} "
             f"independent ones (design effect {clusters['design_effect']:.2f})."
         )
     if order["first_percent"] is not None:
