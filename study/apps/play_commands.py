@@ -133,7 +133,9 @@ def _sit(
     if finished:
         say(f"{plan.participant} has finished before; there is nothing left to do.")
         return Outcome("finished", 0, 0, 0), {}
-    session = open_session(protocol, plan, answers, passed=passed)
+    session = open_session(
+        protocol, plan, answers, passed=passed, frames={record.id: record.frames for record in stimuli.records}
+    )
     if answers:
         say(f"{plan.participant} goes on after {counted(len(answers), 'answer')}.")
     look, size = page_look(stimuli, session, place.font), place.window_size

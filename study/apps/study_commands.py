@@ -168,7 +168,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
 
     checked, opened = load(protocol), open_library(library or "synthetic")
     found, notes = look_ahead(checked, opened), to_do(checked)
-    read = [asdict(one) for one in all_texts(checked)] if texts else []
+    read = [asdict(one) for one in all_texts(checked, found.film_times)] if texts else []
     lines = [f"{one['where']}\n    {one['text']}\n" for one in read]
     lines += table_of(checked, found)
     lines += found.problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]

@@ -15,7 +15,7 @@ from study.experiment.one_hop_stimuli import METHOD as HOP_METHOD
 from study.experiment.one_hop_stimuli import Hops
 from study.experiment.points import Supply
 from study.experiment.protocol import Protocol, StudySpec
-from study.experiment.wording import FilmTimes, duration_s, minutes
+from study.experiment.wording import Films, FilmTimes, duration_s, minutes
 from study.motion.clip import file_frame
 from study.transitions.advice import JND_LONGER_S, JND_SHORTER_S, just_noticeable
 from study.transitions.timewarp import WarpLength
@@ -80,6 +80,7 @@ class Outlook:
 
     `films` are different films of the whole protocol; `minutes` count films, gaps, answers, pauses, breaks, practice,
     attention checks, the form and reading; `minutes_at_most` with every answer and every film at its longest.
+    `film_times` are what they rest on, for the texts that speak of minutes.
     """
 
     rows: tuple[Row, ...]
@@ -89,12 +90,13 @@ class Outlook:
     films: int
     minutes: int
     minutes_at_most: int
+    film_times: Films
 
 
 def look_ahead(protocol: Protocol, library: Library) -> Outlook:
     """Plan all films of a protocol and describe them."""
     planned, problems = plan_all(protocol, library, Hops(protocol, library))
-    times = {study.name: _times(protocol, study, planned) for study in protocol.studies}
+    times = {study.name: found for study in protocol.studies if (found := _times(study, protocol, planned))}
     films = {film for each in planned for showing in each.showings for film in showing.films}
     usual, longest = (minutes(duration_s(protocol, at_most=most, films=times)) for most in (False, True))
     return Outlook(
@@ -105,6 +107,7 @@ def look_ahead(protocol: Protocol, library: Library) -> Outlook:
         len(films),
         usual,
         longest,
+        times,
     )
 
 
@@ -146,7 +149,7 @@ def _lengths(showings: Sequence[Showing], method: str) -> tuple[int, ...]:
     return tuple(sorted({film.blend_frames if film.hop is None else film.hop.frames for film in films}))
 
 
-def _times(protocol: Protocol, study: StudySpec, planned: Sequence[Planned]) -> FilmTimes | None:
+def _times(study: StudySpec, protocol: Protocol, planned: Sequence[Planned]) -> FilmTimes | None:
     """Seconds of film in a trial and in a practice trial of a study; None where its films are not known."""
     trials: list[float] = []
     practice: list[float] = []

@@ -42,14 +42,20 @@ class FilmTimes:
     practice_s: float
 
 
-def consent_text(protocol: Protocol) -> str:
+Films = Mapping[str, FilmTimes]
+"""What is known of the films, by study."""
+
+NO_FILMS: Films = {}
+
+
+def consent_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
     """What is agreed to; empty where nobody is asked."""
-    return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol))
+    return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol, films))
 
 
-def welcome_text(protocol: Protocol) -> str:
+def welcome_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
     """What is read first; empty for nothing."""
-    return _filled(protocol.texts.welcome, _welcome_standard(protocol), _slots(protocol))
+    return _filled(protocol.texts.welcome, _welcome_standard(protocol), _slots(protocol, films))
 
 
 def _welcome_standard(protocol: Protocol) -> str:
@@ -60,9 +66,9 @@ def _welcome_standard(protocol: Protocol) -> str:
     return "\n\n".join(_standard(protocol, each) for each in (name, *parts))
 
 
-def instructions_text(protocol: Protocol, study: StudySpec) -> str:
+def instructions_text(protocol: Protocol, study: StudySpec, films: Films = NO_FILMS) -> str:
     """What is read before a study; empty for nothing."""
-    return _filled(study.instructions, _instructions_standard(protocol, study), _slots(protocol))
+    return _filled(study.instructions, _instructions_standard(protocol, study), _slots(protocol, films))
 
 
 def _instructions_standard(protocol: Protocol, study: StudySpec) -> str:
@@ -75,9 +81,9 @@ def question_text(protocol: Protocol, study: StudySpec) -> str:
     return _filled(study.question, _standard(protocol, f"question_{study.task}"), {})
 
 
-def debrief_text(protocol: Protocol) -> str:
+def debrief_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
     """What is read at the end; empty for nothing."""
-    return _filled(protocol.texts.debrief, _standard(protocol, "debrief"), _slots(protocol))
+    return _filled(protocol.texts.debrief, _standard(protocol, "debrief"), _slots(protocol, films))
 
 
 def _standard(protocol: Protocol, name: str) -> str:
@@ -93,9 +99,9 @@ def _filled(text: str, standard: str, slots: Mapping[str, str]) -> str:
     return re.sub(r"\n\s*\n(\s*\n)+", "\n\n", filled).strip()
 
 
-def _slots(protocol: Protocol) -> dict[str, str]:
+def _slots(protocol: Protocol, films: Films) -> dict[str, str]:
     return {
-        "minutes": str(minutes(duration_s(protocol))),
+        "minutes": str(minutes(duration_s(protocol, films=films))),
         "trials": str(sum(protocol.trials_of(study) for study in protocol.studies)),
         "studies": str(len(protocol.studies)),
         "answer_s": f"{protocol.timing.answer_s:g}",
@@ -103,9 +109,7 @@ def _slots(protocol: Protocol) -> dict[str, str]:
     }
 
 
-def duration_s(
-    protocol: Protocol, *, at_most: bool = False, films: Mapping[str, FilmTimes | None] | None = None
-) -> float:
+def duration_s(protocol: Protocol, *, at_most: bool = False, films: Films = NO_FILMS) -> float:
     """How long a sitting takes, in seconds: films, gaps, answers, pauses, breaks, practice, the form and reading.
 
     Parameters
@@ -124,7 +128,7 @@ def duration_s(
     for study in protocol.studies:
         again = 1 + (protocol.timing.show_again if at_most else 0)
         shown = again * (protocol.trials_of(study) + study.attention_checks)
-        known = (films or {}).get(study.name) or _estimated(protocol, study)
+        known = films.get(study.name) or _estimated(protocol, study)
         besides_s = _besides_s(protocol, study, at_most)
         total += shown * (known.trial_s + besides_s) + study.practice * (known.practice_s + besides_s)
         counted += protocol.trials_of(study) + study.attention_checks
@@ -166,22 +170,22 @@ def minutes(seconds: float) -> int:
     return whole if whole <= 10 else 5 * math.ceil(whole / 5)
 
 
-def all_texts(protocol: Protocol) -> tuple[Read, ...]:
+def all_texts(protocol: Protocol, films: Films = NO_FILMS) -> tuple[Read, ...]:
     """Every text of a sitting that participants read, in its order, and then the small words of the front ends."""
     consent = protocol.consent
-    found = [Read("consent.text", consent_text(protocol))]
+    found = [Read("consent.text", consent_text(protocol, films))]
     found += [Read(f"consent.{name}", getattr(consent, name)) for name in ("agree", "decline", "declined")]
     for field in protocol.form:
         found.append(Read(f"form: {field.name}", " | ".join([field.label, *field.choices])))
-    found.append(Read("texts.welcome", welcome_text(protocol)))
+    found.append(Read("texts.welcome", welcome_text(protocol, films)))
     for study in protocol.studies:
-        found.append(Read(f"{study.name}: instructions", instructions_text(protocol, study)))
+        found.append(Read(f"{study.name}: instructions", instructions_text(protocol, study, films)))
         found.append(Read(f"{study.name}: question", question_text(protocol, study)))
         for item in study.items:
             scale = " ... ".join(filter(None, (item.low, item.middle, item.high)))
             ends = f" [{scale}]" if scale else ""
             found.append(Read(f"{study.name}: item {item.name}", item.question + ends))
-    found.append(Read("texts.debrief", debrief_text(protocol)))
+    found.append(Read("texts.debrief", debrief_text(protocol, films)))
     small = [name for name in type(protocol.texts).model_fields if name not in ("welcome", "debrief")]
     found += [Read(f"texts.{name}", getattr(protocol.texts, name)) for name in small]
     return tuple(read for read in found if read.text)
