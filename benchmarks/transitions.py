@@ -97,8 +97,8 @@ def judged(clips: dict[str, Clip], rng: np.random.Generator) -> list[float]:
         start = int(rng.integers(2, source.frames - longest + 1))
         end = int(rng.integers(longest, destination.frames))
         try:
-            length = blend_length(source, destination, start, end, restrict=True, longest=longest).blend_frames
-            warp = warp_length(source, destination, start, end, restrict=True, longest=longest)
+            length = blend_length(source, destination, start, end, longest=longest).blend_frames
+            warp = warp_length(source, destination, start, end, longest=longest)
             if length < 5 or end > destination.frames - 4:
                 continue
             made = blend(source, destination, start, end, length)

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from study.analysis.estimates import Interval, chi_square_probability, normal_quantile, t_quantile
 from study.analysis.scoring import maximise
+from study.counting import counted
 from study.errors import AnalysisError
 
 FloatArray = NDArray[np.float64]
@@ -158,7 +159,7 @@ def _fitted(
     endless = [row.method for row in every if row.value is None]
     notes = [f"always or never favoured, so without a finite strength: {', '.join(endless)}"] if endless else []
     if any(row.value is not None and row.standard_error is None for row in every):
-        notes.append(f"{people} participants: too few, or too much alike, for standard errors")
+        notes.append(f"{counted(people or 0, 'participant')}: too few, or too much alike, for standard errors")
     # Rows may hold single answers: the saturated model is one share for every pair and order.
     cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
     favoured, seen = np.bincount(cells, yes), np.bincount(cells, total)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study.counting import noun
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -269,7 +270,7 @@ def check_participants(table: pd.DataFrame) -> None:
     """
     nameless = int(table["participant"].isna().sum())
     if nameless:
-        rows = "row" if nameless == 1 else "rows"
+        rows = noun(nameless, "row")
         raise AnalysisError(f"expected a participant in every row, found {nameless} {rows} without; leave them out")
 
 

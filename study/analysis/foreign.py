@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -248,8 +249,8 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Trials:
     placed, given = level.notna(), level.notna() & (answer != "")
     if not given.any():
         raise AnalysisError(
-            f"expected rows with a {columns.level} and an {columns.answer}, found none in {rows} rows; check the "
-            "columns' names and --where"
+            f"expected rows with a {columns.level} and an {columns.answer}, found none in "
+            f"{counted(rows, 'row')}; check the columns' names and --where"
         )
     yes, shown = _answers(table, answer[given], columns, task)
     who: pd.Series[str] | str = "participant"

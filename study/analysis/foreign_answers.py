@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis.foreign import column, few, numbers, row_of, taken
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -195,4 +196,6 @@ def _counted(found: pd.DataFrame, rows: int, given: pd.Series[bool]) -> ForeignA
 
 
 def _nothing(names: str, rows: int) -> AnalysisError:
-    return AnalysisError(f"expected rows with {names}, found none in {rows} rows; check the columns' names and --where")
+    return AnalysisError(
+        f"expected rows with {names}, found none in {counted(rows, 'row')}; check the columns' names and --where"
+    )

@@ -12,6 +12,7 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -74,8 +75,8 @@ def parse_table(text: str, needed: Sequence[str], delimiter: str | None = None) 
     for line, cells in rows:
         if any(cells[len(heading) :]):
             raise AnalysisError(
-                f"row {line}: expected {len(heading)} cells as in the heading, found {len(cells)}; quote cells that "
-                "hold the delimiter, or name another one with --delimiter"
+                f"row {line}: expected {counted(len(heading), 'cell')} as in the heading, found {len(cells)}; "
+                "quote cells that hold the delimiter, or name another one with --delimiter"
             )
     if not rows:
         raise AnalysisError("expected rows under the heading, found none")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from study.analysis import estimates
 from study.analysis.estimating_equations import estimating_equations
 from study.analysis.mixed import Link, MixedFit, fit_mixed, marginal_share
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -107,7 +108,10 @@ def _gee(design: FloatArray, chosen: FloatArray, who: NDArray[Any], confidence: 
     people = len(set(who))
     nothing = {"percent": None, "low": None, "high": None, "p_value": None, "order_logit": None, "order_p_value": None}
     if people < FEWEST_FOR_GEE:
-        return {**nothing, "note": f"{people} participants are too few for estimating equations"}
+        return {
+            **nothing,
+            "note": f"{counted(people, 'participant is', 'participants are')} too few for estimating equations",
+        }
     if chosen.min() == chosen.max():
         return {**nothing, "note": "all answers alike: effects can't be estimated"}
     too_alike = {**nothing, "note": "the answers vary too little between participants for estimating equations"}

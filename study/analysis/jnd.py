@@ -24,6 +24,7 @@ from study.analysis.same_different import (
 )
 from study.analysis.same_different_mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different_model import ModelFit, fit_model
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -196,7 +197,10 @@ def _hotelling(shares: FloatArray) -> dict[str, Any]:
     contrasts = shares[:, 1:] - shares[:, :1]
     size = motions - 1
     if count <= size + 1:
-        return {"note": f"{count} participants are too few for a test across {motions} motions"}
+        return {
+            "note": f"{counted(count, 'participant is', 'participants are')} too few for a test across "
+            f"{counted(motions, 'motion')}"
+        }
     spread = np.atleast_2d(np.cov(contrasts, rowvar=False))
     if np.linalg.matrix_rank(spread, tol=1e-9) < size:
         return {"note": "participants' differences between motions do not vary enough for a test"}
@@ -263,7 +267,7 @@ def d_prime(
     for yes, pairs in ((hits, different_pairs), (alarms, same_pairs)):
         if not 0 <= yes <= pairs < np.inf:
             raise AnalysisError(
-                f"expected counts with 0 <= different <= pairs, found {yes} of {pairs} pairs; count again"
+                f"expected counts with 0 <= different <= pairs, found {yes} of {counted(pairs, 'pair')}; count again"
             )
     if different_pairs == 0 or same_pairs == 0:
         return dict.fromkeys(("d_prime", "criterion", "standard_error", "low", "high"))

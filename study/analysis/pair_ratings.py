@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from study.analysis import estimates
 from study.analysis.rank_tests import signed_rank
 from study.analysis.ratings import rated
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -94,8 +95,8 @@ def _scores(answers: pd.DataFrame, points: int) -> pd.DataFrame:
         )
     if unknown := int(part["a_first"].isna().sum()):
         raise AnalysisError(
-            f"expected true or false in the column `a_first`, found nothing in {unknown} rows; a rating of a pair "
-            "means nothing without it"
+            f"expected true or false in the column `a_first`, found nothing in {counted(unknown, 'row')}; a "
+            "rating of a pair means nothing without it"
         )
     part["participant"] = part["participant"].astype(str)
     part["a_first"] = part["a_first"].astype(bool)

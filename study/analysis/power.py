@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis.estimates import Interval, wilson_interval
+from study.counting import counted
 from study.errors import AnalysisError
 
 FloatArray = NDArray[np.float64]
@@ -111,10 +112,10 @@ def _needed(points: Sequence[PowerPoint], target: float) -> tuple[int | None, st
     sizes = np.array([point.participants for point in points], dtype=np.float64)
     rising = np.maximum.accumulate([point.power for point in points])
     if rising[-1] < target:
-        return None, f"{points[-1].participants} participants are not enough; try more"
+        return None, f"{counted(points[-1].participants, 'participant is', 'participants are')} not enough; try more"
     at = int(np.flatnonzero(rising >= target)[0])
     if at == 0:
-        return points[0].participants, f"{points[0].participants} participants or fewer; try fewer"
+        return points[0].participants, f"{counted(points[0].participants, 'participant')} or fewer; try fewer"
     part = (target - rising[at - 1]) / (rising[at] - rising[at - 1])
     return math.ceil(sizes[at - 1] + part * (sizes[at] - sizes[at - 1]) - 1e-9), ""
 

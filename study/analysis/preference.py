@@ -18,6 +18,7 @@ from study.analysis.bradley_terry import fit_bradley_terry
 from study.analysis.group_models import preference_models
 from study.analysis.no_effect import MARGIN, no_preference
 from study.analysis.preference_tests import motions_as_sample, participant_tests
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -315,7 +316,7 @@ def _in_words(method_a: str, method_b: str, published: Published, participants: 
     if published.percent is None:
         return f"There are no answers that compare {method_a} with {method_b}."
     p_value = participants["p_value"]
-    share = f"{published.percent:.1f}% of {published.answers} answers favoured {method_a} over {method_b}"
+    share = f"{published.percent:.1f}% of {counted(published.answers, 'answer')} favoured {method_a} over {method_b}"
     if p_value is None:
         return f"{share}; with one participant nothing can be said about others."
     if p_value < alpha:

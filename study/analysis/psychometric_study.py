@@ -16,6 +16,7 @@ from study.analysis.group_models import psychometric_mixed
 from study.analysis.mixed import Link
 from study.analysis.psychometric import Estimate, Model, PsychometricFit, curve_of, fit_psychometric, make_model
 from study.analysis.psychometric_likelihood import LikelihoodFit, fit_likelihood
+from study.counting import counted, noun
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -122,7 +123,14 @@ def _group(own: list[dict[str, Any]], model: Model, confidence: float) -> dict[s
     note = test.note
     if left_out:
         note = "; ".join(
-            filter(None, (note, f"{left_out} of {len(own)} participants have no threshold within the levels"))
+            filter(
+                None,
+                (
+                    note,
+                    f"{left_out} of {counted(len(own), 'participant')} {noun(left_out, 'has', 'have')} no "
+                    "threshold within the levels",
+                ),
+            )
         )
     return {
         "participants": test.participants,
@@ -158,10 +166,12 @@ def _in_words(result: dict[str, Any]) -> str:
         return f"The threshold is {_with_interval(pooled['threshold']['value'], **pooled['threshold']['interval'])}."
     if mixed and mixed["threshold"] is not None:
         found = _with_interval(mixed["threshold"], mixed["low"], mixed["high"], result["confidence"])
-        text = f"The threshold of a typical one of {mixed['participants']} participants is {found}, by a mixed model"
+        people = counted(mixed["participants"], "participant")
+        text = f"The threshold of a typical one of {people} is {found}, by a mixed model"
     elif group["mean_threshold"] is not None:
         found = _with_interval(group["mean_threshold"], group["low"], group["high"], result["confidence"])
-        text = f"The mean threshold of {group['participants']} participants is {found}, by Student's t over them"
+        people = counted(group["participants"], "participant")
+        text = f"The mean threshold of {people} is {found}, by Student's t over them"
     else:
         return f"No threshold of the group can be given: {group['note']}."
     if pooled["threshold"]["value"] is None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
+from study.counting import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,7 +117,7 @@ def _flags(row: dict[str, Any], given: dict[str, NDArray[Any]], fastest_s: float
     if row["missed"] > MANY_MISSED * row["trials"]:
         flags.append(f"missed {row['missed']} of {row['trials']}")
     if row["too_fast"] > MANY_FAST * max(row["answered"], 1):
-        flags.append(f"{row['too_fast']} answers sooner than {fastest_s:g} s")
+        flags.append(f"{counted(row['too_fast'], 'answer')} sooner than {fastest_s:g} s")
     if row["longest_run"] >= LONG_RUN:
         flags.append(f"{row['longest_run']} times the same answer in a row")
     tasks = given["task"] if "task" in given else np.full(len(given["answer"]), "answers")

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from study.analysis import estimates
 from study.analysis.anova import sizes, sum_to_zero
+from study.counting import counted
 
 FloatArray = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ def mixed_design(
     count = int(code.max()) + 1 if people else 0
     left = people - count
     if left < 1:
-        return f"{people} participants in {count} groups: too few to see how participants differ"
+        return f"{counted(people, 'participant')} in {counted(count, 'group')}: too few to see how participants differ"
     if min(levels) < 2:
         return "a factor with one level: nothing to compare"
     design = np.column_stack([np.ones(people), sum_to_zero(code, count)])

@@ -21,6 +21,7 @@ from study.analysis import differencing, estimates
 from study.analysis.decision_rules import frames_by_side
 from study.analysis.same_different import SIDES, Counts, Side, Threshold
 from study.analysis.same_different_model import why_no_fit
+from study.counting import counted
 
 FloatArray = NDArray[np.float64]
 
@@ -121,7 +122,8 @@ def fit_mixed_thresholds(
     answered = counts.shown.sum(axis=1) > 0
     reason = why_no_fit(counts)
     if not reason and answered.sum() < FEWEST_PEOPLE:
-        reason = f"{int(answered.sum())} participants are too few to tell how people differ; it takes {FEWEST_PEOPLE}"
+        few = counted(int(answered.sum()), "participant is", "participants are")
+        reason = f"{few} too few to tell how people differ; it takes {FEWEST_PEOPLE}"
     if reason:
         return reason
     people = _people(counts, answered)

@@ -10,13 +10,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.clips import load_clip
-from study.apps.console import emit, json_option, library_option, progress, say
+from study.apps.console import columns, emit, json_option, library_option, progress, say
+from study.apps.moments import moment
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
     from study.transitions.advice import Advice
 
-HEADINGS = ("from", "to", "method", "start", "end", "frames", "than default", "JND", "cost", "cost at default")
+HEADINGS = (
+    *("from", "to", "method", "start", "s", "in file", "end", "s", "in file"),
+    *("frames", "s", "than default", "JND", "cost", "cost at default"),
+)
+POINT = (("_frame", "d"), ("_s", ".2f"), ("_file_frame", ".5g"))
 
 
 @click.command()
@@ -38,8 +43,6 @@ def advise(
     CLIPS are motion files, or names of motions in --library; all of the library where none is named. The method is the
     one that suits the motion (Wang & Bodenheimer 2004): geodesic where one of the two is cyclic, else velocity.
     """
-    from dataclasses import asdict
-
     from study.errors import SegueError
     from study.motion.clip import resample
     from study.motion.library import open_library
@@ -58,30 +61,34 @@ def advise(
     with progress("advise") as advance:
         for done, (source, destination) in enumerate(pairs, start=1):
             try:
-                found, strip = _one(
+                row = _one(
                     clips[source], clips[destination], (cyclic[source], cyclic[destination]), None if no_strips else out
                 )
             except SegueError as error:
                 problems.append(f"{source} to {destination}: {error}")
             else:
-                rows.append({**asdict(found), "source": source, "destination": destination, "strip": strip})
+                rows.append({**row, "source": source, "destination": destination, "fps": fps})
             advance(done / len(pairs), f"{done} of {len(pairs)}")
     for problem in problems:
         say(problem)
     result = {"fps": fps, "advice": rows, "problems": problems, "cyclic": cyclic}
     if out is not None:
         _write(out, result)
-    emit(result, as_json, "\n".join(_table(rows)))
+    emit(result, as_json, "\n".join(_table(rows, fps, library)))
 
 
-def _one(source: Clip, destination: Clip, cyclic: tuple[bool, bool], out: Path | None) -> tuple[Advice, str | None]:
-    """The advice, and the strip drawn where there is a folder for it."""
+def _one(source: Clip, destination: Clip, cyclic: tuple[bool, bool], out: Path | None) -> dict[str, Any]:
+    """The advice as a row, and the strip drawn where there is a folder for it."""
+    from dataclasses import asdict
+
     from study.motion.clip import retarget
     from study.transitions.advice import advise as find
 
     destination = retarget(destination, source.skeleton)
     found = find(source, destination, cyclic=cyclic)
-    return found, None if out is None else str(_strip(source, destination, found, out / "strips"))
+    strip = None if out is None else str(_strip(source, destination, found, out / "strips"))
+    points = {**moment(source, found.start_frame, "start"), **moment(destination, found.end_frame, "end")}
+    return {**asdict(found), **points, "strip": strip}
 
 
 def _strip(source: Clip, destination: Clip, found: Advice, folder: Path) -> Path:
@@ -115,31 +122,33 @@ def _write(out: Path, result: dict[str, Any]) -> None:
     (out / "advice.json").write_text(json.dumps(plain(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """The advice as columns of text, those furthest from the default first."""
+def _table(rows: Sequence[dict[str, Any]], fps: float, library: str | None) -> Iterator[str]:
+    """The advice as columns of text, those furthest from the default first, and how a row is typed back."""
     cells = [
-        HEADINGS,
-        *(
-            (
-                row["source"],
-                row["destination"],
-                row["method"],
-                str(row["start_frame"]),
-                str(row["end_frame"]),
-                str(row["blend_frames"]),
-                f"{row['difference_frames']:+d}",
-                f"{row['jnd']:.1f}",
-                f"{row['cost']:.4f}",
-                f"{row['default_cost']:.4f}",
-            )
-            for row in sorted(rows, key=lambda row: -row["jnd"])
-        ),
-    ]
-    widths = [max(len(line[column]) for line in cells) for column in range(len(HEADINGS))]
-    for line in cells:
-        left = (
-            cell.ljust(width) if at < 3 else cell.rjust(width)
-            for at, (cell, width) in enumerate(zip(line, widths, strict=True))
+        (
+            row["source"],
+            row["destination"],
+            row["method"],
+            *(f"{row[end + kind]:{form}}" for end in ("start", "end") for kind, form in POINT),
+            str(row["blend_frames"]),
+            f"{row['blend_s']:.2f}",
+            f"{row['difference_frames']:+d}",
+            f"{row['jnd']:.1f}",
+            f"{row['cost']:.4f}",
+            f"{row['default_cost']:.4f}",
         )
-        yield "  ".join(left)
+        for row in sorted(rows, key=lambda row: -row["jnd"])
+    ]
+    yield f"Frames at {fps:g} fps; “in file”: the frame of the motion's own file, at the file's rate."
+    yield from columns([HEADINGS, *cells], left=(0, 1, 2))
     yield "JND: just noticeable differences of the blend length from the default; from 1 on, people see it."
+    if cells:
+        yield f"A row as a transition: segue transition {_arguments(cells[0], fps, library)} --out X.mp4"
+
+
+def _arguments(row: Sequence[str], fps: float, library: str | None) -> str:
+    """What `segue transition` takes to make a row of the table."""
+    from shlex import join
+
+    given = [row[0], row[1], *(("--library", library) if library else ()), "--fps", f"{fps:g}"]
+    return join([*given, "--start", row[3], "--end", row[6], "--method", row[2]])

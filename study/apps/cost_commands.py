@@ -10,6 +10,8 @@ import click
 
 from study.apps.clips import clip_pair
 from study.apps.console import emit, json_option, library_option
+from study.apps.moments import in_words, moment
+from study.counting import counted
 
 if TYPE_CHECKING:
     from study.transitions.cost_matrix import Block, Extremes
@@ -64,7 +66,9 @@ def cost_matrix(
         shape = (first.frames - window + 1, second.frames - window + 1)
         if min(shape) < 1:
             most = min(first.frames, second.frames)
-            raise click.UsageError(f"expected --window of 1 to {most} frames, which both clips have, found {window}.")
+            raise click.UsageError(
+                f"expected --window of 1 to {counted(most, 'frame')}, which both clips have, found {window}."
+            )
     if out is None:
         found = extremes(blocks)
     elif out.suffix.lower() == ".npy":
@@ -74,10 +78,12 @@ def cost_matrix(
     keys: dict[str, object] = {"metric": metric, "fps": fps}
     keys |= {"weights": weights, "nu": nu, "root": root} if metric == "joint" else {"window": window}
     result = {"min": found.min, "argmin": found.argmin, "max": found.max, "shape": found.shape, **keys}
+    result |= {**moment(first, found.argmin[0], "source"), **moment(second, found.argmin[1], "destination")}
     result["file"] = None if out is None else str(out)
+    least = f"{in_words(first, found.argmin[0], source)} to {in_words(second, found.argmin[1], destination)}"
     text = (
-        f"{found.shape[0]} x {found.shape[1]} costs from {found.min:.5g} to {found.max:.5g}; least from frame "
-        f"{found.argmin[0]} of {source} to frame {found.argmin[1]} of {destination}"
+        f"{found.shape[0]} x {found.shape[1]} costs at {fps:g} fps, from {found.min:.5g} to {found.max:.5g}; "
+        f"least from {least}"
     )
     emit(result, as_json, text if out is None else f"{out}: {text}")
 

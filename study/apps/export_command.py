@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from study.apps.console import database_option, emit, json_option
+from study.counting import counted
 
 
 @click.command()
@@ -40,4 +41,4 @@ def export(results: Path, kind: str, out: Path | None, database: str | None, as_
             return
         place = export_folder(load_protocol(results / PROTOCOL), responses, kind, out or results / kind)
     files = sum(1 for path in place.rglob("*") if path.is_file())
-    emit({"folder": str(place), "files": files}, as_json, f"{place}: {files} files")
+    emit({"folder": str(place), "files": files}, as_json, f"{place}: {counted(files, 'file')}")

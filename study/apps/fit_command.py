@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.console import emit, json_option
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
         said += anova_sentences(questions, alpha)
     for row in (row for rows in result["ratings"].values() for row in rows):
         said.append(f"{': '.join(filter(None, (row['item'], row['method'])))}: mean {row['mean']:.2f} over "
-                    f"{row['participants']} participants")  # fmt: skip
+                    f"{counted(row['participants'], 'participant')}")  # fmt: skip
     return {**result, "answer": "\n".join(said)}
 
 
@@ -162,8 +163,8 @@ def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
     counts = {"rows": read.rows, "used": read.used, "blank": read.blank, "missed": read.missed}
     people = read.table["participant"].nunique()
     text = (
-        f"{data}: {read.used} of {read.rows} rows used ({read.blank} without a stimulus, {read.missed} without an "
-        f"answer), {people} participant{'' if people == 1 else 's'}\n{found['answer']}"
+        f"{data}: {read.used} of {counted(read.rows, 'row')} used ({read.blank} without a stimulus, "
+        f"{read.missed} without an answer), {counted(people, 'participant')}\n{found['answer']}"
     )
     emit({"file": data.name, "task": task, **found, **counts}, as_json, text)
 

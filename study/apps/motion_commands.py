@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from study.apps.console import emit, json_option, library_option, say
+from study.counting import counted
 
 EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -72,7 +73,8 @@ def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_jso
         ],
     }
     lines = [
-        f"{file.name}: {clip.frames} frames at {clip.fps:g} fps, {clip.seconds:.2f} s, {clip.skeleton.joints} joints",
+        f"{file.name}: {counted(clip.frames, 'frame')} at {clip.fps:g} fps, {clip.seconds:.2f} s, "
+        f"{counted(clip.skeleton.joints, 'joint')}",
         *clip.history,
         "roles: " + ", ".join(f"{role} {name}" for role, name in roles.items()),
         *(f"defect: {defect.message}" for defect in defects),
@@ -144,4 +146,4 @@ def preview(
         track_seconds=1.0 if track else None,
     )
     result = {"file": str(out), "frames": shown.frames, "fps": shown.fps, "history": list(shown.history)}
-    emit(result, as_json, f"{out}: {shown.name or clip}, {shown.frames} frames at {shown.fps:g} fps")
+    emit(result, as_json, f"{out}: {shown.name or clip}, {counted(shown.frames, 'frame')} at {shown.fps:g} fps")

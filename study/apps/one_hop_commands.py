@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.console import emit, json_option, library_option, progress, say
+from study.counting import counted
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -108,8 +109,9 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as
         "mean_direct_cost": float(table.direct_costs[both].mean()) if both.any() else None,
     }
     text = (
-        f"{', '.join(map(str, files))}: {result['transitions']} transitions, {result['found']} of {result['entries']} "
-        f"triggered frames, {result['bytes']} bytes, weight {table.weight:.4g} a frame"
+        f"{', '.join(map(str, files))}: {counted(len(table.rows), 'transition')}, {result['found']} of "
+        f"{counted(len(table.entries), 'triggered frame')}, {counted(table.entries.nbytes, 'byte')}, weight "
+        f"{table.weight:.4g} a frame"
     )
     if both.any():
         text += f"; mean cost {result['mean_cost']:.4g}, direct {result['mean_direct_cost']:.4g}"
@@ -223,7 +225,8 @@ def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -
     held = read_table(table)
     entries = []
     lines = [
-        f"{table}: {len(held.entries)} entries of {', '.join(held.columns)}; {len(held.clips)} clips at "
+        f"{table}: {counted(len(held.entries), 'entry', 'entries')} of {', '.join(held.columns)}; "
+        f"{counted(len(held.clips), 'clip')} at "
         f"{held.fps:g} fps, blends of {held.blend_frames or 'their own'} frames, weight {held.weight:.4g}",
         *(
             f"{held.clips[row.source]} to {held.clips[row.destination]}: frames {row.first_trigger} to "
@@ -304,4 +307,4 @@ def play(
         f"{part['start']:6} {part['kind']:6} {part['clip']} from its frame {part['clip_start']}" for part in segments
     ]
     result = {"file": str(out), "frames": played.clip.frames, "method": method, "segments": segments}
-    emit(result, as_json, "\n".join([f"{out}: {played.clip.frames} frames", *lines]))
+    emit(result, as_json, "\n".join([f"{out}: {counted(played.clip.frames, 'frame')}", *lines]))

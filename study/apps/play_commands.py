@@ -13,6 +13,7 @@ import click
 
 from study.apps.console import database_option, emit, json_option, library_option, say
 from study.apps.study_commands import OUT, check_database, load_for_people, prepare_stimuli, results_folder
+from study.counting import counted
 
 if TYPE_CHECKING:
     from renderer.window import Window
@@ -76,7 +77,11 @@ def play(
         outcome, window = _sit(responses, loaded, stimuli, plan, place)
     where = {"folder": str(folder), "database": responses.place}
     result = {**asdict(outcome), "participant": participant, **where, "window": window}
-    emit(result, as_json, f"{participant}: {outcome.end}; {outcome.answers} answers stored now, in {responses.place}")
+    emit(
+        result,
+        as_json,
+        f"{participant}: {outcome.end}; {counted(outcome.answers, 'answer')} stored now, in {responses.place}",
+    )
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -128,9 +133,11 @@ def _sit(
     if finished:
         say(f"{plan.participant} has finished before; there is nothing left to do.")
         return Outcome("finished", 0, 0, 0), {}
-    session = open_session(protocol, plan, answers, passed=passed)
+    session = open_session(
+        protocol, plan, answers, passed=passed, frames={record.id: record.frames for record in stimuli.records}
+    )
     if answers:
-        say(f"{plan.participant} goes on after {len(answers)} answers.")
+        say(f"{plan.participant} goes on after {counted(len(answers), 'answer')}.")
     look, size = page_look(stimuli, session, place.font), place.window_size
     take_precedence()
     with open_window(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.console import emit, json_option, library_option, progress
+from study.counting import counted, noun
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -249,8 +250,8 @@ def _in_words(found: Power, aim: str, answers: int) -> str:
         low, high = point.interval.low or 0.0, point.interval.high or 0.0
         bar = "#" * round(30 * point.power)
         lines.append(f"{point.participants:12}  {point.power:5.2f}  {low:.2f} to {high:.2f}   {bar}")
-    who = f"{found.needed} participants" if found.needed else "no number tried"
-    asked = "answer" if answers == 1 else "answers"
+    who = counted(found.needed, "participant") if found.needed else "no number tried"
+    asked = noun(answers, "answer")
     lines.append(
         f"To {aim} in {100 * found.target:g}% of studies, {answers} {asked} each: {who}"
         + (f" ({found.note})." if found.note else ".")

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.console import database_option, emit, json_option, library_option, progress, say
+from study.apps.shown import table_of
+from study.counting import counted
 
 if TYPE_CHECKING:
     from study.experiment.protocol import Protocol
@@ -155,30 +157,34 @@ def headlines(analysis: dict[str, Any]) -> list[str]:
 @click.option("--texts", is_flag=True, help="Print all that participants read, too.")
 @json_option
 def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> None:
-    """Everything that would go wrong later, now, and what has still to be written.
+    """Check a protocol before running it: what will be shown, every error, and any text that is still to be written.
 
     Exit status 2 where something can't be shown.
     """
+    from study.experiment.outlook import look_ahead
     from study.experiment.proofreading import to_do
-    from study.experiment.stimuli import check as problems_of
-    from study.experiment.wording import all_texts, duration_s, minutes
+    from study.experiment.wording import all_texts
     from study.motion.library import open_library
 
     checked, opened = load(protocol), open_library(library or "synthetic")
-    problems = problems_of(checked, opened)
-    read = [asdict(one) for one in all_texts(checked)] if texts else []
-    usual, longest = (minutes(duration_s(checked, at_most=most)) for most in (False, True))
-    notes = to_do(checked)
+    found, notes = look_ahead(checked, opened), to_do(checked)
+    read = [asdict(one) for one in all_texts(checked, found.film_times)] if texts else []
     lines = [f"{one['where']}\n    {one['text']}\n" for one in read]
-    lines += problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]
+    lines += table_of(checked, found)
+    lines += found.problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]
     lines.append(
-        f"A sitting takes about {usual} minutes, {longest} where every answer and every film takes its longest."
+        f"A participant sees {counted(found.trials, 'trial')} made of {counted(found.films, 'film')} and takes about "
+        f"{counted(found.minutes, 'minute')}, {found.minutes_at_most} where every answer and every film takes its "
+        "longest; practice, breaks and reading are included."
     )
+    lines += [f"Note: {note}" for note in found.notes]
     lines += [f"To do: {note}" for note in notes]
-    result: dict[str, Any] = {"protocol": checked.name, "library": opened.name, "problems": problems, "notes": notes}
-    result |= {"minutes": usual, "minutes_at_most": longest} | ({"texts": read} if texts else {})
+    result: dict[str, Any] = {"protocol": checked.name, "library": opened.name, "problems": found.problems}
+    result |= {"notes": [*found.notes, *notes], "minutes": found.minutes, "minutes_at_most": found.minutes_at_most}
+    result |= {"trials": found.trials, "films": found.films, "fps": checked.fps}
+    result |= {"shown": [asdict(row) for row in found.rows]} | ({"texts": read} if texts else {})
     emit(result, as_json, "\n".join(lines))
-    if problems:
+    if found.problems:
         raise click.exceptions.Exit(2)
 
 
@@ -202,8 +208,8 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
         else render_stimuli(prepare_stimuli(checked, library), folder, workers)
     )
     text = (
-        f"{summary['folder']}: {summary['videos']} videos, {summary['frames']} frames, {summary['seconds']:.0f} s of "
-        f"motion; {summary['rendered']} rendered now, {summary['reused']} reused"
+        f"{summary['folder']}: {counted(summary['videos'], 'video')}, {counted(summary['frames'], 'frame')}, "
+        f"{summary['seconds']:.0f} s of motion; {summary['rendered']} rendered now, {summary['reused']} reused"
     )
     emit(summary, as_json, text)
 
@@ -245,8 +251,8 @@ def simulate(
         record(stimuli, folder)
     summary = simulate_participants(checked, folder, participants, seed, database, **goes_wrong)
     text = (
-        f"{summary['folder']}: {summary['participants']} simulated participants, "
-        f"{summary['answers']} answers made now, {summary['found']} found"
+        f"{summary['folder']}: {counted(summary['participants'], 'simulated participant')}, "
+        f"{counted(summary['answers'], 'answer')} made now, {summary['found']} found"
     )
     emit(summary, as_json, text)
 
@@ -290,8 +296,9 @@ def demo(out: Path | None, workers: int | None, participants: int, as_json: bool
     analysis = analyse_results(folder)
     page = write_report(folder)
     lines = [
-        f"{rendered['videos']} stimulus videos ({rendered['frames']} frames) in {folder / 'stimuli'}",
-        f"{simulated['answers'] + simulated['found']} answers of {participants} simulated participants "
+        f"{counted(rendered['videos'], 'stimulus video')} ({counted(rendered['frames'], 'frame')}) in "
+        f"{folder / 'stimuli'}",
+        f"{simulated['answers'] + simulated['found']} answers of {counted(participants, 'simulated participant')} "
         f"in {folder / 'responses.sqlite'}",
         *headlines(analysis),
         f"The report: {page.resolve()}",

@@ -10,6 +10,8 @@ import click
 
 from study.apps.clips import clip_pair
 from study.apps.console import emit, json_option, library_option
+from study.apps.moments import in_words, moment
+from study.counting import counted
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -55,7 +57,7 @@ def specification_option(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command("blend-length")
 @clip_options
 @click.option("--method", type=click.Choice(METHODS), default="geodesic", show_default=True)
-@click.option("--fixed-frames", type=click.IntRange(min=1), default=10, show_default=True, help="For --method fixed.")
+@click.option("--fixed-frames", type=click.IntRange(min=1), help="For --method fixed; 0.33 s unless given.")
 @weights_option
 @specification_option
 @click.option("--printed-sum", is_flag=True, help="With timewarp: the undivided sum that Eqs. 5 and 6 print.")
@@ -73,7 +75,7 @@ def blend_length(
     end: int,
     fps: float,
     method: str,
-    fixed_frames: int,
+    fixed_frames: int | None,
     weights: str,
     specification: str,
     printed_sum: bool,
@@ -99,7 +101,7 @@ def blend_length(
         windows = (warped.source_frames, warped.destination_frames)
         result: dict[str, Any] = {"costs": warped.costs, "shortest": warped.shortest}
         if out is not None:
-            show_warped(warped, out, words)
+            show_warped(warped, fps, out, words)
     else:
         chosen = choose(
             first,
@@ -118,10 +120,13 @@ def blend_length(
     differences = major_joint_differences(first, second, start, end)
     keys = {"blend_frames": found.blend_frames, "blend_s": found.blend_s, "cost": found.cost, "note": found.note}
     keys |= {"source_frames": windows[0], "destination_frames": windows[1], "method": method, "fps": fps}
-    text = f"{found.blend_frames} frames ({found.blend_s:.3f} s at {fps:g} fps), cost {found.cost:.5g}"
+    keys |= {**moment(first, start, "start"), **moment(second, end, "end")}
+    text = f"{counted(found.blend_frames, 'frame')} ({found.blend_s:.3f} s at {fps:g} fps), cost {found.cost:.5g}"
     if windows[0] != windows[1]:
         text += f", {windows[0]} of SRC over {windows[1]} of DST"
-    lines = [f"{text}; {found.note}" if found.note else text, "", "differences between the two frames, half angles:"]
+    where = f"from {in_words(first, start, source)} to {in_words(second, end, destination)}"
+    lines = [f"{text}; {found.note}" if found.note else text, where]
+    lines += ["", "differences between the two frames, half angles:"]
     lines += [f"  {role:12} {value:.4f}" for role, value in differences.items()]
     result |= {**keys, "differences": differences, "file": None if out is None else str(out)}
     emit(result, as_json, "\n".join(lines))
@@ -170,7 +175,7 @@ def transition(
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
     first, second = clip_pair(source, destination, library, fps)
-    joined = join(first, second, (start, end), method, frames, weight, specification, joint_frames(joints))
+    joined, found = join(first, second, (start, end), method, frames, weight, specification, joint_frames(joints))
     slide = {}
     if not keep_slide:
         joined, planted = plant_feet(joined, first, second)
@@ -185,10 +190,23 @@ def transition(
         "blend_frames": joined.blend_frames,
         "blend_start": joined.blend_start,
         "blend_stop": joined.blend_stop,
-        "note": joined.note,
+        "blend_s": joined.blend_frames / fps,
+        "seconds": joined.clip.seconds,
+        "fps": fps,
+        **moment(first, start, "start"),
+        **moment(second, end, "end"),
+        "method": method,
+        "cost": None if found is None else found.cost,
+        "unclipped_s": getattr(found, "unclipped_s", None),
+        "note": "; ".join(filter(None, (joined.note, "" if found is None else found.note))),
         **slide,
     }
-    emit(result, as_json, f"{out}: {joined.clip.frames} frames; {joined.note}")
+    text = (
+        f"{out}: {counted(joined.clip.frames, 'frame')} ({joined.clip.seconds:.3f} s at {fps:g} fps), "
+        f"{joined.blend_frames} of them blended ({joined.blend_frames / fps:.3f} s), "
+        f"from {in_words(first, start, source)} to {in_words(second, end, destination)}; {result['note']}"
+    )
+    emit(result, as_json, text)
 
 
 def join(
@@ -200,8 +218,11 @@ def join(
     weight: str,
     specification: str = "start-end",
     shorter: dict[str, int] | None = None,
-) -> Transition:
-    """The transition of so many frames, or as long as a method says; `shorter` has blends of joints' own, by role."""
+) -> tuple[Transition, BlendLength | WarpLength | None]:
+    """The transition of so many frames, or as long as a method says, and what the method found.
+
+    `shorter` has blends of joints' own, by role.
+    """
     from study.transitions.blend_length import blend_length as choose
     from study.transitions.blending import blend
     from study.transitions.timewarp import warp_length, warped_blend
@@ -212,12 +233,13 @@ def join(
             raise click.UsageError("expected no --joint with timewarp: its joints share one warp.")
         warped = warp_length(source, destination, *points)
         windows = (warped.source_frames, warped.destination_frames)
-        return warped_blend(source, destination, *points, *windows, weight=weight)
-    length = frames
-    if length is None:
+        return warped_blend(source, destination, *points, *windows, weight=weight), warped
+    chosen = None
+    if frames is None:
         chosen = choose(source, destination, *points, method=method or "geodesic", specification=specification)
-        length = chosen.blend_frames
-    return blend(source, destination, *points, length, weight=weight, specification=specification, joint_frames=shorter)
+        frames = chosen.blend_frames
+    made = blend(source, destination, *points, frames, weight=weight, specification=specification, joint_frames=shorter)
+    return made, chosen
 
 
 def joint_frames(given: Sequence[str]) -> dict[str, int]:
@@ -262,7 +284,6 @@ def show_lengths(
         longest=longest,
         weights=weights,
         specification=specification,
-        restrict=True,
     )
     if curve.lengths is None or curve.costs is None:
         raise AssertionError("the geodesic method gives the cost of every length")
@@ -293,14 +314,16 @@ def show_lengths(
     )
 
 
-def show_warped(found: WarpLength, out: Path, words: str) -> None:
+def show_warped(found: WarpLength, fps: float, out: Path, words: str) -> None:
     """The cost of each pair of lengths (2004 Eqs. 5, 6), as a picture or as CSV."""
     import numpy as np
 
     lengths = np.arange(found.shortest, found.shortest + len(found.costs))
     if out.suffix.lower() == ".csv":
         source, destination = np.meshgrid(lengths, lengths, indexing="ij")
-        columns = {"source_frames": source, "destination_frames": destination, "cost": found.costs}
+        frames = {"source_frames": source, "destination_frames": destination}
+        seconds = {"source_s": source / fps, "destination_s": destination / fps}
+        columns = {**frames, **seconds, "cost": found.costs}
         _write_csv(out, {name: column.ravel() for name, column in columns.items()})
         return
     from study.report.transition_figures import cost_picture

@@ -9,6 +9,7 @@ import click
 
 from study.apps.clips import clip_pair, load_clip
 from study.apps.console import emit, json_option, library_option, progress, say
+from study.counting import counted, noun
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -94,7 +95,7 @@ def label(
             asked[said] += 1
     text = f"{out}: {asked['good']} good, {asked['bad']} bad, {asked['skip']} skipped"
     if left:
-        text += f"; {left} are left: the same command goes on from there"
+        text += f"; {left} {noun(left, 'is', 'are')} left: the same command goes on from there"
     emit({"file": str(out), **asked, "left": left, "known": len(known)}, as_json, text)
 
 
@@ -196,7 +197,7 @@ def fit_weights(
             result["transfer"] = {"same": checked.transfer_same, "of": len(cuts), "deviations": checked.transfer}
             lines.append(
                 f"from {transfer[0]} to {transfer[1]} it stays where it is in {checked.transfer_same} of {len(cuts)} "
-                f"cases, and moves by {max(checked.transfer)} frames at most"
+                f"cases, and moves by {counted(max(checked.transfer), 'frame')} at most"
             )
     emit(result, as_json, "\n".join(lines))
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import study
+from study.counting import counted
 from study.errors import SessionError
 from study.experiment.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, Variable
 
@@ -59,11 +60,12 @@ class Shared:
     @property
     def words(self) -> str:
         """A paragraph on the data set."""
-        counted = f"{len(self.answers)} answers of {len(self.participants)} participants"
+        size = f"{counted(len(self.answers), 'answer')} of {counted(len(self.participants), 'participant')}"
         source = f" After {self.protocol.source}." if self.protocol.source else ""
         whose = f" NOT PEOPLE'S ANSWERS ALONE: {self.whose}." if self.whose else ""
         return (
-            f"{self.protocol.title}: {counted} in {len(self.protocol.studies)} studies of motion transitions.{source}"
+            f"{self.protocol.title}: {size} in {counted(len(self.protocol.studies), 'study', 'studies')} of "
+            f"motion transitions.{source}"
             f"{whose} Collected under the protocol {self.protocol.name}, sha256 {self.protocol.sha256}. Exported by "
             f"{MADE_BY} {study.__version__}."
         )

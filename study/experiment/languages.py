@@ -42,9 +42,8 @@ def has_words(language: str) -> bool:
 def with_words(data: Mapping[str, Any]) -> dict[str, Any]:
     """A protocol's data with the words of its language where it has no own; what is malformed stays as it is."""
     language = data.get("language", FALLBACK)
-    if not isinstance(language, str):
-        return dict(data)
-    table, filled = words(language), dict(data)
+    # A language that is none is refused later; the rest shall not look wrong for it.
+    table, filled = words(language if isinstance(language, str) else FALLBACK), dict(data)
     for part in _PARTS:
         own = data.get(part, {})
         if part in table and isinstance(own, dict):

@@ -63,6 +63,11 @@ class Hop:
         return self.stay_source + (1 if self.direct else 2) * self.blend_frames + self.stay_hop
 
     @property
+    def at_once(self) -> bool:
+        """Whether it is the direct blend at the transition's own points, which needs no hop."""
+        return self.direct and self.stay_source == 0
+
+    @property
     def words(self) -> str:
         """For manifests."""
         return (
@@ -79,7 +84,7 @@ class Hops:
         self.protocol, self.library = protocol, library
         self._clips: dict[str, Clip] = {}
         self._weights: dict[tuple[tuple[str, ...], int, int], float] = {}
-        self._found: dict[tuple[str, str], Hop] = {}
+        self._found: dict[tuple[str, str, int, int], Hop] = {}
 
     def find(self, study: StudySpec, settled: Settled) -> Hop:
         """The optimal hop for one transition of a study.
@@ -87,18 +92,18 @@ class Hops:
         Raises
         ------
         StimulusError
-            Where no transition fits, or motions are missing.
+            Where no transition fits, or the library lacks a hop, or has it on another rig.
         """
-        key = (study.name, settled.transition.name)
+        key = (study.name, settled.transition.name, settled.start_frame, settled.end_frame)
         if key not in self._found:
+            self._check(study, settled)
             try:
                 self._found[key] = self._search(study, settled)
             except (TransitionError, MotionError) as error:
                 raise StimulusError(f"transition {settled.transition.name!r}, one-hop: {error}") from error
         return self._found[key]
 
-    def check(self, study: StudySpec, settled: Settled) -> None:
-        """`StimulusError` where the library lacks a hop, or has it on another rig."""
+    def _check(self, study: StudySpec, settled: Settled) -> None:
         for name in self._names(study):
             try:
                 self._clip(name, settled.source.clip)
@@ -126,7 +131,7 @@ class Hops:
         )
 
         source, distance = settled.source.clip, PointCloudDistance()
-        blend_frames, stay = study.fixed_frames, round(study.one_hop.stay_s * self.protocol.fps)
+        blend_frames, stay = self.protocol.fixed_frames_of(study), round(study.one_hop.stay_s * self.protocol.fps)
         settings = Settings(blend_frames, stay, stay)
         names = self._names(study)
         motions = tuple(self._clip(name, source) for name in names)

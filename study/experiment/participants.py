@@ -226,7 +226,11 @@ def _filled(connection: sa.Connection, places: Places, now: datetime) -> list[in
 def overview(responses: Responses) -> list[dict[str, Any]]:
     """One mapping a session in the browser, newest first: who is where; for the researcher's eyes."""
     count = (
-        sa.select(sa.func.count()).where(answers.c.session_id == sessions.c.id).correlate(sessions).scalar_subquery()
+        sa.select(sa.func.count())
+        # A trial that is shown again asks the same questions, which are counted once.
+        .where((answers.c.session_id == sessions.c.id) & (answers.c.attempt == 1))
+        .correlate(sessions)
+        .scalar_subquery()
     )
     query = (
         sa.select(

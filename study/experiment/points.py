@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from study.counting import counted, noun
 from study.errors import MotionError, StimulusError, TransitionError
 from study.experiment.plan import generator
 from study.experiment.protocol import OPTIMUM_CUTS, Points, Protocol, StudySpec, TransitionSpec
@@ -31,6 +32,13 @@ CANDIDATES = 2000
 
 WARPS = 150
 """So many of them at most with all of their time-warped blends, which take a hundred times longer to cost."""
+
+HOPS = 20
+"""So many with a search for the hop, each."""
+
+ONE_FILM = "with one film for both methods"
+
+_FOLLOWING = ("geodesic", "velocity", "timewarp")
 
 LONGEST_BLEND_S = 2.0
 FREEDOM_S = 1.0
@@ -100,8 +108,16 @@ class Settled:
         return replace(self, start_frame=start, end_frame=end)
 
 
-def settle(protocol: Protocol, study: StudySpec, transition: TransitionSpec, library: Library) -> Settled:
+Alike = Callable[[StudySpec, "Settled"], bool]
+"""Whether the two methods of a study would show one film at some points; see `films.alike`."""
+
+
+def settle(
+    protocol: Protocol, study: StudySpec, transition: TransitionSpec, library: Library, alike: Alike | None = None
+) -> Settled:
     """Find the points of one transition of a study.
+
+    With `alike`, points at which both methods would show one film are drawn again, and given ones are refused.
 
     Raises
     ------
@@ -120,9 +136,16 @@ def settle(protocol: Protocol, study: StudySpec, transition: TransitionSpec, lib
         )
     if study.reference in OPTIMUM_CUTS:
         return _at_optima(study, transition, source, destination)
-    if points.choose == "given":
-        return _given(protocol, study, transition, points, source, destination)
-    return _drawn(protocol, study, transition, points, source, destination)
+    if points.choose == "random":
+        return _drawn(protocol, study, transition, points, source, destination, alike)
+    settled = _given(protocol, study, transition, points, source, destination)
+    if alike is not None and alike(study, settled):
+        raise StimulusError(
+            f"transition {transition.name!r}: expected two films by the methods {study.reference!r} and "
+            f"{study.comparison!r} of the study {study.name!r}, found one at these points, where both make the same "
+            "blend; give other points, or change a method or fixed_frames."
+        )
+    return settled
 
 
 def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs, Needs]:
@@ -131,8 +154,9 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
     after_exit = round(protocol.stimuli.exit_s * protocol.fps)
     search = round(LONGEST_BLEND_S * protocol.fps)
     longest = min(points.longest_frames or search, search) + max((0, *study.differences_frames))
+    fixed = protocol.fixed_frames_of(study)
     if "fixed" in study.methods:
-        longest = max(longest, study.fixed_frames + max((0, *study.differences_frames)))
+        longest = max(longest, fixed + max((0, *study.differences_frames)))
     if all(method.startswith("cut") for method in study.methods):
         longest = search = 1
     if "timewarp" in study.methods:
@@ -141,13 +165,20 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs,
     if "one-hop" in study.methods:
         # The source plays on for a stay, the destination for both stays and a second blend.
         stay = round(study.one_hop.stay_s * protocol.fps)
-        longest = max(longest, study.fixed_frames) if len(study.methods) > 1 else study.fixed_frames
-        longest, after_exit = longest + stay, after_exit + 2 * stay + study.fixed_frames
+        longest = max(longest, fixed) if len(study.methods) > 1 else fixed
+        longest, after_exit = longest + stay, after_exit + 2 * stay + fixed
     room = max(longest, search)
-    blend, whole = f"blends of up to {longest} frames", study.reference in OPTIMUM_CUTS
+    blend, whole = f"blends of up to {counted(longest, 'frame')}", study.reference in OPTIMUM_CUTS
     return (
-        Needs(entry, room, entry, longest, f"{entry} frames of entry and {blend}", whole),
-        Needs(room - 1, after_exit + 1, longest - 1, after_exit + 1, f"{blend} and {after_exit} frames of exit", whole),
+        Needs(entry, room, entry, longest, f"{counted(entry, 'frame')} of entry and {blend}", whole),
+        Needs(
+            room - 1,
+            after_exit + 1,
+            longest - 1,
+            after_exit + 1,
+            f"{blend} and {counted(after_exit, 'frame')} of exit",
+            whole,
+        ),
     )
 
 
@@ -182,9 +213,9 @@ def _supply(
         return Supply(name, longer, first, first + clip.frames, window, library.where(entry), notes)
     missing = _missing(motion, needs.least_before, needs.least_after)
     raise StimulusError(
-        f"motion {name!r}: expected {needs.least_before + needs.least_after} frames at {protocol.fps:g} fps around a "
-        f"transition point ({needs.words}), found {clip.frames} in {library.name}: {missing} frames are missing. {why} "
-        "Or lower entry_s, exit_s or longest_frames."
+        f"motion {name!r}: expected {counted(needs.least_before + needs.least_after, 'frame')} at "
+        f"{protocol.fps:g} fps around a transition point ({needs.words}), found {clip.frames} in {library.name}: "
+        f"{counted(missing, 'frame is', 'frames are')} missing. {why} Or lower entry_s, exit_s or longest_frames."
     )
 
 
@@ -304,7 +335,7 @@ def lengths_at(
     found: dict[str, BlendLength | WarpLength] = {}
     for method in methods or study.methods:
         if method == "timewarp":
-            found[method] = warp_length(source, destination, start, end, restrict=True)
+            found[method] = warp_length(source, destination, start, end)
             continue
         if method == "cut":
             found[method] = BlendLength("cut", 0, 0.0, float("nan"))
@@ -315,9 +346,8 @@ def lengths_at(
             start,
             end,
             method="fixed" if method == "one-hop" else method,
-            fixed_frames=study.fixed_frames,
+            fixed_frames=protocol.fixed_frames_of(study),
             specification=protocol.stimuli.specification,
-            restrict=True,
         )
     return found
 
@@ -350,8 +380,8 @@ def _given(
     if study.differences_frames and shortest < 1:
         raise StimulusError(
             f"transition {transition.name!r}: a level below one frame: the {study.reference} blend here takes "
-            f"{lengths[study.reference].blend_frames} frames, the difference {min(study.differences_frames)} leaves "
-            f"{shortest}. Choose other points, or other differences_frames."
+            f"{counted(lengths[study.reference].blend_frames, 'frame')}, the difference "
+            f"{min(study.differences_frames)} leaves {shortest}. Choose other points, or other differences_frames."
         )
     settled = Settled(transition, source, destination, frames[0], frames[1], lengths, 1)
     if problem := _room_problem(protocol, study, settled):
@@ -371,7 +401,7 @@ def _room_problem(protocol: Protocol, study: StudySpec, settled: Settled) -> str
     longest = max(level_lengths(study, settled.lengths))
     if "one-hop" in study.methods:
         stay = round(study.one_hop.stay_s * protocol.fps)
-        longest, after = longest + stay, after + 2 * stay + study.fixed_frames
+        longest, after = longest + stay, after + 2 * stay + protocol.fixed_frames_of(study)
     rooms = (
         ("entry", entry, settled.start_frame, settled.source),
         ("the longest blend", longest, settled.source.clip.frames - settled.start_frame, settled.source),
@@ -379,7 +409,8 @@ def _room_problem(protocol: Protocol, study: StudySpec, settled: Settled) -> str
         ("exit", after, settled.destination.clip.frames - 1 - settled.end_frame, settled.destination),
     )
     return "; ".join(
-        f"expected {needed} frames for {what}, found {there} in {supply.name!r}: {needed - there} are missing"
+        f"expected {counted(needed, 'frame')} for {what}, found {there} in {supply.name!r}: {needed - there} "
+        f"{noun(needed - there, 'is', 'are')} missing"
         for what, needed, there, supply in rooms
         if there < needed
     )
@@ -392,6 +423,7 @@ def _drawn(
     points: Points,
     source: Supply,
     destination: Supply,
+    alike: Alike | None,
 ) -> Settled:
     """Pairs of frames at random, in the order drawn, until one meets the conditions."""
     starts, ends = np.arange(*source.window), np.arange(*destination.window)
@@ -400,38 +432,54 @@ def _drawn(
     rng = generator(protocol.seed, "points", transition.name)
     reasons: dict[str, int] = {}
     seen: list[int] = []
+    judged = judged_method(study)
     for tried, draw in enumerate(rng.choice(count, size=min(count, CANDIDATES), replace=False), start=1):
         start, end = int(starts[draw // len(ends)]), int(ends[draw % len(ends)])
         clips = source.clip, destination.clip
-        lengths = lengths_at(protocol, study, *clips, start, end, (study.reference,))
-        seen.append(lengths[study.reference].blend_frames)
-        reason = _unmet(study, points, lengths)
+        lengths = lengths_at(protocol, study, *clips, start, end, (judged,))
+        seen.append(lengths[judged].blend_frames)
+        reason = _unmet(study, points, lengths[judged])
         if not reason and study.comparison is not None:
-            lengths |= lengths_at(protocol, study, *clips, start, end, (study.comparison,))
+            lengths |= lengths_at(protocol, study, *clips, start, end, [m for m in study.methods if m != judged])
             reason = _unwarped(points, lengths)
         settled = Settled(transition, source, destination, start, end, lengths, tried)
         if not reason and _room_problem(protocol, study, settled):
             reason = "no room for the longest blend"
+        if not reason and alike is not None and alike(study, settled):
+            reason = ONE_FILM
         if not reason:
             return settled
         reasons[reason] = reasons.get(reason, 0) + 1
-        if reasons[reason] >= WARPS and reason.startswith("warped"):
+        if reasons[reason] >= _patience(study, reason):
             break
     raise StimulusError(_none_found(study, transition, reasons, seen))
 
 
-def _unmet(study: StudySpec, points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -> str:
+def judged_method(study: StudySpec) -> str:
+    """The method whose length the conditions are about: the first whose length follows from the points."""
+    return next((method for method in study.methods if method in _FOLLOWING), study.reference)
+
+
+def _patience(study: StudySpec, reason: str) -> int:
+    """How many draws may fail for a reason that takes long to see."""
+    if reason == ONE_FILM and "one-hop" in study.methods:
+        return HOPS
+    slow = reason.startswith("warped") or judged_method(study) == "timewarp"
+    return WARPS if slow else CANDIDATES
+
+
+def _unmet(study: StudySpec, points: Points, found: BlendLength | WarpLength) -> str:
     """The first condition that a drawn transition doesn't meet; empty where all are met."""
-    length = lengths[study.reference].blend_frames
-    if study.reference == "cut":
+    length = found.blend_frames
+    if length == 0:
         return ""
     least = max(points.shortest_frames or 1, 1 - min((0, *study.differences_frames)))
     if length < least:
-        return f"shorter than {least} frames"
+        return f"shorter than {counted(least, 'frame')}"
     if points.longest_frames is not None and length > points.longest_frames:
-        return f"longer than {points.longest_frames} frames"
+        return f"longer than {counted(points.longest_frames, 'frame')}"
     if points.avoid_frames is not None and abs(length - points.avoid_frames) <= (points.avoid_within_frames or 0):
-        return f"within {points.avoid_within_frames or 0} frames of {points.avoid_frames}"
+        return f"within {counted(points.avoid_within_frames or 0, 'frame')} of {points.avoid_frames}"
     return ""
 
 
@@ -440,14 +488,14 @@ def _unwarped(points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -
     least = points.least_warp_frames or 0
     for length in lengths.values():
         if isinstance(length, WarpLength) and abs(length.source_frames - length.destination_frames) < least:
-            return f"warped by less than {least} frames"
+            return f"warped by less than {counted(least, 'frame')}"
     return ""
 
 
 def _none_found(study: StudySpec, transition: TransitionSpec, reasons: Mapping[str, int], seen: Sequence[int]) -> str:
     counts = ", ".join(f"{number} {reason}" for reason, number in reasons.items())
     return (
-        f"transition {transition.name!r}: expected points whose {study.reference} blend meets the conditions "
+        f"transition {transition.name!r}: expected points whose {judged_method(study)} blend meets the conditions "
         f"of the study {study.name!r}, found none among {len(seen)} drawn ({counts}; lengths from {min(seen)} to "
-        f"{max(seen)} frames). Widen the conditions, or choose other motions."
+        f"{counted(max(seen), 'frame')}). Widen the conditions, or choose other motions."
     )

@@ -29,6 +29,17 @@ def to_do(protocol: Protocol) -> list[str]:
         notes.append('consent.text is empty: nobody is asked for consent; "{standard}" takes the built-in text.')
     elif "{standard}" in protocol.consent.text and not protocol.consent.contact:
         notes.append("consent.contact is empty: participants do not learn whom to ask; write who runs the study.")
+    notes += [
+        f'texts.{key} is empty: participants read none; "{{standard}}" takes the built-in text.'
+        for key in ("welcome", "debrief")
+        if not getattr(protocol.texts, key)
+    ]
+    notes += [
+        f"studies.{study.name}.instructions is empty: participants see films and are not told their task before; "
+        '"{standard}" takes the built-in text.'
+        for study in protocol.studies
+        if not study.instructions.strip()
+    ]
     if not has_words(protocol.language) and (left := still_english(protocol)):
         notes.append(f"language is {protocol.language!r}, but these texts are still in English: {', '.join(left)}.")
     for study in protocol.studies:

@@ -21,7 +21,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from study.errors import ProtocolError
 from study.experiment.languages import with_words
 from study.experiment.protocol_checks import check_whole
-from study.experiment.protocol_errors import explain, full_location, line_of
+from study.experiment.protocol_errors import explain, full_location, line_of, telling
 from study.experiment.protocol_parts import Consent, FormField, Keys, Part, Slug, Texts
 from study.experiment.protocol_stimuli import Points, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec
@@ -123,6 +123,12 @@ class Protocol(Part):
             return shown * len(study.methods) * study.repeats
         return shown * study.repeats * (2 if study.order == "both" else 1)
 
+    def fixed_frames_of(self, study: StudySpec) -> int:
+        """The blend length of the method `fixed` in a study: its own, or 0.33 s (2004)."""
+        from study.transitions.blend_length import FIXED_S, default_frames
+
+        return study.fixed_frames or default_frames(self.fps, FIXED_S)
+
     @property
     def scale_points(self) -> dict[str, int]:
         """Points of the scale of each rating study, by its name."""
@@ -185,7 +191,7 @@ def parse_protocol(text: str, path: Path | None = None) -> Protocol:
         protocol = Protocol.model_validate(with_words(data))
     except ValidationError as error:
         lines = []
-        for detail in error.errors():
+        for detail in telling(Protocol, error.errors()):
             location = full_location(detail)
             line = line_of(text, location)
             lines.append(f"{where}{f':{line}' if line else ''}: {explain(Protocol, detail)}")

@@ -11,6 +11,7 @@ from typing import Protocol as Shape
 
 from pydantic import ValidationError
 
+from study.counting import counted
 from study.experiment.protocol_errors import KeyMismatchError
 from study.experiment.protocol_stimuli import Points, Timing, TransitionSpec
 from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec, check_once
@@ -114,7 +115,7 @@ def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
         found = getattr(study, key)
         if found > trials:
             raise KeyMismatchError(
-                f"expected no more than the {trials} trials of {study.name!r}, found {found}; lower it",
+                f"expected no more than the {counted(trials, 'trial')} of {study.name!r}, found {found}; lower it",
                 "studies",
                 index,
                 key,

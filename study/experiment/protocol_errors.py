@@ -11,9 +11,14 @@ import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
-from typing import Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic import BaseModel
+
+from study.counting import counted
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 Location = Sequence[int | str]
 
@@ -30,6 +35,28 @@ def full_location(detail: Mapping[str, Any]) -> Location:
     """Where a finding is: pydantic's location, and within it the one that a `KeyMismatchError` names."""
     error = detail.get("ctx", {}).get("error")
     return (*detail["loc"], *(error.location if isinstance(error, KeyMismatchError) else ()))
+
+
+def telling(model: type[BaseModel], details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """The findings that are about the protocol itself, without those that only follow from another one.
+
+    A list whose only part has a mistake is not empty; a key that stands there misspelled is not missing.
+    """
+    faulty = [tuple(full_location(detail)) for detail in details]
+    meant = set()
+    for detail in details:
+        if detail["type"] == "extra_forbidden" and (near := _near_key(model, detail["loc"])):
+            meant.add((*detail["loc"][:-1], near))
+    return [
+        detail
+        for detail in details
+        if not (detail["type"] == "missing" and detail["loc"] in meant)
+        and not (detail["type"] == "too_short" and any(_within(other, detail["loc"]) for other in faulty))
+    ]
+
+
+def _within(location: Location, part: Location) -> bool:
+    return len(location) > len(part) and tuple(location[: len(part)]) == tuple(part)
 
 
 _EXPECTED = {
@@ -59,6 +86,8 @@ def explain(model: type[BaseModel], detail: Mapping[str, Any]) -> str:
     path = key_path(location) or "the protocol"
     if kind == "extra_forbidden":
         return _unknown_key(model, location)
+    if kind == "missing" and isinstance(location[-1], int):
+        return f"{key_path(location[:-1])}: expected more than {counted(location[-1], 'entry', 'entries')}; add one."
     if kind == "missing":
         return f"{path}: expected this key, found none; add it."
     if kind == "value_error":
@@ -68,11 +97,13 @@ def explain(model: type[BaseModel], detail: Mapping[str, Any]) -> str:
         bound, words = _BOUNDS[kind]
         return f"{path}: expected {words} {context[bound]:g}{unit}, found {found!r}; change it."
     if kind == "literal_error":
-        return f"{path}: expected {context['expected']}, found {found!r}{_nearest_choice(context['expected'], found)}."
+        return f"{path}: expected {context['expected']}, found {found!r}{_nearest_choice(context['expected'], found)}"
     if kind in ("string_pattern_mismatch", "string_too_short"):
         return f"{path}: expected {_text_rule(kind, context)}, found {found!r}; change it."
     if kind in ("too_short", "too_long"):
-        return f"{path}: {detail['msg'].split(' after')[0]}; found {found!r}."
+        bound, words = ("min_length", "at least") if kind == "too_short" else ("max_length", "at most")
+        entries = counted(context[bound], "entry", "entries")
+        return f"{path}: expected {words} {entries}, found {context['actual_length']}; change it."
     expected = _EXPECTED.get(kind, detail["msg"])
     return f"{path}: expected {expected}{unit}, found {_shown(found)}; change it."
 
@@ -89,17 +120,23 @@ def _shown(value: object) -> str:
     return f"{value!r} ({kinds.get(type(value), type(value).__name__)})"
 
 
+_PATTERNS = {
+    "#": "a colour such as #20305a",
+    "{2,3}": "a language such as en, de or pt-BR",
+    "[a-z0-9]$": "one small letter or digit",
+    "": "a name of small letters, digits, - and _",
+}
+
+
 def _text_rule(kind: str, context: Mapping[str, Any]) -> str:
     if kind == "string_too_short":
         return "some text"
-    if "#" in context["pattern"]:
-        return "a colour such as #20305a"
-    return "a name of small letters, digits, - and _"
+    return next(words for sign, words in _PATTERNS.items() if sign in context["pattern"])
 
 
 def _nearest_choice(expected: str, found: object) -> str:
     near = get_close_matches(str(found), re.findall(r"'([^']+)'", expected), n=1)
-    return f"; did you mean {near[0]!r}?" if near else "; choose one of these"
+    return f"; did you mean {near[0]!r}?" if near else "; choose one of these."
 
 
 def _unknown_key(model: type[BaseModel], location: Location) -> str:
@@ -107,14 +144,20 @@ def _unknown_key(model: type[BaseModel], location: Location) -> str:
     keys = list(parent.model_fields) if parent else []
     key = str(location[-1])
     elsewhere = [f"{p}.{key}" if p else key for p, part in parts(model) if key in part.model_fields]
-    near = get_close_matches(key, keys, n=1)
     if elsewhere:
         hint = f"it belongs at {elsewhere[0]}."
-    elif near:
-        hint = f"did you mean {near[0]!r}?"
+    elif near := _near_key(model, location):
+        hint = f"did you mean {near!r}?"
     else:
         hint = f"valid keys here: {', '.join(keys)}."
     return f"{key_path(location)}: unknown key; {hint}"
+
+
+def _near_key(model: type[BaseModel], location: Location) -> str:
+    """The valid key that an unknown one is nearest to; empty where none is near."""
+    parent = model_at(model, location[:-1])
+    near = get_close_matches(str(location[-1]), list(parent.model_fields) if parent else [], n=1)
+    return near[0] if near else ""
 
 
 def key_path(location: Location) -> str:

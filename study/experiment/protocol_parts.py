@@ -26,12 +26,12 @@ class Part(BaseModel):
 
 SLOTS = ("standard", "minutes", "trials", "studies", "answer_s", "contact")
 """What may stand in braces in the longer texts: the built-in text, minutes and trials of the sitting, its studies,
-seconds to answer, and the protocol's contact."""
+seconds to answer, and the protocol's contact. `{minutes:minute|minutes}` are the words that go with one or several."""
 
 
 def known_slots(text: str, *location: int | str) -> None:
     """Refuse words in braces that mean nothing, and say which do."""
-    strange = next((slot for slot in re.findall(r"\{(\w*)\}", text) if slot not in SLOTS), None)
+    strange = next((slot for slot in re.findall(r"\{(\w*)(?::[^{}|]*\|[^{}|]*)?\}", text) if slot not in SLOTS), None)
     if strange is not None:
         near = get_close_matches(strange, SLOTS, n=1)
         hint = f"did you mean {{{near[0]}}}?" if near else "leave the braces out"

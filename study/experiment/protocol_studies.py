@@ -77,11 +77,12 @@ class StudySpec(Part):
         default=(),
         description="Same-different: comparison minus reference blend length, a pair each; 0 shows one twice. [frames]",
     )
-    fixed_frames: int = Field(
-        default=10,
+    fixed_frames: int | None = Field(
+        default=None,
         ge=1,
         le=600,
-        description="Blend length of the method `fixed`, and of both blends of `one-hop`. [frames]",
+        description="Blend length of the method `fixed`, and of both blends of `one-hop`; 0.33 s where it is left out, "
+        "which are 10 frames at 30 fps. [frames]",
     )
     one_hop: OneHop = Field(default=OneHop(), description="How the method `one-hop` finds its hops.")
     order: Order = Field(
@@ -94,7 +95,8 @@ class StudySpec(Part):
         default="{standard}", description="What the participant is asked after each pair or stimulus."
     )
     instructions: str = Field(
-        default="", description="What the participant reads before the study; `{standard}` is the built-in text."
+        default="{standard}",
+        description="What the participant reads before the study; `{standard}` is the built-in text.",
     )
     example: bool = Field(default=True, description="Whether the instructions can show one stimulus as an example.")
     practice: int = Field(

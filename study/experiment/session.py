@@ -142,7 +142,12 @@ class Session:
 
 
 def open_session(
-    protocol: Protocol, plan: Plan, answers: Iterable[Answer] = (), *, passed: Collection[str] = ()
+    protocol: Protocol,
+    plan: Plan,
+    answers: Iterable[Answer] = (),
+    *,
+    passed: Collection[str] = (),
+    frames: Mapping[str, int] | None = None,
 ) -> Session:
     """A sitting at its start, or where its answers left it; a trial half answered is shown again from its start.
 
@@ -150,6 +155,8 @@ def open_session(
     ----------
     passed
         Which of `consent` and `form` are behind the participant.
+    frames
+        Frames of each stimulus, so that texts say how long the films really take; an estimate unless given.
     """
     if plan.protocol_sha256 != protocol.sha256:
         raise SessionError(
@@ -157,7 +164,8 @@ def open_session(
             f"{protocol.name!r} with {protocol.sha256[:12]}; use the protocol.toml of the results folder."
         )
     before = tuple(answers)
-    steps = _steps(protocol, plan, before, passed)
+    films = wording.NO_FILMS if frames is None else _film_times(protocol, plan, frames)
+    steps = _steps(protocol, plan, before, passed, films)
     badly_shown = frozenset((answer.trial, answer.attempt) for answer in before if not answer.shown_well)
     return Session(plan, protocol, steps, _trials_left(steps), badly_shown=badly_shown)
 
@@ -341,17 +349,30 @@ def answer_keys(protocol: Protocol, legal: Sequence[str]) -> dict[str, str]:
     return {value: key for value, key in keys.items() if len(key) == 1}
 
 
-def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Collection[str]) -> tuple[Step, ...]:
+def _film_times(protocol: Protocol, plan: Plan, frames: Mapping[str, int]) -> wording.Films:
+    shown: dict[str, dict[bool, list[int]]] = {}
+    for trial in plan.trials:
+        own = shown.setdefault(trial.study, {True: [], False: []})
+        own[trial.role == "practice"].append(sum(frames[name] for name in (trial.first, trial.second) if name))
+    return {
+        study: wording.FilmTimes(*(sum(own) / len(own) / protocol.fps if own else 0.0 for own in (of[False], of[True])))
+        for study, of in shown.items()
+    }
+
+
+def _steps(
+    protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Collection[str], films: wording.Films
+) -> tuple[Step, ...]:
     """All that is left to do, in order."""
     known = {trial.trial for trial in plan.trials}
     if strays := sorted({answer.trial for answer in answers} - known):
         raise SessionError(f"Expected answers to the plan's trials 1 to {len(plan.trials)}, found trials {strays}.")
     steps: list[Step] = []
-    if "consent" not in passed and (text := wording.consent_text(protocol)):
+    if "consent" not in passed and (text := wording.consent_text(protocol, films)):
         steps.append(Step("consent", text=text))
     if protocol.form and "form" not in passed:
         steps.append(Step("form", text=protocol.texts.form.strip()))
-    if not answers and (text := wording.welcome_text(protocol)):
+    if not answers and (text := wording.welcome_text(protocol, films)):
         steps.append(Step("instructions", text=text))
     earlier: dict[int, list[tuple[int, Answer]]] = {}
     for place, answer in enumerate(answers):
@@ -361,8 +382,8 @@ def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Co
         studies.setdefault(trial.study, []).append(trial)
     breaks = _breaks(protocol, plan)
     for trials in studies.values():
-        steps += _study_steps(protocol, trials, earlier, breaks)
-    if text := wording.debrief_text(protocol):
+        steps += _study_steps(protocol, trials, earlier, breaks, films)
+    if text := wording.debrief_text(protocol, films):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
 
@@ -372,6 +393,7 @@ def _study_steps(
     trials: Sequence[Trial],
     earlier: Mapping[int, Sequence[tuple[int, Answer]]],
     breaks: Collection[int],
+    films: wording.Films,
 ) -> list[Step]:
     """What is left of a study: its instructions, trials with breaks, and those that come again, as they were queued.
 
@@ -399,7 +421,7 @@ def _study_steps(
         if trial.trial in breaks:
             steps.append(Step("break", study.name, protocol.texts.break_text.strip()))
     steps += [step for _, repeated in sorted(again, key=lambda one: one[0]) for step in repeated]
-    if steps and (text := wording.instructions_text(protocol, study)):
+    if steps and (text := wording.instructions_text(protocol, study, films)):
         steps.insert(0, Step("instructions", study.name, text, stimulus=trials[0].first if study.example else ""))
     return steps
 

@@ -12,28 +12,27 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import SegueError, StimulusError
+from study.errors import StimulusError
 from study.experiment.drawing import figure_for
-from study.experiment.one_hop_stimuli import METHOD as HOP_METHOD
-from study.experiment.one_hop_stimuli import Hop, Hops
+from study.experiment.films import Film, Planned, Showing, plan_all
+from study.experiment.one_hop_stimuli import Hops
 from study.experiment.plan import Pair
-from study.experiment.points import Settled, Supply, settle
+from study.experiment.points import Settled, Supply
 from study.experiment.protocol import Protocol, StudySpec
 from study.experiment.rendering import Manifest, RenderSummary, made_from, read_manifest, record, render
 from study.experiment.stimulus_set import MotionUse, Stimulus, StimulusRecord, StimulusSet
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
-from study.transitions.blend_length import BlendLength
 from study.transitions.blending import Transition, blend, cut, facing
 from study.transitions.footskate import plant_feet
-from study.transitions.timewarp import WarpLength, warped_blend
+from study.transitions.timewarp import warped_blend
 
 if TYPE_CHECKING:
     from renderer.camera import Camera
@@ -61,20 +60,6 @@ LOOK_VERSION = 1
 _TRAVELS_M = 0.5
 
 
-@dataclass(frozen=True)
-class _Key:
-    """What makes two stimuli of one transition the same: points, method's blend length, and nothing else."""
-
-    transition: str
-    start_frame: int
-    end_frame: int
-    blend_frames: int
-    added: tuple[int, int]
-    hop: Hop | None = None
-    frames_on: int = 0
-    windows: tuple[int, int] | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class _Draft:
     """A stimulus before it has a camera."""
@@ -87,16 +72,6 @@ class _Draft:
     blend: tuple[int, int]
     positions: FloatArray
     notes: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class _DraftPair:
-    study: StudySpec
-    settled: Settled
-    a: _Key
-    b: _Key | None
-    method_b: str
-    difference_frames: int | None
 
 
 def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None = None) -> StimulusSet:
@@ -115,14 +90,12 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
         With everything that can't be shown, one problem a line.
     """
     hops = Hops(protocol, library)
-    settled, problems = _settle_all(protocol, library, hops, progress)
+    planned, problems = plan_all(protocol, library, hops, progress)
     if problems:
         raise StimulusError("\n".join(problems))
-    drafts: dict[_Key, _Draft] = {}
-    pairs: list[_DraftPair] = []
-    for study in protocol.studies:
-        for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
-            pairs += _draft_pairs(protocol, study, settled[study.name, transition.name], drafts, hops)
+    drafts: dict[Film, _Draft] = {}
+    for each in planned:
+        _add_drafts(protocol, each, drafts, hops)
     stimuli = _with_cameras(protocol, library, drafts)
     return StimulusSet(
         protocol,
@@ -130,7 +103,7 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
         library.synthetic,
         library.acknowledgement,
         tuple({stimulus.id: stimulus for stimulus in stimuli.values()}.values()),
-        tuple(_pair(pair, stimuli) for pair in pairs),
+        tuple(_pair(each.study, showing, stimuli) for each in planned for showing in each.showings),
         versions(),
         made_from(protocol, library),
     )
@@ -138,7 +111,7 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
 
 def check(protocol: Protocol, library: Library) -> list[str]:
     """Everything that can't be shown, one sentence each; empty where all can."""
-    return _settle_all(protocol, library, Hops(protocol, library), None)[1]
+    return plan_all(protocol, library, Hops(protocol, library))[1]
 
 
 def versions() -> dict[str, str]:
@@ -156,61 +129,15 @@ def versions() -> dict[str, str]:
     }
 
 
-def _settle_all(
-    protocol: Protocol, library: Library, hops: Hops, progress: Callable[[int, int], None] | None
-) -> tuple[dict[tuple[str, str], Settled], list[str]]:
-    """The points of every transition in every study, and the problems of those that have none."""
-    todo = [
-        (study, transition)
-        for study in protocol.studies
-        for transition in (*protocol.transitions_of(study), *protocol.practice_of(study))
-    ]
-    settled: dict[tuple[str, str], Settled] = {}
-    problems: dict[str, None] = {}
-    for done, (study, transition) in enumerate(todo, start=1):
-        try:
-            points = settle(protocol, study, transition, library)
-            if HOP_METHOD in study.methods:
-                hops.check(study, points)
-            settled[study.name, transition.name] = points
-        except SegueError as error:
-            problems[str(error)] = None
-        if progress:
-            progress(done, len(todo))
-    return settled, list(problems)
-
-
-def _draft_pairs(
-    protocol: Protocol, study: StudySpec, settled: Settled, drafts: dict[_Key, _Draft], hops: Hops
-) -> Iterator[_DraftPair]:
-    """The pairs of one transition in one study; the stimuli that they need are added to `drafts`."""
-
-    def need(method: str, difference: int = 0) -> _Key:
-        own_points, length = settled.at(method), settled.lengths[method]
-        frames = length.blend_frames + difference
-        added = (settled.source.added_before, settled.destination.added_before)
-        hop = hops.find(study, settled) if HOP_METHOD in study.methods else None
-        # What stands beside a one-hop transition is shown for as long as that one takes.
-        on = 0 if hop is None or method == HOP_METHOD else max(hop.frames - frames, 0)
-        own = hop if method == HOP_METHOD else None
-        windows = _warped(length)
-        points = own_points.start_frame, own_points.end_frame
-        key = _Key(settled.transition.name, *points, frames, added, own, on, windows)
-        if key not in drafts:
-            made = None if own is None else hops.transition(study, settled)
-            drafts[key] = _draft(protocol, own_points, method, difference, frames, made, on, windows)
-        return key
-
-    if study.task == "same-different":
-        for difference in study.levels_of(settled.transition.name):
-            reference = need(study.reference)
-            yield _DraftPair(study, settled, reference, need(study.reference, difference), study.reference, difference)
-    elif study.paired:
-        other = study.comparison or study.reference
-        yield _DraftPair(study, settled, need(study.reference), need(other), other, None)
-    else:
-        for method in study.methods:
-            yield _DraftPair(study, settled, need(method), None, method, None)
+def _add_drafts(protocol: Protocol, planned: Planned, drafts: dict[Film, _Draft], hops: Hops) -> None:
+    """Make what is seen in one study of one transition, but for what was made before."""
+    study, settled = planned.study, planned.settled
+    for showing in planned.showings:
+        seen = ((showing.a, showing.method_a, 0), (showing.b, showing.method_b, showing.difference_frames or 0))
+        for film, method, difference in seen:
+            if film is not None and film not in drafts:
+                made = None if film.hop is None else hops.transition(study, settled)
+                drafts[film] = _draft(protocol, settled.at(method), method, difference, film, made)
 
 
 def _draft(
@@ -218,38 +145,29 @@ def _draft(
     settled: Settled,
     method: str,
     difference: int,
-    blend_frames: int,
+    film: Film,
     by_hop: Transition | None,
-    frames_on: int,
-    windows: tuple[int, int] | None,
 ) -> _Draft:
     """Blend, cut to entry and exit, clean the feet, and place at the origin with the common heading."""
-    made = by_hop or _transition(protocol, settled, blend_frames, windows)
-    if protocol.stimuli.clean_feet and blend_frames and by_hop is None:
+    made = by_hop or _transition(protocol, settled, film.blend_frames, film.windows)
+    if protocol.stimuli.clean_feet and film.blend_frames and by_hop is None:
         # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
         made, _ = plant_feet(made, settled.source.clip, settled.destination.clip)
     entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
     first = settled.start_frame - entry
-    clip = trim(made.clip, first, made.blend_stop + frames_on + after)
+    clip = trim(made.clip, first, made.blend_stop + film.frames_on + after)
     notes = [note for note in (made.note, settled.lengths[method].note) if note]
     positions = _placed(joint_positions(clip, ends=True), protocol, settled)
     return _Draft(
         settled,
         method,
         difference,
-        blend_frames,
+        film.blend_frames,
         clip,
         (made.blend_start - first, made.blend_stop - first),
         positions,
         tuple(notes),
     )
-
-
-def _warped(length: BlendLength | WarpLength) -> tuple[int, int] | None:
-    """The frames of source and destination in a time-warped blend; None where they are as many."""
-    if isinstance(length, WarpLength) and length.source_frames != length.destination_frames:
-        return length.source_frames, length.destination_frames
-    return None
 
 
 def _transition(
@@ -290,17 +208,17 @@ def _placed(positions: FloatArray, protocol: Protocol, settled: Settled) -> Floa
     return np.round(quat.rotate(quat.yaw(-heading), positions - floor), 4)
 
 
-def _with_cameras(protocol: Protocol, library: Library, drafts: dict[_Key, _Draft]) -> dict[_Key, Stimulus]:
+def _with_cameras(protocol: Protocol, library: Library, drafts: dict[Film, _Draft]) -> dict[Film, Stimulus]:
     """Figures, one camera a group, and names."""
     from renderer.camera import frame_group
     from renderer.errors import RendererError
     from renderer.viewpoint import best_view
 
     settings = protocol.stimuli
-    groups: dict[str, list[_Key]] = {}
+    groups: dict[str, list[Film]] = {}
     for key, draft in drafts.items():
         groups.setdefault(_group(protocol, draft), []).append(key)
-    stimuli: dict[_Key, Stimulus] = {}
+    stimuli: dict[Film, Stimulus] = {}
     try:
         for group, keys in groups.items():
             moving, size = [drafts[key].positions for key in keys], (settings.width, settings.height)
@@ -381,22 +299,29 @@ def _content_hash(fps: float, positions: FloatArray, figure: Figure, camera: Cam
     return digest.hexdigest()[:16]
 
 
-def _pair(draft: _DraftPair, stimuli: dict[_Key, Stimulus]) -> Pair:
-    study, transition = draft.study, draft.settled.transition
+def _pair(study: StudySpec, showing: Showing, stimuli: dict[Film, Stimulus]) -> Pair:
+    transition = showing.settled.transition
     name = f"{study.name}/{transition.name}"
+    a, b = stimuli[showing.a].id, "" if showing.b is None else stimuli[showing.b].id
+    if a == b and showing.method_a != showing.method_b:
+        raise StimulusError(
+            f"transition {transition.name!r}: expected two films by the methods {showing.method_a!r} and "
+            f"{showing.method_b!r} of the study {study.name!r}, found that they look the same; choose other motions, "
+            "other points, or another method."
+        )
     if study.task == "same-different":
-        name += f"/{draft.difference_frames:+d}"
+        name += f"/{showing.difference_frames:+d}"
     elif not study.paired:
-        name += f"/{draft.method_b}"
+        name += f"/{showing.method_a}"
     return Pair(
         name=name,
         study=study.name,
         task=study.task,
         motion=transition.name,
         category=transition.category,
-        a=stimuli[draft.a].id,
-        b="" if draft.b is None else stimuli[draft.b].id,
-        method_a=study.reference if study.paired else draft.method_b,
-        method_b=draft.method_b if study.paired else "",
-        difference_frames=draft.difference_frames,
+        a=a,
+        b=b,
+        method_a=showing.method_a,
+        method_b=showing.method_b if study.paired else "",
+        difference_frames=showing.difference_frames,
     )

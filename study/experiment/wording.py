@@ -18,7 +18,7 @@ from study.experiment.languages import words
 if TYPE_CHECKING:
     from study.experiment.protocol import Protocol, StudySpec
 
-_FILM_BESIDES_S = 1.0
+_BLEND_S = 1.0
 _ANSWER_S = 2.0
 _ITEM_S = 6.0
 _FIELD_S = 8.0
@@ -34,36 +34,46 @@ class Read:
     text: str
 
 
-def consent_text(protocol: Protocol) -> str:
+@dataclass(frozen=True)
+class FilmTimes:
+    """Seconds of film in a trial of a study, and in a practice trial, on average."""
+
+    trial_s: float
+    practice_s: float
+
+
+Films = Mapping[str, FilmTimes]
+"""What is known of the films, by study."""
+
+NO_FILMS: Films = {}
+
+
+def consent_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
     """What is agreed to; empty where nobody is asked."""
-    return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol))
+    return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol, films))
 
 
-def welcome_text(protocol: Protocol) -> str:
+def welcome_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
     """What is read first; empty for nothing."""
-    standard = _standard(protocol, _welcome(protocol))
-    if len(protocol.studies) > 1:
-        standard += "\n\n" + _standard(protocol, "parts")
-    return _filled(protocol.texts.welcome, standard, _slots(protocol))
+    return _filled(protocol.texts.welcome, _welcome_standard(protocol), _slots(protocol, films))
 
 
-def _welcome(protocol: Protocol) -> str:
-    """Name of the built-in welcome: by whether films are shown in pairs, one at a time, or both."""
+def _welcome_standard(protocol: Protocol) -> str:
+    """The built-in welcome: by whether films are shown in pairs, one at a time, or both."""
     kinds = {study.paired for study in protocol.studies}
-    return "welcome_films_and_pairs" if len(kinds) > 1 else "welcome_pairs" if kinds == {True} else "welcome_films"
+    name = "welcome_films_and_pairs" if len(kinds) > 1 else "welcome_pairs" if kinds == {True} else "welcome_films"
+    parts = ["parts"] if len(protocol.studies) > 1 else []
+    return "\n\n".join(_standard(protocol, each) for each in (name, *parts))
 
 
-def _task(study: StudySpec) -> str:
-    """Name of a study's built-in instructions."""
-    return "rating_pairs" if study.task == "rating" and study.paired else study.task
-
-
-def instructions_text(protocol: Protocol, study: StudySpec) -> str:
+def instructions_text(protocol: Protocol, study: StudySpec, films: Films = NO_FILMS) -> str:
     """What is read before a study; empty for nothing."""
-    standard = _standard(protocol, _task(study))
-    if study.practice:
-        standard += "\n\n" + _standard(protocol, "practice")
-    return _filled(study.instructions, standard, _slots(protocol))
+    return _filled(study.instructions, _instructions_standard(protocol, study), _slots(protocol, films))
+
+
+def _instructions_standard(protocol: Protocol, study: StudySpec) -> str:
+    task = "rating_pairs" if study.task == "rating" and study.paired else study.task
+    return "\n\n".join(_standard(protocol, each) for each in (task, *(["practice"] if study.practice else [])))
 
 
 def question_text(protocol: Protocol, study: StudySpec) -> str:
@@ -71,9 +81,9 @@ def question_text(protocol: Protocol, study: StudySpec) -> str:
     return _filled(study.question, _standard(protocol, f"question_{study.task}"), {})
 
 
-def debrief_text(protocol: Protocol) -> str:
+def debrief_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
     """What is read at the end; empty for nothing."""
-    return _filled(protocol.texts.debrief, _standard(protocol, "debrief"), _slots(protocol))
+    return _filled(protocol.texts.debrief, _standard(protocol, "debrief"), _slots(protocol, films))
 
 
 def _standard(protocol: Protocol, name: str) -> str:
@@ -84,13 +94,14 @@ def _filled(text: str, standard: str, slots: Mapping[str, str]) -> str:
     filled = text.strip().replace("{standard}", standard)
     for slot, value in slots.items():
         filled = filled.replace(f"{{{slot}}}", value.strip())
+        filled = re.sub(rf"\{{{slot}:(.*?)\|(.*?)\}}", r"\1" if value == "1" else r"\2", filled)
     # A slot that is empty leaves no hole.
     return re.sub(r"\n\s*\n(\s*\n)+", "\n\n", filled).strip()
 
 
-def _slots(protocol: Protocol) -> dict[str, str]:
+def _slots(protocol: Protocol, films: Films) -> dict[str, str]:
     return {
-        "minutes": str(minutes(duration_s(protocol))),
+        "minutes": str(minutes(duration_s(protocol, films=films))),
         "trials": str(sum(protocol.trials_of(study) for study in protocol.studies)),
         "studies": str(len(protocol.studies)),
         "answer_s": f"{protocol.timing.answer_s:g}",
@@ -98,44 +109,59 @@ def _slots(protocol: Protocol) -> dict[str, str]:
     }
 
 
-def duration_s(protocol: Protocol, *, at_most: bool = False) -> float:
-    """How long a sitting takes, in seconds: films, gaps, answers, pauses, breaks, the form and reading.
+def duration_s(protocol: Protocol, *, at_most: bool = False, films: Films = NO_FILMS) -> float:
+    """How long a sitting takes, in seconds: films, gaps, answers, pauses, breaks, practice, the form and reading.
 
     Parameters
     ----------
     at_most
         With every answer at the end of its window, and every trial shown again because its films stalled.
+    films
+        What is known of the films, by study. Where nothing is, they are taken to be a second longer than entry and
+        exit, and a film with a hop two blends and a stay longer.
 
     Notes
     -----
-    Reckoned with films a second longer than entry and exit, two seconds for an answer (six for an item of a rating)
-    and 15 letters read a second.
+    Two seconds for an answer (six for an item of a rating), and 15 letters read a second.
     """
     total, counted = 0.0, 0
     for study in protocol.studies:
         again = 1 + (protocol.timing.show_again if at_most else 0)
-        shown = again * (protocol.trials_of(study) + study.attention_checks) + study.practice
-        total += shown * _trial_s(protocol, study, at_most)
+        shown = again * (protocol.trials_of(study) + study.attention_checks)
+        known = films.get(study.name) or _estimated(protocol, study)
+        besides_s = _besides_s(protocol, study, at_most)
+        total += shown * (known.trial_s + besides_s) + study.practice * (known.practice_s + besides_s)
         counted += protocol.trials_of(study) + study.attention_checks
     if protocol.timing.break_after:
         total += _BREAK_S * ((counted - 1) // protocol.timing.break_after)
     return total + _FIELD_S * len(protocol.form) + _letters(protocol) / _LETTERS_A_SECOND
 
 
-def _trial_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
-    stimuli, timing = protocol.stimuli, protocol.timing
-    film_s = stimuli.entry_s + stimuli.exit_s + _FILM_BESIDES_S
-    shown_s = 2 * film_s + timing.gap_s if study.paired else film_s
+def _estimated(protocol: Protocol, study: StudySpec) -> FilmTimes:
+    stimuli = protocol.stimuli
+    hop_s = 2 * protocol.fixed_frames_of(study) / protocol.fps + study.one_hop.stay_s
+    film_s = stimuli.entry_s + stimuli.exit_s + (hop_s if "one-hop" in study.methods else _BLEND_S)
+    shown_s = (2 if study.paired else 1) * film_s
+    return FilmTimes(shown_s, shown_s)
+
+
+def _besides_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
+    """What a trial takes besides its films."""
+    timing = protocol.timing
     answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
-    return shown_s + (_ITEM_S * len(study.items) or answer_s) + timing.pause_s
+    gap_s = timing.gap_s if study.paired else 0.0
+    return gap_s + (_ITEM_S * len(study.items) or answer_s) + timing.pause_s
 
 
 def _letters(protocol: Protocol) -> int:
-    """How much there is to read before, between and after the trials."""
-    texts = [(protocol.consent.text, "consent"), (protocol.texts.welcome, _welcome(protocol))]
-    texts += [(study.instructions, _task(study)) for study in protocol.studies]
-    texts.append((protocol.texts.debrief, "debrief"))
-    return sum(len(text.strip().replace("{standard}", _standard(protocol, name))) for text, name in texts)
+    """How much there is to read before, between and after the trials, slots not filled in."""
+    texts = [
+        (protocol.consent.text, _standard(protocol, "consent")),
+        (protocol.texts.welcome, _welcome_standard(protocol)),
+        *((study.instructions, _instructions_standard(protocol, study)) for study in protocol.studies),
+        (protocol.texts.debrief, _standard(protocol, "debrief")),
+    ]
+    return sum(len(text.strip().replace("{standard}", standard)) for text, standard in texts)
 
 
 def minutes(seconds: float) -> int:
@@ -144,22 +170,22 @@ def minutes(seconds: float) -> int:
     return whole if whole <= 10 else 5 * math.ceil(whole / 5)
 
 
-def all_texts(protocol: Protocol) -> tuple[Read, ...]:
+def all_texts(protocol: Protocol, films: Films = NO_FILMS) -> tuple[Read, ...]:
     """Every text of a sitting that participants read, in its order, and then the small words of the front ends."""
     consent = protocol.consent
-    found = [Read("consent.text", consent_text(protocol))]
+    found = [Read("consent.text", consent_text(protocol, films))]
     found += [Read(f"consent.{name}", getattr(consent, name)) for name in ("agree", "decline", "declined")]
     for field in protocol.form:
         found.append(Read(f"form: {field.name}", " | ".join([field.label, *field.choices])))
-    found.append(Read("texts.welcome", welcome_text(protocol)))
+    found.append(Read("texts.welcome", welcome_text(protocol, films)))
     for study in protocol.studies:
-        found.append(Read(f"{study.name}: instructions", instructions_text(protocol, study)))
+        found.append(Read(f"{study.name}: instructions", instructions_text(protocol, study, films)))
         found.append(Read(f"{study.name}: question", question_text(protocol, study)))
         for item in study.items:
             scale = " ... ".join(filter(None, (item.low, item.middle, item.high)))
             ends = f" [{scale}]" if scale else ""
             found.append(Read(f"{study.name}: item {item.name}", item.question + ends))
-    found.append(Read("texts.debrief", debrief_text(protocol)))
+    found.append(Read("texts.debrief", debrief_text(protocol, films)))
     small = [name for name in type(protocol.texts).model_fields if name not in ("welcome", "debrief")]
     found += [Read(f"texts.{name}", getattr(protocol.texts, name)) for name in small]
     return tuple(read for read in found if read.text)

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
@@ -266,7 +267,7 @@ def _read_hierarchy(
 
 def _numbers(source: Source, words: _Words, count: int, what: str) -> FloatArray:
     if len(words) < count + 1:
-        raise source.error(words[-1][1], f"Expected {count} number(s) for {what}, found {len(words) - 1}.")
+        raise source.error(words[-1][1], f"Expected {counted(count, 'number')} for {what}, found {len(words) - 1}.")
     return np.array([number(source, word, at, what) for word, at in words[1 : count + 1]])
 
 
@@ -409,7 +410,8 @@ def _parse_slowly(
             place = words[count + 1][1] if len(words) > count + 1 else line.end()
             raise source.error(
                 place,
-                f"Expected {count} values for {name!r} in frame {last_number}, as {asf} says, found {len(words) - 1}.",
+                f"Expected {counted(count, 'value')} for {name!r} in frame {last_number}, as {asf} says, found "
+                f"{len(words) - 1}.",
             )
         frames[-1][name] = [number(source, w, a, f"a value of {name!r} in frame {last_number}") for w, a in words[1:]]
     if frames:
@@ -417,7 +419,10 @@ def _parse_slowly(
     if not frames:
         raise source.error(len(source.raw.rstrip()), "Expected frames, found none.")
     if gaps:
-        _warn(f"{source.path}: frame numbers jump {gaps} times from {first_number} to {last_number}; all rows are kept")
+        _warn(
+            f"{source.path}: frame numbers jump {counted(gaps, 'time')} from {first_number} to {last_number}; "
+            "all rows are kept"
+        )
     return {name: np.array([frame[name] for frame in frames]) for name in moving}
 
 

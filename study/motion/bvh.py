@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
@@ -86,7 +87,7 @@ def read_bvh(path: Path | str, *, metres_per_unit: float | None = None) -> Clip:
     fps, stated, offset = _read_motion_header(source, offset)
     values = parse_table(source, offset, hierarchy.columns)
     if stated is not None and stated != len(values):
-        _warn(f"{source.path}: says Frames: {stated}, but holds {len(values)} rows; the rows are trusted")
+        _warn(f"{source.path}: says Frames: {stated}, but holds {counted(len(values), 'row')}; the rows are trusted")
     return _assemble(source, hierarchy, values, fps, metres_per_unit)
 
 

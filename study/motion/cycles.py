@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import MotionError
 from study.motion.clip import Clip, joint_positions
 from study.motion.feet import heading
@@ -322,10 +323,10 @@ def _words(clip: Clip, cycle: Cycle, frames: int) -> str:
     seconds, where = frames / clip.fps, "before its start" if cycle.at == "start" else "after its end"
     if cycle.kind == "still":
         drawn = f"drawn out from {cycle.period_frames:.0f} frames"
-        return f"extended {where} by {frames} frames ({seconds:.2f} s) of standing, {drawn}"
+        return f"extended {where} by {counted(frames, 'frame')} ({seconds:.2f} s) of standing, {drawn}"
     how = "gait cycles" if cycle.kind == "gait" else "gait cycles made of one captured step and its mirror image"
     return (
-        f"extended {where} by {frames} frames ({seconds:.2f} s): {frames / cycle.cycle_frames:.2f} {how}, "
+        f"extended {where} by {counted(frames, 'frame')} ({seconds:.2f} s): {frames / cycle.cycle_frames:.2f} {how}, "
         f"each {cycle.cycle_frames / clip.fps:.2f} s, unlike the one before by {cycle.unlikeness:.2f} of the movement"
     )
 
@@ -333,6 +334,6 @@ def _words(clip: Clip, cycle: Cycle, frames: int) -> str:
 def _refusal(clip: Clip, at: End, frames: int) -> str:
     return (
         f"Expected {clip.name or 'the clip'} ({clip.seconds:.2f} s) to {at} in walking or running steps, or standing "
-        f"still, to extend it there by {frames} frames; it does neither, and other motion is not repeated. "
+        f"still, to extend it there by {counted(frames, 'frame')}; it does neither, and other motion is not repeated. "
         "Use a longer clip, or a part of it that needs no extension."
     )

@@ -15,6 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
@@ -363,7 +364,7 @@ def _longest_clean(clip: Clip, spans: Sequence[tuple[int, int]]) -> Clip:
     if not runs or 2 * (runs[0][1] - runs[0][0]) < clip.frames:
         raise MotionError(
             f"Expected at least half of {clip.name or 'the clip'} to be free of defects, found "
-            f"{int(runs[0][1] - runs[0][0]) if runs else 0} of {clip.frames} frames in a row. "
+            f"{int(runs[0][1] - runs[0][0]) if runs else 0} of {counted(clip.frames, 'frame')} in a row. "
             "Mend it, or use another clip."
         )
     return trim(clip, int(runs[0][0]), int(runs[0][1]))

@@ -14,6 +14,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.motion.source import NUMBER, Source, number
 
 FloatArray = NDArray[np.float64]
@@ -213,13 +214,13 @@ def _parse_slowly(source: Source, offset: int, columns: int) -> FloatArray:
         if len(words) < columns:
             raise source.error(
                 line.end(),
-                f"Expected {columns} values in frame {len(rows)}, found {len(words)}: the row is cut short. "
+                f"Expected {counted(columns, 'value')} in frame {len(rows)}, found {len(words)}: the row is cut short. "
                 "Copy the file again, or delete the row.",
             )
         if len(words) > columns:
             raise source.error(
                 words[columns][1],
-                f"Expected {columns} values in frame {len(rows)}, found {len(words)}: "
+                f"Expected {counted(columns, 'value')} in frame {len(rows)}, found {len(words)}: "
                 "the rows don't fit the channels of the hierarchy.",
             )
         rows.append(row)

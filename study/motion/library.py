@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from study.counting import counted
 from study.errors import MotionError
 from study.motion.clip import Clip, resample, trim
 from study.motion.cmu import CMU_ACKNOWLEDGEMENT, CMU_SITE, Boundary, IndexedMotion, Take, cmu_index, is_trial
@@ -293,7 +294,7 @@ def _usable(clip: Clip, entry: Entry) -> Clip:
     if not 0 <= entry.first_frame < stop <= clip.frames:
         raise MotionError(
             f"Expected frames {entry.first_frame} to {stop - 1} for {entry.name!r} in {entry.file}, found "
-            f"{clip.frames} frames. The file is not the whole trial; download it again."
+            f"{counted(clip.frames, 'frame')}. The file is not the whole trial; download it again."
         )
     return trim(clip, entry.first_frame, stop)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from study.counting import counted
 from study.report import tables, words
 from study.report.drawing import BLUE, FAINT, ORANGE, add_mark, new_figure, quiet_grid, style, to_svg
 
@@ -74,7 +75,7 @@ def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> st
         add_mark(figure, mark)
         over = int((gaps > LONGEST_GAP_FRAMES).sum())
         spoken = (
-            f"{words.number(len(gaps), 'presentation')}, median {np.median(gaps):.2f} frames, longest "
+            f"{counted(len(gaps), 'presentation')}, median {np.median(gaps):.2f} frames, longest "
             f"{gaps.max():.2f}; "
             f"{over} over {LONGEST_GAP_FRAMES:g} frames"
         )
@@ -87,8 +88,8 @@ def checks_sentence(checks: pd.DataFrame) -> str:
         return ""
     passed = int((checks["answer"].notna() & (checks["answer"] == checks["expected"])).sum())
     people = checks["participant"].nunique()
-    asked = words.number(len(checks), "attention check")
-    return f"{passed} of {asked} by {words.number(people, 'participant')} were passed."
+    asked = counted(len(checks), "attention check")
+    return f"{passed} of {asked} by {counted(people, 'participant')} were passed."
 
 
 def exclusion_sentence(analysis: Result) -> str:
@@ -98,15 +99,15 @@ def exclusion_sentence(analysis: Result) -> str:
         return "The protocol states no rules of exclusion; nobody and nothing was left out."
     if not found["answers_left_out"]:
         return (
-            f"By the {words.number(len(found['rules']), 'rule')} of exclusion that the protocol stated before there "
+            f"By the {counted(len(found['rules']), 'rule')} of exclusion that the protocol stated before there "
             "was "
             "data, nobody and nothing was left out."
         )
     return (
         f"By rules that the protocol stated before there was data, "
-        f"{words.number(found['answers_left_out'], 'answer')} of "
+        f"{counted(found['answers_left_out'], 'answer')} of "
         f"{analysis['quality']['trials']:,} are left out of all results above; "
-        f"{words.number(len(found['participants']), 'participant')} wholly. Results with and without stand side by "
+        f"{counted(len(found['participants']), 'participant')} wholly. Results with and without stand side by "
         "side "
         "below."
     )

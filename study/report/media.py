@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
+
 if TYPE_CHECKING:
     from study.experiment.stimuli import Manifest
     from study.experiment.stimulus_set import StimulusRecord
@@ -139,7 +141,9 @@ def embed_videos(manifest: Manifest, most_bytes: int = MOST_VIDEO_BYTES) -> list
 def _caption(record: StimulusRecord) -> str:
     added = f" {record.difference_frames:+d}".replace("-", "− ").replace("+", "+ ") if record.difference_frames else ""
     how = (
-        f"{record.method}{added}: {record.blend_frames} frames" if record.blend_frames else f"{record.method}, no blend"
+        f"{record.method}{added}: {counted(record.blend_frames, 'frame')}"
+        if record.blend_frames
+        else f"{record.method}, no blend"
     )
     synthetic = " (synthetic motions)" if record.synthetic else ""
     return f"{record.transition.replace('_', ' ')}, {how}{synthetic}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from study.counting import counted
 from study.report import words
 
 if TYPE_CHECKING:
@@ -119,43 +120,47 @@ def references(protocol: Protocol, analysis: Result) -> list[str]:
 
 
 def _design(protocol: Protocol, analysis: Result, who: str) -> str:
-    studies = words.number(len(protocol.studies), "study", "studies")
+    studies = counted(len(protocol.studies), "study", "studies")
     asked = analysis["quality"]
     each = asked["trials"] / max(asked["participants"], 1)
     return (
         f"{words.sentence(who)} took part in one sitting of {studies}. "
-        f"{' '.join(_study(study) for study in protocol.studies)} Trials came in an order drawn anew for every "
-        f"participant (seed {protocol.seed}); a participant was asked {each:.0f} questions on average."
+        f"{' '.join(_study(protocol, study) for study in protocol.studies)} Trials came in an order drawn anew for "
+        f"every participant (seed {protocol.seed}); a participant was asked {counted(round(each), 'question')} "
+        "on average."
     )
 
 
-def _study(study: StudySpec) -> str:
+def _study(protocol: Protocol, study: StudySpec) -> str:
     title = words.readable(study.title or study.name)
     if study.task == "same-different":
         levels = ", ".join(f"{value:+d}".replace("-", "−") if value else "0" for value in study.differences_frames)
         what = (
             f"participants judged whether two transitions were the same or different: "
-            f"{_blends(study, study.reference)}, "
+            f"{_blends(protocol, study, study.reference)}, "
             f"against blends longer by {levels} frames"
         )
     elif study.task == "preference":
-        what = f"participants chose the more natural of two transitions, {_against(study)}"
+        what = f"participants chose the more natural of two transitions, {_against(protocol, study)}"
     else:
-        asked = words.number(len(study.items), "question")
+        asked = counted(len(study.items), "question")
         done = "compared the second of two transitions with the first," if study.paired else "rated"
-        what = f"participants {done} {_against(study)}, on a scale of 0 to {study.scale_points - 1} in {asked}"
+        what = (
+            f"participants {done} {_against(protocol, study)}, on a scale of 0 to {study.scale_points - 1} in {asked}"
+        )
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
     order = (ORDERS if study.paired else SINGLE_ORDERS)[study.order]
     return f"In “{title}”, {what}. {order}{repeated}."
 
 
-def _against(study: StudySpec) -> str:
-    first = _blends(study, study.reference)
-    return first if study.comparison is None else f"{first} and {_blends(study, study.comparison)}"
+def _against(protocol: Protocol, study: StudySpec) -> str:
+    first = _blends(protocol, study, study.reference)
+    return first if study.comparison is None else f"{first} and {_blends(protocol, study, study.comparison)}"
 
 
-def _blends(study: StudySpec, method: str) -> str:
-    return f"blends of {words.number(study.fixed_frames, 'frame')}" if method == "fixed" else BLENDS[method]
+def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:
+    fixed = counted(protocol.fixed_frames_of(study), "frame")
+    return f"blends of {fixed}" if method == "fixed" else BLENDS[method]
 
 
 def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
@@ -174,7 +179,7 @@ def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
         how += " Sliding of planted feet was removed after blending." if shown.clean_feet else ""
         joint = "blend or the cut" if cuts else "blend"
     return (
-        f"{words.number(len(manifest.records), 'transition')} between {motions} {how} Each was rendered as a "
+        f"{counted(len(manifest.records), 'transition')} between {motions} {how} Each was rendered as a "
         f"{shown.style} figure of {shown.width} × {shown.height} pixels at {protocol.fps:g} frames per second, seen by "
         f"{camera} {ground}, with {shown.entry_s:g} s before and {shown.exit_s:g} s after the {joint}."
     )
@@ -184,9 +189,7 @@ def _procedure(protocol: Protocol, analysis: Result, presentations: pd.DataFrame
     timing = protocol.timing
     paired = any(study.paired for study in protocol.studies)
     pair = f"The two stimuli of a pair followed each other after {timing.gap_s:g} s. " if paired else ""
-    rest = (
-        f" A break was offered after every {words.number(timing.break_after, 'trial')}." if timing.break_after else ""
-    )
+    rest = f" A break was offered after every {counted(timing.break_after, 'trial')}." if timing.break_after else ""
     limit = (
         f"Participants had {timing.answer_s:g} s to answer; an answer not given in time was recorded as missed. "
         if any(study.task != "rating" for study in protocol.studies)
@@ -205,7 +208,7 @@ def _shown(analysis: Result, presentations: pd.DataFrame) -> str:
         "swap": "a window, every buffer swap timed",
     }
     parts = [
-        f"{words.number(len(part), 'presentation')} in {timers.get(str(method), f'a way timed by {method} only')}"
+        f"{counted(len(part), 'presentation')} in {timers.get(str(method), f'a way timed by {method} only')}"
         for method, part in presentations.groupby("method", sort=True)
     ]
     badly = int((~presentations["shown_well"].astype(bool)).sum())
@@ -261,10 +264,10 @@ def _excluded(analysis: Result) -> str:
     if not found["rules"]:
         return "No rule of exclusion was stated beforehand; no participant and no answer was left out."
     rules = words.joined([rule["rule"] for rule in found["rules"]])
-    wholly = words.number(len(found["participants"]), "participant")
+    wholly = counted(len(found["participants"]), "participant")
     return (
         f"By rules stated before there was data, these were left out: {rules}; "
-        f"{words.number(found['answers_left_out'], 'answer')} of {analysis['quality']['trials']:,} in all, among them "
+        f"{counted(found['answers_left_out'], 'answer')} of {analysis['quality']['trials']:,} in all, among them "
         f"those of {wholly} left out wholly. Results of all answers are given beside."
     )
 

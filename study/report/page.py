@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from study.counting import counted
 from study.report import (
     conduct,
     course,
@@ -122,8 +123,8 @@ def who(analysis: Result) -> str:
     """Return who answered: "12 participants", "35 simulated observers", or both."""
     quality = analysis["quality"]
     people, simulated = quality["participants"] - quality["simulated_participants"], quality["simulated_participants"]
-    parts = [words.number(people, "participant")] if people else []
-    return words.joined([*parts, *([words.number(simulated, "simulated observer")] if simulated else [])])
+    parts = [counted(people, "participant")] if people else []
+    return words.joined([*parts, *([counted(simulated, "simulated observer")] if simulated else [])])
 
 
 def _sections(material: Material, analysis: Result, mark: str) -> list[Section]:
@@ -173,12 +174,12 @@ def _without_answers(material: Material, name: str, title: str) -> Section:
     if asked.empty:
         why = "nobody has come to it yet"
     elif missed == len(asked):
-        why = f"all {words.number(missed, 'question')} were missed"
+        why = f"all {counted(missed, 'question')} were missed"
     elif not missed:
-        why = f"all {words.number(len(asked), 'answer')} are left out by the rules of exclusion"
+        why = f"all {counted(len(asked), 'answer')} are left out by the rules of exclusion"
     else:
-        rest = words.number(len(asked) - missed, "answer")
-        why = f"{missed:,} of {words.number(len(asked), 'question')} were missed and {rest} left out by rules"
+        rest = counted(len(asked) - missed, "answer")
+        why = f"{missed:,} of {counted(len(asked), 'question')} were missed and {rest} left out by rules"
     return Section(f"study-{name}", title, (Headline(f"{title}: there is no result, for {why}.", ""),))
 
 
@@ -235,8 +236,8 @@ def _facts(material: Material, analysis: Result) -> tuple[str, ...]:
     )
     return (
         who(analysis),
-        f"{words.number(quality['answered'], 'answer')}, {quality['missed']:,} missed",
-        f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} at {manifest.fps:g} frames per second",
+        f"{counted(quality['answered'], 'answer')}, {quality['missed']:,} missed",
+        f"{counted(len(manifest.records), 'stimulus', 'stimuli')} at {manifest.fps:g} frames per second",
         motions,
     )
 
@@ -244,7 +245,7 @@ def _facts(material: Material, analysis: Result) -> tuple[str, ...]:
 def _quality_sentence(quality: Result) -> str:
     times = quality["response_s"]
     text = (
-        f"{quality['missed']:,} of {words.number(quality['trials'], 'question')} were missed "
+        f"{quality['missed']:,} of {counted(quality['trials'], 'question')} were missed "
         f"({quality['missed_percent']:.1f}%), {quality['too_fast']:,} answered sooner than {quality['fastest_s']:g} s."
     )
     if times:
@@ -253,8 +254,8 @@ def _quality_sentence(quality: Result) -> str:
             f"{times['95']:.2f} s."
         )
     if quality["shown_badly"]:
-        text += f" {words.number(quality['shown_badly'], 'answer')} followed a stimulus that stalled or was hidden."
-    flagged = words.number(quality["flagged"], "participant")
+        text += f" {counted(quality['shown_badly'], 'answer')} followed a stimulus that stalled or was hidden."
+    flagged = counted(quality["flagged"], "participant")
     return text + (
         f" {flagged} {'is' if quality['flagged'] == 1 else 'are'} flagged, which alone leaves nobody out, for one of "
         f"these: {'; '.join(quality['rules'])}."
@@ -266,9 +267,9 @@ def _sessions_sentence(material: Material) -> str:
     parts = []
     empty = len(material.sessions) - material.answers["participant"].nunique()
     if empty > 0:
-        parts.append(f"{words.number(empty, 'session')} begun without an answer that counts")
+        parts.append(f"{counted(empty, 'session')} begun without an answer that counts")
     if material.withdrawn:
-        parts.append(f"{words.number(material.withdrawn, 'participant')} withdrew, and their answers are deleted")
+        parts.append(f"{counted(material.withdrawn, 'participant')} withdrew, and their answers are deleted")
     return f"Beside these: {words.joined(parts)}." if parts else ""
 
 
@@ -280,7 +281,7 @@ def _shown_sentence(material: Material) -> str:
     )
     motions = "a synthetic library" if manifest.synthetic else f"the library {words.library(manifest.library)}"
     text = (
-        f"{words.number(len(manifest.records), 'stimulus', 'stimuli')} from {motions}, {manifest.size[0]} × "
+        f"{counted(len(manifest.records), 'stimulus', 'stimuli')} from {motions}, {manifest.size[0]} × "
         f"{manifest.size[1]} pixels at {manifest.fps:g} frames per second."
     )
     if not manifest.videos:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from study.counting import counted
 from study.report import tables, words
 from study.report.likert_figure import likert_figure
 from study.report.sections import Drawing, Headline, Section
@@ -100,8 +101,8 @@ def _headline(questions: Sequence[Result], top: int, alpha: float) -> Headline:
     clear = sum(1 for test in which if test["p_value"] is not None and test["p_value"] < alpha)
     return Headline(
         f"Compared with {_reference(first)}, {_other(first)} was rated {side} the middle of the scale in "
-        f"{len(which)} of {words.number(len(questions), 'question')}, in {clear or 'none'} of them significantly at "
-        f"{alpha:g} across {words.number(known[0]['participants'], 'participant')}.",
+        f"{len(which)} of {counted(len(questions), 'question')}, in {clear or 'none'} of them significantly at "
+        f"{alpha:g} across {counted(known[0]['participants'], 'participant')}.",
         detail,
     )
 
@@ -109,7 +110,7 @@ def _headline(questions: Sequence[Result], top: int, alpha: float) -> Headline:
 def _size(questions: Sequence[Result]) -> str:
     answers = sum(question["answers"] for question in questions)
     people = max(question["participants"]["participants"] for question in questions)
-    return f"{words.number(answers, 'answer')} of {words.number(people, 'participant')}"
+    return f"{counted(answers, 'answer')} of {counted(people, 'participant')}"
 
 
 def _in_words(question: Result) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from study.counting import counted
 from study.errors import AnalysisError
 from study.report import tables, words
 from study.report.drawing import BLUE, INK, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
@@ -45,7 +46,7 @@ def read_power(folder: Path) -> list[Result]:
 def power_sentence(found: Result) -> str:
     """Return how many participants are needed, in words."""
     who = (
-        f"{words.number(found['needed'], 'participant')} are needed"
+        f"{counted(found['needed'], 'participant')} are needed"
         if found["needed"]
         else "no number of participants that was tried is enough"
     )
@@ -53,7 +54,7 @@ def power_sentence(found: Result) -> str:
     return (
         f"{words.sentence(words.readable(found['study']))}: to {found['aim']} in {100 * found['target']:g}% of "
         "studies, "
-        f"with {words.number(found['answers_per_participant'], 'answer')} of each participant, {who}{note}."
+        f"with {counted(found['answers_per_participant'], 'answer')} of each participant, {who}{note}."
     )
 
 
@@ -104,6 +105,6 @@ def power_drawing(found: Result, name: str, asked: int) -> Drawing:
         axes.set_title("power")
         quiet_grid(axes)
         add_mark(figure, "simulated studies")
-        spoken = "; ".join(f"{point['participants']} participants: {point['power']:.2f}" for point in points)
+        spoken = "; ".join(f"{counted(point['participants'], 'participant')}: {point['power']:.2f}" for point in points)
         svg = to_svg(figure, f"power-{found['study']}", f"Power of {words.readable(found['study'])}", spoken)
     return Drawing(name, svg, f"Power to {found['aim']}, by simulation, with Wilson’s 95% intervals.")

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from study.counting import counted
 from study.report import figures, tables, words
 from study.report.sections import Drawing, Headline, Section
 from study.report.tables import Table
@@ -76,7 +77,7 @@ def headline(comparison: Result) -> Headline:
     parts = []
     if people["low"] is not None:
         parts.append(
-            f"Mean over {words.number(people['participants'], 'participant')} {people['mean_percent']:.1f}%, 95% "
+            f"Mean over {counted(people['participants'], 'participant')} {people['mean_percent']:.1f}%, 95% "
             f"interval {words.interval(people['low'], people['high'], unit='%')}."
         )
     elif people["note"]:
@@ -113,16 +114,17 @@ def _notes(comparison: Result) -> list[str]:
     people, order, clusters = comparison["participants"], comparison["order"], comparison["clustering"]
     first, second = methods_of(comparison)
     notes = [
-        f"{words.number(people['for_a'], 'participant')} leant towards {first}, {people['for_b']} towards {second}, "
+        f"{counted(people['for_a'], 'participant')} leant towards {first}, {people['for_b']} towards {second}, "
         f"{people['undecided']} towards neither."
     ]
     if comparison.get("ties"):
-        notes.append(f"{words.number(comparison['ties'], 'answer')} chose neither: left out of the published test.")
+        notes.append(f"{counted(comparison['ties'], 'answer')} chose neither: left out of the published test.")
     if clusters["design_effect"] is not None:
         correlation = words.signed(clusters["intraclass_correlation"], 3, plus=False)
         notes.append(
             f"Answers of one participant correlate by {correlation}: the pooled test counts "
-            f"{comparison['published']['answers']} answers that are worth {clusters['effective_answers'] or 0:.0f} "
+            f"{counted(comparison['published']['answers'], 'answer')} that are worth "
+            f"{clusters['effective_answers'] or 0:.0f} "
             f"independent ones (design effect {clusters['design_effect']:.2f})."
         )
     if order["first_percent"] is not None:
@@ -309,7 +311,7 @@ def confirmatory_table(tests: Sequence[Result]) -> Table | None:
     ]
     return tables.make(
         "confirmatory",
-        f"The confirmatory family. The default test of {words.number(len(rows), 'comparison')}, p-values adjusted "
+        f"The confirmatory family. The default test of {counted(len(rows), 'comparison')}, p-values adjusted "
         "together by Holm’s method, so that the chance of any false finding among them stays at the level of "
         "significance.",
         "study comparison test p_value holm_p_value",

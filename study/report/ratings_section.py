@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from study.counting import counted
 from study.report import figures, tables, words
 from study.report.sections import Drawing, Headline, Section
 from study.report.tables import Table
@@ -88,7 +89,7 @@ def _highest(rows: Sequence[Result], points: int) -> Headline:
     what = words.joined([words.readable(": ".join(filter(None, (row["item"], row["method"])))) for row in best])
     verb = "were rated alike," if len(best) > 1 else "was rated" if len(rows) == 1 else "was rated highest,"
     row = best[0]
-    size = f"{words.number(row['answers'], 'answer')} of {words.number(row['participants'], 'participant')}"
+    size = f"{counted(row['answers'], 'answer')} of {counted(row['participants'], 'participant')}"
     return Headline(
         f"{words.sentence(what)} {verb} {top:.2f} on average, on a scale of 0 to {points - 1}.",
         f"{size}; 95% interval over participants {words.interval(row['low'], row['high'], 2)}.",
@@ -101,7 +102,7 @@ def _of_one(question: Result, points: int, alpha: float) -> Headline:
     first, second = _methods(question)
     if difference["mean"] < 0:
         first, second = second, first
-    size = f"{words.number(question['answers'], 'answer')} of {words.number(question['participants'], 'participant')}"
+    size = f"{counted(question['answers'], 'answer')} of {counted(question['participants'], 'participant')}"
     if difference["mean"] == 0:
         statement = f"{words.sentence(first)} and {second} were rated alike on average, on a scale of 0 to {points - 1}"
     else:
@@ -128,8 +129,8 @@ def _of_several(known: Sequence[Result], alpha: float) -> Headline:
     clear = sum(1 for question in up if _significant(question, alpha))
     return Headline(
         f"{words.sentence(first)} was rated higher than {second} in {len(up)} of "
-        f"{words.number(len(known), 'question')}, in {clear or 'none'} of them significantly at {alpha:g} across "
-        f"{words.number(known[0]['participants'], 'participant')}.",
+        f"{counted(len(known), 'question')}, in {clear or 'none'} of them significantly at {alpha:g} across "
+        f"{counted(known[0]['participants'], 'participant')}.",
         _tests(known),
     )
 

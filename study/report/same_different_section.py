@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from study.counting import counted
 from study.report import figures, tables, words
 from study.report.sections import Drawing, Headline, Section
 from study.report.tables import Table
@@ -16,9 +17,9 @@ Result = Mapping[str, Any]
 
 SIDES = (("longer", "+"), ("shorter", "−"))
 SUBJECTS: Mapping[str, Callable[[int], str]] = {
-    "collected": lambda count: words.number(count, "person", "people"),
-    "simulated": lambda count: words.number(count, "simulated observer"),
-    "mixed": lambda count: f"{words.number(count, 'participant')}, people and simulated observers together,",
+    "collected": lambda count: counted(count, "person", "people"),
+    "simulated": lambda count: counted(count, "simulated observer"),
+    "mixed": lambda count: f"{counted(count, 'participant')}, people and simulated observers together,",
 }
 """Who answered, as the subject of a sentence."""
 
@@ -94,7 +95,7 @@ def headline(result: Result, fps: float, data: str) -> Headline:
     """Return the just noticeable difference as a statement and what it rests on."""
     if not result["answers"]:
         missed = result["missed"]
-        why = f"all {words.number(missed, 'question')} were missed" if missed else "there are no answers"
+        why = f"all {counted(missed, 'question')} were missed" if missed else "there are no answers"
         return Headline(f"No just noticeable difference can be given: {why}.", "")
     who = SUBJECTS[data](result["participants"])
     percent = f"{100 * result['level']:.0f}% “different”"
@@ -120,14 +121,14 @@ def _place(result: Result, chosen: Result, side: str, fps: float) -> str:
     )
     # Wilson's interval has to agree: a single answer is no evidence.
     if levels and levels[0]["low"] is not None and levels[0]["low"] > 100 * result["level"]:
-        return f"less than {abs(levels[0]['difference_frames']):g} frames {side}"
+        return f"less than {counted(abs(levels[0]['difference_frames']), 'frame')} {side}"
     if levels and all(row["high"] is not None and row["high"] < 100 * result["level"] for row in levels):
-        return f"more than {abs(levels[-1]['difference_frames']):g} frames {side}"
+        return f"more than {counted(abs(levels[-1]['difference_frames']), 'frame')} {side}"
     return ""
 
 
 def _detail(result: Result, chosen: Result) -> str:
-    size = f"{words.number(result['answers'], 'answer')} of {words.number(result['participants'], 'participant')}"
+    size = f"{counted(result['answers'], 'answer')} of {counted(result['participants'], 'participant')}"
     parts = []
     if result["model"]:
         ends = [f"{_ends(found)} {side}" for side, _ in SIDES if (found := chosen.get(side)) and _closed(found)]
@@ -221,7 +222,7 @@ def _model_notes(model: Result) -> list[str]:
         says = "the curve follows the data" if fit >= 0.05 else "the curve does not follow the data closely"
         notes.append(
             f"Deviance from free percentages {model['fit_deviance']:.1f} on "
-            f"{words.number(model['fit_degrees_of_freedom'], 'degree')} of freedom, {words.p(fit)}: {says}."
+            f"{counted(model['fit_degrees_of_freedom'], 'degree')} of freedom, {words.p(fit)}: {says}."
         )
     if model["equal_slopes"]:
         notes.append(_equal_slopes(model["equal_slopes"]))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.report.drawing import BLUE, FAINT, INK, ORANGE, SOFT, TEAL, new_figure, quiet_grid, style
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def curve_picture(
         at = int(np.flatnonzero(np.asarray(lengths) == chosen)[0])
         axes.plot(chosen, costs[at], "o", color=ORANGE, markersize=7, clip_on=False, zorder=5)
         axes.set_ylabel("cost")
-        axes.set_title(f"{words}: {chosen} frames, {chosen / fps:.2f} s", color=ORANGE)
+        axes.set_title(f"{words}: {counted(chosen, 'frame')}, {chosen / fps:.2f} s", color=ORANGE)
         seconds = axes.secondary_xaxis("top", functions=(lambda x: x / fps, lambda x: x * fps))
         seconds.set_xlabel("blend length, seconds")
         _finish_length_axis(axes)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from study.counting import counted, noun
 from study.report.tables import p_value
 
 Result = Mapping[str, Any]
@@ -31,11 +32,6 @@ def joined(parts: Sequence[str]) -> str:
     if len(parts) < 2:
         return "".join(parts)
     return ", ".join(parts[:-1]) + " and " + parts[-1]
-
-
-def number(count: int, singular: str, plural: str | None = None) -> str:
-    """Return a count with its noun."""
-    return f"{count:,} {singular if count == 1 else plural or singular + 's'}"
 
 
 def unbroken(text: str) -> str:
@@ -66,8 +62,9 @@ def warnings_of(data: str, synthetic: bool, simulated: int, participants: int) -
         )
     elif data == "mixed":
         found.append(
-            f"Simulated and collected answers are mixed here: {simulated} of {participants} participants are simulated "
-            "observers. Results describe neither people nor the simulation."
+            f"Simulated and collected answers are mixed here: {simulated} of {counted(participants, 'participant')} "
+            f"{noun(simulated, 'is a simulated observer', 'are simulated observers')}. Results describe neither people "
+            "nor the simulation."
         )
     if synthetic:
         found.append(

@@ -115,9 +115,9 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
     check_same_rig(source, destination)
     repeats = (is_cyclic(source), is_cyclic(destination)) if cyclic is None else cyclic
     method = "geodesic" if any(repeats) else "velocity"
-    starts, ends, longest = _points(source, destination)
+    starts, ends = _points(source, destination)
     find = geodesic_lengths if method == "geodesic" else velocity_lengths
-    lengths, costs = find(source, destination, starts, ends, longest=longest)
+    lengths, costs = find(source, destination, starts, ends)
     strain = costs * (1.0 + (own_time(source, destination) / (lengths + 1)) ** 2)
     low, high = (round(seconds * source.fps) for seconds in USUAL_S)
     usual = (lengths >= low) & (lengths <= high)
@@ -125,12 +125,11 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
     if not usual.any():
         notes.append(f"no point asks for a blend of {low} to {high} frames; this one costs least of all")
         usual[:] = True
-    if longest < default_frames(source.fps, LONGEST_S):
-        notes.append(f"short clips: blends of up to {longest} frames were considered")
     best = int(np.flatnonzero(usual)[np.argmin(strain[usual])])
-    start, end, length = int(starts[best]), int(ends[best]), int(lengths[best])
-    default = default_frames(source.fps, FIXED_S)
-    fixed = blend_length(source, destination, start, end, method="fixed", restrict=True)
+    start, end = int(starts[best]), int(ends[best])
+    chosen = blend_length(source, destination, start, end, method=method)
+    fixed = blend_length(source, destination, start, end, method="fixed")
+    length, default = chosen.blend_frames, default_frames(source.fps, FIXED_S)
     return Advice(
         source.name,
         destination.name,
@@ -139,13 +138,13 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
         start,
         end,
         length,
-        length / source.fps,
-        float(costs[best]),
+        chosen.blend_s,
+        chosen.cost,
         fixed.cost,
         default,
         length - default,
         just_noticeable((length - default) / source.fps),
-        "; ".join(notes),
+        "; ".join(filter(None, (*notes, chosen.note))),
     )
 
 
@@ -176,8 +175,8 @@ def _why(cyclic: tuple[bool, bool]) -> str:
     return "neither motion is cyclic"
 
 
-def _points(source: Clip, destination: Clip) -> tuple[IntArray, IntArray, int]:
-    """Start and end frames to try, and the longest blend that all of them have room for."""
+def _points(source: Clip, destination: Clip) -> tuple[IntArray, IntArray]:
+    """Start and end frames to try: with room for all lengths where the clips are long enough."""
     fps = source.fps
     entry, after = (min(round(_SEEN_S * fps), clip.frames // 4) for clip in (source, destination))
     freedom = round(_FREEDOM_S * fps)
@@ -194,4 +193,4 @@ def _points(source: Clip, destination: Clip) -> tuple[IntArray, IntArray, int]:
     ends = np.arange(longest - 1, destination.frames - max(after, 1))
     step = int(np.ceil(np.sqrt(max(1.0, len(starts) * len(ends) / _TRIED))))
     grid = np.meshgrid(starts[::step], ends[::step], indexing="ij")
-    return grid[0].ravel(), grid[1].ravel(), longest
+    return grid[0].ravel(), grid[1].ravel()

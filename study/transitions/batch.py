@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames, joint_speeds
@@ -58,17 +59,20 @@ def geodesic_lengths(
     Raises
     ------
     TransitionError
-        Where the clips don't supply the longest blend at some of the frames; the message says how many.
+        Where the clips don't supply even the shortest blend at some of the frames; the message says how many.
     """
-    starts, ends, low, high = _transitions(source, destination, start_frames, end_frames, shortest, longest)
+    starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames, shortest, longest)
     sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
-    lengths = np.arange(low, high + 1)
+    lengths = np.arange(low, longest_there.max(initial=low) + 1)
     best, cost = np.empty(len(starts), dtype=np.int64), np.empty(len(starts))
     block = max(1, _BLOCK // len(lengths))
     for at in range(0, len(starts), block):
         i, j = starts[at : at + block, None], ends[at : at + block, None]
+        there = longest_there[at : at + block, None]
+        held = np.minimum(lengths, there)
         # Pairs (i, j-b+1) to (i+b-1, j): the sum to the last of them less the sum to the one before the first.
-        costs = (sums[i + lengths, j + 1] - sums[i, j + 1 - lengths]) / lengths
+        costs = (sums[i + held, j + 1] - sums[i, j + 1 - held]) / held
+        costs[lengths > there] = np.inf
         found = np.argmin(costs, axis=1)
         best[at : at + block] = lengths[found]
         cost[at : at + block] = costs[np.arange(len(found)), found]
@@ -89,7 +93,7 @@ def velocity_lengths(
 
     Parameters, returns and errors are those of `geodesic_lengths`; lengths outside the range are clipped to it.
     """
-    starts, ends, low, high = _transitions(source, destination, start_frames, end_frames, shortest, longest)
+    starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames, shortest, longest)
     joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
     speeds = [joint_speeds(clip, joints) for clip in (source, destination)]
     sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
@@ -103,7 +107,7 @@ def velocity_lengths(
         speed = 0.5 * (speeds[0][i, most] + speeds[1][j, most])
         gap = differences[rows, most]
         seconds = np.divide(gap, speed, out=np.where(gap > 0, np.inf, 0.0), where=speed > 0)
-        lengths[at : at + block] = np.rint(np.clip(seconds * source.fps, low, high))
+        lengths[at : at + block] = np.rint(np.clip(seconds * source.fps, low, longest_there[at : at + block]))
     return lengths, (sums[starts + lengths, ends + 1] - sums[starts, ends + 1 - lengths]) / lengths
 
 
@@ -114,8 +118,8 @@ def _transitions(
     end_frames: ArrayLike,
     shortest: int | None,
     longest: int | None,
-) -> tuple[IntArray, IntArray, int, int]:
-    """The frames as arrays, and the range of lengths, all of it checked."""
+) -> tuple[IntArray, IntArray, int, IntArray]:
+    """The frames as arrays, the shortest length, and for each transition the longest that the clips supply; checked."""
     check_same_rig(source, destination)
     low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
     high = default_frames(source.fps, LONGEST_S) if longest is None else longest
@@ -126,16 +130,16 @@ def _transitions(
         raise TransitionError(
             f"Expected as many start frames as end frames in one row each, got shapes {starts.shape} and {ends.shape}."
         )
-    lacking = (starts < 0) | (starts + high > source.frames) | (ends - high + 1 < 0) | (ends >= destination.frames)
+    lacking = (starts < 0) | (starts + low > source.frames) | (ends - low + 1 < 0) | (ends >= destination.frames)
     if lacking.any():
         first = int(np.argmax(lacking))
         raise TransitionError(
-            f"Expected start frames from 0 to {source.frames - high} in {source.name or 'the source'} and end frames "
-            f"from {high - 1} to {destination.frames - 1} in {destination.name or 'the destination'}, so that both "
-            f"supply blends of {high} frames; {np.count_nonzero(lacking)} of {len(starts)} transitions do not, the "
-            f"first from {starts[first]} to {ends[first]}."
+            f"Expected start frames from 0 to {source.frames - low} in {source.name or 'the source'} and end frames "
+            f"from {low - 1} to {destination.frames - 1} in {destination.name or 'the destination'}, so that both "
+            f"supply blends of {counted(low, 'frame')}; {np.count_nonzero(lacking)} of "
+            f"{counted(len(starts), 'transition')} do not, the first from {starts[first]} to {ends[first]}."
         )
-    return starts, ends, low, high
+    return starts, ends, low, np.minimum(high, np.minimum(source.frames - starts, ends + 1))
 
 
 def _diagonal_sums(distances: FloatArray) -> FloatArray:

@@ -14,12 +14,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, trim
 from study.transitions.distances import check_same_rig, frame_distance, half_angle_squares, joint_differences
 from study.transitions.weights import MAJOR_ROLES, joint_weights
-from study.transitions.windows import check_frames, longest_available, shortfall, window
+from study.transitions.windows import check_frames, held, longest_available, shortfall, window
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -86,9 +87,10 @@ def blend_length(
     longest: int | None = None,
     weights: str | Mapping[str, float] = "wang2003",
     specification: str = "start-end",
-    restrict: bool = False,
 ) -> BlendLength:
     """The blend length for a transition, by one of the methods of Wang & Bodenheimer 2004.
+
+    Lengths that the clips don't supply at these frames are not considered; the note says so.
 
     Parameters
     ----------
@@ -106,14 +108,12 @@ def blend_length(
         As `joint_weights` takes them.
     specification
         What the two frames mean; see `study.transitions.windows`.
-    restrict
-        Leave out lengths that the clips can't supply, rather than refuse them.
 
     Raises
     ------
     TransitionError
-        Where the clips don't supply the frames (the message counts them), differ in rig or frame rate, or an
-        option is not known.
+        Where the clips don't supply even the shortest blend (the message counts the frames), differ in rig or frame
+        rate, or an option is not known.
     MotionError
         Where the rig lacks a joint that the weights or the velocity method need.
 
@@ -133,7 +133,7 @@ def blend_length(
     weight = joint_weights(source.skeleton, weights)
     frames = (start_frame, end_frame)
     if method == "geodesic":
-        return _geodesic(source, destination, frames, low, high, weight, specification, restrict)
+        return _geodesic(source, destination, frames, low, high, weight, specification)
     if method == "velocity":
         found = _velocity(source, destination, frames, low, high)
     elif method == "fixed":
@@ -141,7 +141,7 @@ def blend_length(
         found = BlendLength("fixed", length, length / source.fps, np.nan)
     else:
         raise TransitionError(f"Expected a method of {', '.join(METHODS)}, got {method!r}.")
-    return _supplied(found, source, destination, frames, weight, specification, restrict)
+    return _supplied(found, source, destination, frames, low, weight, specification)
 
 
 def geodesic_costs(
@@ -197,9 +197,8 @@ def joint_costs(
     frames = window(start_frame, end_frame, longest, specification)
     if lacking := shortfall(source, destination, frames):
         raise TransitionError(
-            f"Expected clips with frames for blends of up to {longest} frames at source frame {start_frame} and "
-            f"destination frame {end_frame}, but {lacking}. Choose other frames, extend the clip, lower the longest "
-            "blend, or restrict the candidates to what there is."
+            f"Expected clips with frames for blends of up to {counted(longest, 'frame')} at source frame "
+            f"{start_frame} and destination frame {end_frame}, but {lacking}. Choose other frames, or use longer clips."
         )
     a = source.rotations[frames.source_start : frames.source_stop, joints]
     b = destination.rotations[frames.destination_start : frames.destination_stop, joints]
@@ -232,13 +231,8 @@ def _geodesic(
     high: int,
     weights: FloatArray,
     specification: str,
-    restrict: bool,
 ) -> BlendLength:
-    note = ""
-    available = longest_available(source, destination, *frames, specification) if restrict else high
-    if low <= available < high:
-        note = f"the clips supply blends of up to {available} frames; {high} were asked for"
-        high = available
+    high, note = held(longest_available(source, destination, *frames, specification), low, high)
     costs = geodesic_costs(source, destination, *frames, high, weights, specification)[low - 1 :]
     best = low + int(np.argmin(costs))
     return BlendLength(
@@ -304,23 +298,20 @@ def _supplied(
     source: Clip,
     destination: Clip,
     frames: tuple[int, int],
+    shortest: int,
     weights: FloatArray,
     specification: str,
-    restrict: bool,
 ) -> BlendLength:
     """The length with its cost, held to what the clips supply or refused."""
-    length, note = found.blend_frames, found.note
+    asked = found.blend_frames
+    available = longest_available(source, destination, *frames, specification)
+    length, note = held(available, min(shortest, asked), asked)
     span = window(*frames, length, specification)
     if lacking := shortfall(source, destination, span):
-        available = longest_available(source, destination, *frames, specification)
-        if not restrict or available < 1:
-            raise TransitionError(
-                f"Expected clips with frames for the {found.method} blend of {length} frames at source frame "
-                f"{frames[0]} and destination frame {frames[1]}, but {lacking}. Choose other frames or extend the clip."
-            )
-        length = available
-        note = "; ".join(filter(None, (note, f"shortened to the {available} frames that the clips supply")))
-        span = window(*frames, length, specification)
+        raise TransitionError(
+            f"Expected clips with frames for the {found.method} blend of {counted(length, 'frame')} at source frame "
+            f"{frames[0]} and destination frame {frames[1]}, but {lacking}. Choose other frames, or use longer clips."
+        )
     a = source.rotations[span.source_start : span.source_stop]
     b = destination.rotations[span.destination_start : span.destination_stop]
     return BlendLength(
@@ -332,5 +323,5 @@ def _supplied(
         differences=found.differences,
         joint_speed=found.joint_speed,
         unclipped_s=found.unclipped_s,
-        note=note,
+        note="; ".join(filter(None, (found.note, note))),
     )

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved, retarget
@@ -150,7 +151,8 @@ def blend(
     frames = window(start_frame, end_frame, blend_frames, specification)
     if lacking := shortfall(source, destination, frames):
         raise TransitionError(
-            f"Expected clips with frames for a blend of {blend_frames} frames at source frame {start_frame} and "
+            f"Expected clips with frames for a blend of {counted(blend_frames, 'frame')} at source frame "
+            f"{start_frame} and "
             f"destination frame {end_frame}, but {lacking}. Choose other frames, extend the clip or blend shorter."
         )
     destination = retarget(destination, source.skeleton)
@@ -163,7 +165,7 @@ def blend(
         (frames.destination_start, frames.destination_stop),
         blend_weights(blend_frames, weight),
         joint_shares(source.skeleton, blend_frames, weight, joint_frames),
-        f"{weight} blend of {blend_frames} frames, {specification}",
+        f"{weight} blend of {counted(blend_frames, 'frame')}, {specification}",
     )
 
 
@@ -175,7 +177,7 @@ def joint_shares(
     for role, own_frames in (joint_frames or {}).items():
         if not 1 <= own_frames <= blend_frames:
             raise TransitionError(
-                f"Expected a blend of 1 to {blend_frames} frames for the role {role!r}, got {own_frames}; "
+                f"Expected a blend of 1 to {counted(blend_frames, 'frame')} for the role {role!r}, got {own_frames}; "
                 "no joint blends for longer than the figure."
             )
         first = (blend_frames - own_frames) // 2

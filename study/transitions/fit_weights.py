@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
@@ -162,7 +163,7 @@ def fit_weights(cuts: Sequence[LabelledCut], *, nu: float = 1.0) -> FittedWeight
     """
     if not any(cut.bad > 0 for cut in cuts) or not any(cut.bad <= 0 for cut in cuts):
         raise TransitionError(
-            f"Expected both good and bad transitions to fit weights to, found {len(cuts)} transitions, "
+            f"Expected both good and bad transitions to fit weights to, found {counted(len(cuts), 'transition')}, "
             f"{sum(cut.bad > 0 for cut in cuts)} of them bad. Label more of them."
         )
     for cut in cuts[1:]:
@@ -229,7 +230,7 @@ def cross_validate(
     if min(sum(cut.bad > 0 for cut in cuts), sum(cut.bad <= 0 for cut in cuts)) < 2:
         raise TransitionError(
             "Expected at least two good and two bad transitions, so that both are left when one is taken out; found "
-            f"{len(cuts)} transitions, {sum(cut.bad > 0 for cut in cuts)} of them bad. Label more of them."
+            f"{counted(len(cuts), 'transition')}, {sum(cut.bad > 0 for cut in cuts)} of them bad. Label more of them."
         )
     groups = weight_groups(cuts[0].source.skeleton)
     terms, bad = cost_terms(cuts, groups, nu), np.array([cut.bad for cut in cuts], dtype=np.float64)

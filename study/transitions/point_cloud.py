@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions
 
@@ -207,7 +208,8 @@ def _ranges(
         count = cloud.frames - window + 1
         if window < 1 or count < 1:
             raise TransitionError(
-                f"Expected a window of 1 to {cloud.frames} frames, which {cloud.name or 'the clip'} has, got {window}."
+                f"Expected a window of 1 to {counted(cloud.frames, 'frame')}, which {cloud.name or 'the clip'} "
+                f"has, got {window}."
             )
         wanted = range(count) if wanted is None else wanted
         if wanted.step != 1 or wanted.start < 0 or wanted.stop > count:

@@ -13,13 +13,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, retarget, sample
 from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames
 from study.transitions.blending import Stretch, Transition, blend_weights, join, joint_shares
 from study.transitions.distances import check_same_rig, half_angle_squares
 from study.transitions.weights import joint_weights
-from study.transitions.windows import check_frames
+from study.transitions.windows import check_frames, held
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -65,13 +66,12 @@ def warp_length(
     longest: int | None = None,
     weights: str | Mapping[str, float] = "wang2003",
     average: bool = True,
-    restrict: bool = False,
 ) -> WarpLength:
     """The pair of blend lengths with the least cost (2004 Eqs. 5 and 6).
 
     Parameters
     ----------
-    source, destination, start_frame, end_frame, shortest, longest, weights, restrict
+    source, destination, start_frame, end_frame, shortest, longest, weights
         As in `study.transitions.blend_length.blend_length`; the range holds for both lengths.
     average
         Divide each sum by its number of terms, as Eq. 1 does, so that equal lengths cost what the geodesic method
@@ -88,11 +88,8 @@ def warp_length(
     high = default_frames(source.fps, LONGEST_S) if longest is None else longest
     if not 1 <= low <= high:
         raise TransitionError(f"Expected 1 <= shortest <= longest blend length in frames, got {low} and {high}.")
-    note = ""
-    available = min(source.frames - start_frame, end_frame)
-    if restrict and start_frame > 0 and low <= available < high:
-        note = f"the clips supply warped blends of up to {available} frames; {high} were asked for"
-        high = available
+    # A warped window also looks at the frame before its first.
+    high, note = held(min(source.frames - start_frame, end_frame) if start_frame else 0, low, high)
     weight = joint_weights(source.skeleton, weights)
     costs = warp_costs(source, destination, start_frame, end_frame, high, weight, average=average)[low - 1 :, low - 1 :]
     row, column = np.unravel_index(int(np.argmin(costs)), costs.shape)
@@ -225,14 +222,14 @@ def _check_supply(
     if start_frame < 1:
         faults.append(f"{names[0]} lacks 1 frame before its first")
     if (lacking := start_frame + source_frames - source.frames) > 0:
-        faults.append(f"{names[0]} lacks {lacking} frames after its last")
+        faults.append(f"{names[0]} lacks {counted(lacking, 'frame')} after its last")
     if (lacking := destination_frames - end_frame) > 0:
-        faults.append(f"{names[1]} lacks {lacking} frames before its first")
+        faults.append(f"{names[1]} lacks {counted(lacking, 'frame')} before its first")
     if faults:
         raise TransitionError(
             f"Expected clips with frames for warped blends of {source_frames} source and {destination_frames} "
             f"destination frames at source frame {start_frame} and destination frame {end_frame}, but "
-            f"{'; '.join(faults)}. Choose other frames, extend the clip or lower the longest blend."
+            f"{'; '.join(faults)}. Choose other frames, or use longer clips."
         )
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
 
@@ -72,13 +73,26 @@ def shortfall(source: Clip, destination: Clip, frames: Window) -> str:
     ):
         name = f"the {kind} {clip.name}" if clip.name else f"the {kind}"
         if start < 0:
-            faults.append(f"{name} lacks {-start} frames before its first (needs frame {start})")
+            faults.append(f"{name} lacks {counted(-start, 'frame')} before its first (needs frame {start})")
         if stop > clip.frames:
             faults.append(
-                f"{name} lacks {stop - clip.frames} frames after its last "
+                f"{name} lacks {counted(stop - clip.frames, 'frame')} after its last "
                 f"(needs frames to {stop - 1}, has them to {clip.frames - 1})"
             )
     return "; ".join(faults)
+
+
+def held(available: int, shortest: int, longest: int) -> tuple[int, str]:
+    """The longest length to consider where the clips supply `available` frames, and what to say of those left out.
+
+    The one rule for candidate lengths, whichever method chooses among them: what the clips don't supply is not
+    considered. Where they don't supply the shortest either, that is the one to refuse, with `shortfall`.
+    """
+    if available >= longest:
+        return longest, ""
+    if available < shortest:
+        return shortest, ""
+    return available, f"the clips supply blends of up to {counted(available, 'frame')}; {longest} were asked for"
 
 
 def longest_available(

@@ -131,4 +131,4 @@ def test_one_participant_has_strengths_without_errors() -> None:
     assert isinstance(found, BradleyTerry)
     assert all(row.standard_error is None for row in found.strengths)
     assert found.strengths[0].value is not None
-    assert "1 participants: too few" in found.note
+    assert "1 participant: too few" in found.note

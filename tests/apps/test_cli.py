@@ -150,7 +150,8 @@ def test_check_tells_the_time_and_what_is_to_be_written(capsys: pytest.CaptureFi
     found = ask(capsys, "check", "geodesic_vs_fixed", "--texts")
     assert found["problems"] == []
     assert 3 <= found["minutes"] <= found["minutes_at_most"] <= 15  # type: ignore[operator]
-    (note,) = found["notes"]  # type: ignore[misc]
+    alike, note = found["notes"]  # type: ignore[misc]
+    assert "geodesic and fixed differ by less than the just noticeable difference" in alike
     assert "consent.contact" in note
     read = {one["where"]: one["text"] for one in found["texts"]}  # type: ignore[attr-defined]
     assert f"about {found['minutes']} minutes" in read["consent.text"].replace("\n", " ")

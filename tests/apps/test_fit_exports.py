@@ -271,7 +271,7 @@ def test_a_stated_decimal_or_delimiter_is_taken(fitted: Callable[..., dict[str, 
             "expected answers p and one other, found 'p', 'q', 'r'",
         ),
         ("a,b,c\nx,y,good\n", ("rating",), "row 2, column 'c': expected a number as the rating, found 'good'"),
-        ("a,b,c\nx,y,\n", ("rating", "--method", "a"), "expected rows with c, found none in 1 rows"),
+        ("a,b,c\nx,y,\n", ("rating", "--method", "a"), "expected rows with c, found none in 1 row;"),
         ("level,c\n1,1\n", ("2afc",), "expected --level with --task 2afc"),
     ],
 )

@@ -14,7 +14,7 @@ from study.experiment.proofreading import to_do
 from study.experiment.protocol import parse_protocol
 from study.experiment.protocol_parts import Consent, Texts
 from study.experiment.session import current, open_session
-from study.experiment.wording import all_texts, duration_s, instructions_text, minutes, welcome_text
+from study.experiment.wording import FilmTimes, all_texts, duration_s, instructions_text, minutes, welcome_text
 
 LANGUAGES = languages()
 FORM = 'form = [{ name = "age", required = true }, { name = "gender" }, { name = "vision" }, { name = "animation" }]\n'
@@ -22,6 +22,7 @@ STANDARD = {
     'welcome = "Welcome."': 'welcome = "{standard}"',
     'debrief = "Thank you."': 'debrief = "{standard}"',
     'instructions = "Some pairs are the same."': 'instructions = "{standard}"',
+    'instructions = ""': 'instructions = "{standard}"',
 }
 
 
@@ -94,6 +95,43 @@ def test_slots_are_the_numbers_of_the_study(toy_protocol):
     assert "| female | male |" in read["form: gender"]
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_study_without_instructions_has_the_built_in_ones(language, toy_protocol, toy_stimuli):
+    text = f'language = "{language}"\n' + toy_protocol.text.replace('instructions = ""\n', "")
+    protocol = parse_protocol(text)
+    shown = instructions_text(protocol, protocol.study("liking"))
+    begins = words(language)["standard"]["preference"].strip().partition("{")[0]
+    assert shown.startswith(begins)
+    assert len(shown) > 100 or language == "ja"
+    steps = open_session(protocol, first_plan(protocol, toy_stimuli)).steps
+    assert shown in [step.text for step in steps if step.kind == "instructions"]
+
+
+@pytest.mark.parametrize(
+    ("language", "one", "several"),
+    [
+        ("en", "you have 1 second to say", "you have 2 seconds to say"),
+        ("de", "haben Sie 1 Sekunde, um", "haben Sie 2 Sekunden, um"),
+        ("fr", "vous avez 1 seconde pour", "vous avez 2 secondes pour"),
+        ("ja", "1秒以内", "2秒以内"),
+    ],
+)
+def test_words_go_with_their_numbers(language, one, several, toy_protocol):
+    for seconds, said in ((1, one), (2, several)):
+        text = toy_protocol.text.replace('instructions = ""', "").replace(
+            "[texts]", f"[timing]\nanswer_s = {seconds}.0\n[texts]"
+        )
+        protocol = parse_protocol(f'language = "{language}"\n{text}')
+        assert said in instructions_text(protocol, protocol.study("liking"))
+
+
+def test_a_protocols_own_texts_can_have_both_words(toy_protocol):
+    text = toy_protocol.text.replace('"Welcome."', '"{trials} {trials:task|tasks}, {studies} {studies:part|parts}"')
+    assert welcome_text(parse_protocol(text)) == "8 tasks, 2 parts"
+    with pytest.raises(ProtocolError, match=r"found {trial}; did you mean {trials}\?"):
+        parse_protocol(text.replace("{trials:task", "{trial:task"))
+
+
 def test_an_empty_contact_leaves_no_hole(toy_protocol, toy_stimuli):
     protocol = changed(toy_protocol, consent='text = "{standard}"')
     text = current(open_session(protocol, first_plan(protocol, toy_stimuli))).text
@@ -144,8 +182,11 @@ def test_malformed_parts_are_refused_and_not_filled(toy_protocol, text):
 
 def test_what_is_still_to_be_written_is_said(toy_protocol):
     assert to_do(changed(toy_protocol)) == []
-    (empty,) = to_do(toy_protocol)
-    assert empty.startswith("consent.text is empty")
+    consent, instructions = to_do(toy_protocol)
+    assert consent.startswith("consent.text is empty")
+    assert instructions.startswith("studies.liking.instructions is empty: participants see films and are not told")
+    bare = parse_protocol(toy_protocol.text.replace('welcome = "Welcome."\ndebrief = "Thank you."', ""))
+    assert [note.split(":")[0] for note in to_do(bare)][1:3] == ["texts.welcome is empty", "texts.debrief is empty"]
     (contact,) = to_do(changed(toy_protocol, consent='text = "{standard}"\ncontact = "FILL IN: who runs it"'))
     assert contact == "consent.contact says 'FILL IN: who runs it': write it before participants read it."
     (nobody,) = to_do(changed(toy_protocol, consent='text = "{standard}"'))
@@ -188,6 +229,13 @@ def test_a_sitting_lasts_as_long_as_its_parts(toy_protocol):
     assert [minutes(s) for s in (1, 60, 61, 599, 601, 960)] == [1, 1, 2, 10, 15, 20]
 
 
+def test_known_films_count_as_long_as_they_are(toy_protocol):
+    """Six trials of the first study with 10 s of films and two of the second with 20, in place of 3.2 s each."""
+    known = {"jnd": FilmTimes(10.0, 0.0), "liking": FilmTimes(20.0, 0.0)}
+    apart = duration_s(toy_protocol, films=known) - duration_s(toy_protocol)
+    assert apart == pytest.approx(6 * (10 - 3.2) + 2 * (20 - 3.2))
+
+
 def test_rated_pairs_take_the_time_of_two_films_and_have_words_of_their_own(pair_rating_protocol, rating_protocol):
     pairs, films = pair_rating_protocol.text, rating_protocol.text
     apart = duration_s(parse_protocol(pairs)) - duration_s(
@@ -195,7 +243,8 @@ def test_rated_pairs_take_the_time_of_two_films_and_have_words_of_their_own(pair
     )  # two pairs of films with a gap, two items each, against four films with two items each
     assert apart == pytest.approx(2 * (2 * 1.6 + 1 + 12 + 1) - 4 * (1.6 + 12 + 1))
     asked = 'instructions = "{standard}"'
-    own = parse_protocol(pairs.replace('show = "pair"', f'show = "pair"\n{asked}'))
+    before, after = pairs.split('show = "pair"')
+    own = parse_protocol(before + 'show = "pair"' + after.replace('instructions = ""', asked))
     assert "how the second film was, compared with the first" in instructions_text(own, own.study("compared"))
     for text, said in ((pairs, "pairs of short films"), (films, "in some parts one at a time")):
         standard = parse_protocol(text.replace('welcome = "Welcome."', 'welcome = "{standard}"'))

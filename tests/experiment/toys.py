@@ -142,6 +142,7 @@ task = "preference"
 reference = "geodesic"
 comparison = "fixed"
 question = "Which is more natural?"
+instructions = ""
 """
 
 TOY_RATING = """
@@ -152,6 +153,7 @@ reference = "geodesic"
 comparison = "cut"
 order = "by-group"
 question = "How was it?"
+instructions = ""
 
 [[studies.items]]
 name = "natural"
@@ -211,6 +213,7 @@ show = "pair"
 reference = "geodesic"
 comparison = "cut"
 order = "by-group"
+instructions = ""
 
 [[studies.items]]
 name = "better"

@@ -76,6 +76,8 @@ def test_two_walks_out_of_phase_are_joined_in_phase(make_walk):
 def test_short_clips_say_so(make_walk):
     short = make_walk(45, name="short")
     found = advise(short, short, cyclic=(True, True))
-    assert "short clips: blends of up to 24 frames" in found.note
+    assert "the clips supply blends of up to 24 frames; 60 were asked for" in found.note
+    own = blend_length(short, short, found.start_frame, found.end_frame)
+    assert (own.blend_frames, own.cost) == (found.blend_frames, found.cost)
     with pytest.raises(TransitionError, match="found 18 in tiny"):
         advise(make_walk(18, name="tiny"), make_walk(90), cyclic=(True, True))

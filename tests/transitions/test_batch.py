@@ -37,14 +37,14 @@ def test_a_range_of_lengths_is_kept(make_walk):
             [59, 99],
             "start frames from 0 to 40 in the source.*1 of 2 transitions do not, the first from 41 to 99",
         ),
-        ([0], [58], "end frames from 59 to 99"),
+        ([0], [58], "end frames from 59 to 99.*1 of 1 transition do not"),
         ([-1], [60], "first from -1 to 60"),
         ([0, 1], [60], r"as many start frames as end frames.*\(2,\) and \(1,\)"),
     ],
 )
 def test_frames_that_are_not_there_are_counted(make_walk, starts, ends, message):
     with pytest.raises(TransitionError, match=message):
-        geodesic_lengths(make_walk(100), make_walk(100), starts, ends)
+        geodesic_lengths(make_walk(100), make_walk(100), starts, ends, shortest=60)
 
 
 def test_velocity_lengths_are_those_found_one_by_one(make_walk):
@@ -55,4 +55,17 @@ def test_velocity_lengths_are_those_found_one_by_one(make_walk):
     for i, j, length, cost in zip(starts, ends, lengths, costs, strict=True):
         one = blend_length(source, destination, int(i), int(j), method="velocity", longest=30)
         assert length == one.blend_frames
+        assert cost == pytest.approx(one.cost, abs=1e-12)
+
+
+@pytest.mark.parametrize(("method", "find"), [("geodesic", geodesic_lengths), ("velocity", velocity_lengths)])
+def test_near_the_ends_of_clips_lengths_are_held_as_they_are_one_by_one(make_walk, method, find):
+    source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
+    rng = np.random.default_rng(7)
+    starts, ends = rng.integers(0, 90, 80), rng.integers(0, 80, 80)
+    starts[:2], ends[:2] = (89, 0), (0, 0)
+    lengths, costs = find(source, destination, starts, ends)
+    for i, j, length, cost in zip(starts, ends, lengths, costs, strict=True):
+        one = blend_length(source, destination, int(i), int(j), method=method)
+        assert length == one.blend_frames <= min(90 - i, j + 1)
         assert cost == pytest.approx(one.cost, abs=1e-12)

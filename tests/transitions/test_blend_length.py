@@ -5,7 +5,7 @@ import pytest
 
 from study.errors import TransitionError
 from study.motion.clip import Clip, moved, resample, trim
-from study.transitions.blend_length import blend_length, geodesic_costs, joint_costs, joint_speed
+from study.transitions.blend_length import METHODS, blend_length, geodesic_costs, joint_costs, joint_speed
 from study.transitions.distances import frame_distance
 from study.transitions.weights import joint_weights
 from study.transitions.windows import SPECIFICATIONS, longest_available, shortfall, window
@@ -127,23 +127,49 @@ def test_joints_that_stand_still_clip_the_velocity_method_and_it_says_so(make_wa
         ((50, -1), "end frame from 0 to 99 in the destination long, got -1"),
     ],
 )
-def test_what_the_clips_cannot_supply_is_counted(make_walk, frames, message):
+@pytest.mark.parametrize("method", ["geodesic", "fixed"])
+def test_what_the_clips_cannot_supply_is_counted(make_walk, frames, message, method):
     with pytest.raises(TransitionError, match=message):
-        blend_length(make_walk(100, name="short"), make_walk(100, name="long"), *frames)
+        blend_length(
+            make_walk(100, name="short"),
+            make_walk(100, name="long"),
+            *frames,
+            method=method,
+            fixed_frames=60,
+            shortest=60,
+        )
 
 
-def test_candidates_can_be_restricted_to_what_there_is(make_walk):
+def test_candidates_are_held_to_what_there_is(make_walk):
     walk = make_walk(100)
-    found = blend_length(walk, walk, 80, 90, restrict=True)
+    found = blend_length(walk, walk, 80, 90)
     assert found.lengths is not None
     assert found.lengths[-1] == 20
     assert "up to 20 frames; 60 were asked for" in found.note
-    fixed = blend_length(walk, walk, 95, 90, method="fixed", restrict=True)
-    assert (fixed.blend_frames, fixed.note) == (5, "shortened to the 5 frames that the clips supply")
-    with pytest.raises(TransitionError, match=r"fixed blend of 10 frames .* source lacks 5 frames after its last"):
-        blend_length(walk, walk, 95, 90, method="fixed")
-    with pytest.raises(TransitionError, match="lacks"):
-        blend_length(walk, walk, 80, 90, restrict=True, shortest=30)
+    fixed = blend_length(walk, walk, 95, 90, method="fixed")
+    assert (fixed.blend_frames, fixed.note) == (5, "the clips supply blends of up to 5 frames; 10 were asked for")
+    for method in METHODS:
+        last = blend_length(walk, walk, 99, 0, method=method)
+        assert last.blend_frames == 1
+    with pytest.raises(TransitionError, match=r"blends of up to 30 frames .* source lacks 10 frames after its last"):
+        blend_length(walk, walk, 80, 90, shortest=30)
+
+
+def test_the_velocity_methods_length_is_held_too_and_says_what_it_gave(make_walk):
+    source, destination = make_walk(100), make_walk(100, phase=2.0)
+    free = blend_length(source, destination, 40, 67, method="velocity")
+    assert 5 < free.blend_frames < 60
+    cut = trim(source, 0, 40 + free.blend_frames - 3)
+    held = blend_length(cut, destination, 40, 67, method="velocity")
+    assert held.blend_frames == free.blend_frames - 3
+    assert held.unclipped_s == pytest.approx(free.unclipped_s)
+    assert f"blends of up to {held.blend_frames} frames; {free.blend_frames} were asked for" in held.note
+
+
+@pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
+def test_the_fixed_length_is_a_third_of_a_second_at_any_rate(make_walk, fps):
+    walk = make_walk(400, fps)
+    assert blend_length(walk, walk, 100, 300, method="fixed").blend_frames == round(fps / 3)
 
 
 @pytest.mark.parametrize("specification", SPECIFICATIONS)

@@ -211,7 +211,7 @@ def test_each_blend_has_the_length_of_the_geodesic_method() -> None:
     blends = geodesic_blends(a, b, weights, 3, 20)
     assert (blends.counts[38:] >= 2**29).all()
     for i, j in ((0, 0), (5, 17), (12, 3), (18, 25)):
-        one = blend_length(a, b, i, j, method="geodesic", shortest=3, longest=20, specification="left", restrict=True)
+        one = blend_length(a, b, i, j, method="geodesic", shortest=3, longest=20, specification="left")
         assert blends.counts[i, j] * UNIT == pytest.approx(one.cost, abs=UNIT)
         assert one.costs is not None
         assert one.costs[blends.lengths[i, j] - 3] == pytest.approx(one.cost, abs=2 * UNIT)

@@ -120,7 +120,8 @@ class Host:
         record = session_by_id(self.responses, participant.session_id)
         before = stored_answers(self.responses, record.id)
         passed = steps_passed(self.responses, record)
-        state = views.to_view(flow.open_session(self.protocol, record.plan, before, passed=passed))
+        frames = {known.id: known.frames for known in self.manifest.records}
+        state = views.to_view(flow.open_session(self.protocol, record.plan, before, passed=passed, frames=frames))
         return Sitting(record, participant, state, {(a.trial, a.item, a.attempt): a for a in before})
 
     async def begin(self, token: str, message: Begin) -> tuple[dict[str, Any], str]:

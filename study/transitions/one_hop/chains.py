@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.transitions.one_hop.build import MEMORY_BYTES
 from study.transitions.one_hop.play import Step
@@ -78,8 +79,8 @@ class _Search:
     def __init__(self, problem: Problem, switch: Switch, hops: int, memory_bytes: int) -> None:
         if hops < 1 or switch.alignment.offset is None or problem.settings.longest_stay_both is not None:
             raise TransitionError(
-                f"Expected at least one hop, an alignment by an offset and no bound on both stays, got {hops} hops, "
-                f"{switch.alignment} and a bound of {problem.settings.longest_stay_both}."
+                "Expected at least one hop, an alignment by an offset and no bound on both stays, got "
+                f"{counted(hops, 'hop')}, {switch.alignment} and a bound of {problem.settings.longest_stay_both}."
             )
         if problem.offsets or problem.hop_costs or problem.nearest_to_direct is not None:
             raise TransitionError("Expected a problem without rules for single hops; chains of hops don't take them.")
@@ -92,7 +93,8 @@ class _Search:
         needed = 4 * total * (total + (hops + 1) * times)
         if needed > memory_bytes:
             raise TransitionError(
-                f"Expected to need at most {memory_bytes / 2**30:.1f} GB, a search over chains of {total} hop frames "
+                f"Expected to need at most {memory_bytes / 2**30:.1f} GB, a search over chains of "
+                f"{counted(total, 'hop frame')} "
                 f"needs {needed / 2**30:.1f} GB. Give fewer or shorter hops, or more memory."
             )
         distance = problem.distance

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem
 from study.transitions.one_hop.table import Entry
@@ -51,7 +52,8 @@ def connect(problem: Problem, source: int, destination: int) -> Connection:
         clip = problem.clips[number]
         if clip.frames < blend:
             raise TransitionError(
-                f"Expected clips of at least {blend} frames, the blend, {clip.name or number} has {clip.frames}."
+                f"Expected clips of at least {counted(blend, 'frame')}, the blend, {clip.name or number} has "
+                f"{clip.frames}."
             )
     last = problem.clips[source].frames - blend
     prepared = {n: distance.prepare(problem.clips[n], blend) for n in {source, destination, *problem.hop_numbers}}

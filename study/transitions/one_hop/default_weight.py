@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.transitions.one_hop.build import MEMORY_BYTES, build_table
@@ -96,7 +97,8 @@ def draw_condition(clips: Sequence[Clip], settings: Settings, rng: np.random.Gen
     able = [number for number, clip in enumerate(clips) if clip.frames >= blend]
     if len(able) < 2:
         raise TransitionError(
-            f"Expected at least two clips of {blend} frames or more, the blend, found {len(able)} of {len(clips)}."
+            f"Expected at least two clips of {counted(blend, 'frame')} or more, the blend, found {len(able)} "
+            f"of {len(clips)}."
         )
     source, destination = (int(number) for number in rng.choice(able, 2, replace=False))
     stays = settings.longest_stay_source + settings.longest_stay_hop

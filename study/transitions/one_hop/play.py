@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions, moved, retarget, trim
 from study.transitions.blending import blend_weights, slerp_one_way
@@ -268,7 +269,7 @@ def _direct_steps(
     lengths = tape.clips[tape.number].frames, tape.clips[destination].frames
     if frame + table.blend_frames > lengths[0] or not 0 <= frame - offset <= lengths[1] - table.blend_frames:
         raise TransitionError(
-            f"Expected {table.blend_frames} frames for a direct transition at frame {frame} of "
+            f"Expected {counted(table.blend_frames, 'frame')} for a direct transition at frame {frame} of "
             f"{table.clips[tape.number]} and frame {frame - offset} of {table.clips[destination]}, which have "
             f"{lengths[0]} and {lengths[1]} frames. Trigger it at another frame."
         )
