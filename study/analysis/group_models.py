@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FEWEST_FOR_GEE = 4
+NO_ORDER = "without a term for the order of presentation, which is not known or never changed"
 
 
 def preference_models(part: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]:
@@ -48,6 +49,9 @@ def preference_models(part: pd.DataFrame, confidence: float = 0.95) -> dict[str,
     who = part["participant"].astype(str).to_numpy()
     mixed = _mixed(design, chosen, who, confidence)
     gee = _gee(design, chosen, who, confidence)
+    if order is None:
+        for model in (mixed, gee):
+            model["note"] = "; ".join(filter(None, (model["note"], NO_ORDER)))
     return {"mixed": mixed, "gee": gee, "differ": _differ(mixed, gee)}
 
 

@@ -104,12 +104,14 @@ def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Serie
 
 def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
     """Preferences and ratings, through the analysis of our own studies; `answer` in words."""
+    from study.analysis.preference import strengths_in_words
     from study.analysis.rating_comparisons import anova_sentences
     from study.analysis.summary import analyse
 
     alpha = options["alpha"] or 0.05
     result = analyse(found.table, confidence=options["confidence"], alpha=alpha)
     said = [compared["answer"] for study in result["preference"].values() for compared in study]
+    said += [strengths_in_words(found) for found in result["bradley_terry"].values() if found]
     for questions in result["rating_anova"].values():
         said += anova_sentences(questions, alpha)
     for row in (row for rows in result["ratings"].values() for row in rows):
