@@ -4,8 +4,8 @@
 
 Answers come in, strengths with standard errors go out (Davidson & Beaver 1977; Agresti 2013, section 11.6). Where it is
 known who answered, standard errors are those of participants (the sandwich of Liang & Zeger 1986), not of answers. A
-tie counts half for each side. Estimates are those of maximum likelihood. Where a method never loses, its strength has no
-maximum; linear programs find which differences are finite (Konis 2007), and those are estimated.
+tie counts half for each side. Estimates are those of maximum likelihood. Where a method never loses, the likelihood has
+no maximum; linear programs find which differences are finite (Konis 2007), and those are estimated.
 """
 
 from __future__ import annotations

@@ -350,7 +350,12 @@ def _order_in_words(method_a: str, method_b: str, order: dict[str, Any], alpha: 
 
 
 def _in_words(
-    method_a: str, method_b: str, published: Published, participants: dict[str, Any], order: dict[str, Any], alpha: float
+    method_a: str,
+    method_b: str,
+    published: Published,
+    participants: dict[str, Any],
+    order: dict[str, Any],
+    alpha: float,
 ) -> str:
     """Who was favoured, how often, whether it can be told from chance, and what the order had to do with it."""
     if published.percent is None:

@@ -266,15 +266,17 @@ def anova_sentences(questions: list[dict[str, Any]], alpha: float) -> list[str]:
     found = []
     for question in questions:
         name = question["item"] or "rating"
-        for row in question["anova"]:
-            if row.get("f") is not None:
-                found.append(
-                    f"{name}: {row['source']} F({row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}) = "
-                    f"{row['f']:.2f}, MS = {row['mean_square']:.2f}, {_verdict(row['p_value'], alpha)}"
-                )
+        found += [
+            f"{name}: {row['source']} F({row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}) = "
+            f"{row['f']:.2f}, MS = {row['mean_square']:.2f}, {_verdict(row['p_value'], alpha)}"
+            for row in question["anova"]
+            if row.get("f") is not None
+        ]
         if len(question["differences"]) > 1:
             found.append(f"{name}: {omnibus_in_words(question, alpha)}")
-        found += [f"{name}: {difference_in_words(row, alpha)}" for row in question["differences"] if row["participants"]]
+        found += [
+            f"{name}: {difference_in_words(row, alpha)}" for row in question["differences"] if row["participants"]
+        ]
     return found
 
 

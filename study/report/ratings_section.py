@@ -167,8 +167,8 @@ def _omnibus(question: Result) -> list[str]:
     ranks = question["ranks"]["participants"]
     effects = [row for row in question["mixed_design"]["effects"] if row["source"] == "method"]
     found = [
-        f"all methods over participants {_f({**row, 'p_value': row['corrected_p_value']})} (corrected by Greenhouse and "
-        "Geisser)"
+        f"all methods over participants {_f({**row, 'p_value': row['corrected_p_value']})} (corrected by Greenhouse "
+        "and Geisser)"
         for row in effects
     ]
     return [*found, *([f"by ranks (Friedman) {words.p(ranks['p_value'])}"] if ranks else [])]

@@ -74,7 +74,10 @@ def test_three_methods_are_tested_together_and_in_pairs() -> None:
     from statsmodels.stats.anova import AnovaRM
 
     rng = np.random.default_rng(4)
-    values = {name: [round(float(x), 2) for x in rng.normal(mean, 15, 16)] for name, mean in zip("abc", (30, 45, 60), strict=True)}
+    values = {
+        name: [round(float(x), 2) for x in rng.normal(mean, 15, 16)]
+        for name, mean in zip("abc", (30, 45, 60), strict=True)
+    }
     section = section_of(values)
     table = ratings_of(values).astype({"answer": float})
     expected = AnovaRM(table, "answer", "participant", within=["method_a"]).fit().anova_table.iloc[0]["F Value"]
