@@ -160,7 +160,9 @@ def _finite(design: FloatArray, yes: FloatArray, total: FloatArray, contrasts: F
     signed = np.unique(np.concatenate([design[yes > 0], -design[yes < total]]), axis=0)
 
     def highest(aim: FloatArray) -> float:
-        return -float(linprog(-aim, A_ub=-signed, b_ub=np.zeros(len(signed)), bounds=(-1, 1)).fun)
+        found = linprog(-aim, A_ub=-signed, b_ub=np.zeros(len(signed)), bounds=(-1, 1)).fun
+        assert found is not None, "no step at all is always allowed"
+        return -float(found)
 
     if highest(signed.sum(axis=0)) < 1e-7:
         return np.ones(len(contrasts), dtype=bool)
