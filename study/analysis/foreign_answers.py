@@ -182,9 +182,9 @@ def _ratings(answer: pd.Series[str], columns: AnswerColumns) -> pd.Series[float]
     """Points of the scale, from numbers or from the words that stand for them."""
     points = {word.strip().lower(): f"{point:g}" for word, point in columns.scale}
     text = answer.str.lower().map(points).fillna(answer) if points else answer
-    words = sorted(set(text[text.str.fullmatch(r".*[^\W\d_]{2,}.*")]))
-    if words:
-        first = text[text.isin(words)]
+    first = text[text.str.contains(r"[^\W\d_]") & ~text.str.fullmatch(r"[-+]?[\d.,]+[eE][-+]?\d+")]
+    if len(first):
+        words = sorted(set(first))
         asked = " ".join(f'--scale "{word}=..."' for word in words[:12])
         raise AnalysisError(
             f"row {row_of(first)}, column {columns.answer!r}: expected a number as the rating, found "
@@ -205,10 +205,10 @@ def _refuse_off_scale(answer: pd.Series[str], rating: pd.Series[float], columns:
                 f"{answer[off[0]]!r}; correct it, or take other rows with --where"
             )
         return
-    coded = rating.isin(CODES)
-    others = rating[rating.notna() & ~coded]
-    if coded.any() and len(others) and (others.max() < rating[coded].abs().min() / 5) and others.min() >= 0:
-        row = answer[coded]
+    others = rating[rating.notna() & ~rating.isin(CODES)]
+    far = (rating > 5 * others.max()) | ((rating < 0) & (others.min() >= 0))
+    row = answer[rating.isin(CODES) & far]
+    if len(row):
         raise AnalysisError(
             f"row {row_of(row)}, column {columns.answer!r}: expected ratings like the others ({others.min():g} to "
             f"{others.max():g}), found {row.iloc[0]!r}, which looks like a code for no answer; empty such cells, or "

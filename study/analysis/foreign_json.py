@@ -7,6 +7,7 @@ file, or one trial a line. Lists may stand in objects under a name such as `tria
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 from study.errors import AnalysisError
@@ -15,6 +16,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 HOLDERS = ("trials", "data", "results")
+
+
+def looks_like_json(text: str) -> bool:
+    """Return whether a text begins as JSON does, and not as a table whose first heading has a bracket."""
+    return re.match(r'\s*(\[\s*["\[{\]]|\{\s*["}])', text) is not None
 
 
 def parse_json(text: str) -> pd.DataFrame:

@@ -36,7 +36,7 @@ def read_table(path: Path, needed: tuple[str, ...], delimiter: str | None = None
     AnalysisError
         When it can't be read as one.
     """
-    from study.analysis.foreign_json import parse_json
+    from study.analysis.foreign_json import looks_like_json, parse_json
     from study.analysis.foreign_text import decoded, parse_table
 
     try:
@@ -44,7 +44,7 @@ def read_table(path: Path, needed: tuple[str, ...], delimiter: str | None = None
     except OSError as error:
         raise AnalysisError(f"expected a table, found a file that can't be read: {error}") from error
     text = decoded(content)
-    return parse_json(text) if text.lstrip()[:1] in ("[", "{") else parse_table(text, needed, delimiter)
+    return parse_json(text) if looks_like_json(text) else parse_table(text, needed, delimiter)
 
 
 def _scale(given: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
