@@ -4,7 +4,8 @@
 
 Answers come in, strengths with standard errors go out (Davidson & Beaver 1977; Agresti 2013, section 11.6). Where it is
 known who answered, standard errors are those of participants (the sandwich of Liang & Zeger 1986), not of answers. A
-tie counts half for each side.
+tie counts half for each side. Estimates are those of maximum likelihood. Where a method never loses, the likelihood has
+no maximum; linear programs find which differences are finite (Konis 2007), and those are estimated.
 """
 
 from __future__ import annotations
@@ -88,7 +89,8 @@ def fit_bradley_terry(
     with_order
         Whether coming first may matter.
     reference
-        The method whose strength is 0; the first by name unless given.
+        The method whose strength is 0; unless given, the first by name of those that most others are finitely apart
+        from.
     participants : sequence of str, shape (rows,)
         Who answered; every answer counts as independent where left out.
 
@@ -101,21 +103,71 @@ def fit_bradley_terry(
     methods = sorted({*first, *second})
     if len(methods) < 2 or total.sum() == 0:
         return "fewer than two methods were compared"
-    held = methods[0] if reference is None else reference
-    if held not in methods:
-        raise AnalysisError(f"expected one of the methods {', '.join(methods)} as reference, found {held!r}")
-    others = [method for method in methods if method != held]
-    design = np.zeros((len(yes), len(others) + with_order))
-    for row, (one, other) in enumerate(zip(first, second, strict=True)):
-        for method, sign in ((one, 1.0), (other, -1.0)):
-            if method != held:
-                design[row, others.index(method)] += sign
+    if reference is not None and reference not in methods:
+        raise AnalysisError(f"expected one of the methods {', '.join(methods)} as reference, found {reference!r}")
+    design = np.zeros((len(yes), len(methods)))
+    for row, names in enumerate(zip(first, second, strict=True)):
+        for method, sign in zip(names, (1.0, -1.0), strict=True):
+            design[row, methods.index(method)] += sign
+    if np.linalg.matrix_rank(design[total > 0]) < len(methods) - 1:
+        return "the methods are not linked by comparisons: strengths can't be told"
+    note = ""
     if with_order:
-        design[:, -1] = 1.0
-    if np.linalg.matrix_rank(design[total > 0]) < design.shape[1]:
-        return "the methods are not linked by comparisons, or the order never changed: strengths can't be told"
+        every = np.column_stack([design, np.ones(len(yes))])
+        note = _why_no_order(every, yes, total)
+        if note == DECIDED:
+            return note
+        design = design if note else every
+    apart = _differences_finite(design, yes, total, len(methods))
+    place = int(np.argmax(apart.sum(axis=1))) if reference is None else methods.index(reference)
     groups = None if participants is None else np.unique(np.asarray(participants), return_inverse=True)[1]
-    return _fitted(design, yes, total, others, held, groups, confidence)
+    told = np.append(np.delete(apart[place], place), np.ones(design.shape[1] - len(methods), dtype=bool))
+    others = [method for method in methods if method != methods[place]]
+    columns = np.delete(design, place, axis=1)
+    return _fitted(columns, yes, total, others, methods[place], groups, confidence, told, note)
+
+
+DECIDED = "every answer went to the same place in the order of presentation: nothing can be said about the methods"
+
+
+def _why_no_order(design: FloatArray, yes: FloatArray, total: FloatArray) -> str:
+    """Why the effect of the order, the last column, can't be estimated beside strengths; empty where it can."""
+    if np.linalg.matrix_rank(design[total > 0]) < design.shape[1] - 1:
+        return "no two methods were shown in both orders: an effect of the order can't be told, and is left out"
+    if yes.sum() in (0.0, total.sum()):
+        return DECIDED
+    if not _finite(design, yes, total, np.eye(design.shape[1])[-1:])[0]:
+        return "the effect of the order can't be told from the strengths by these answers, and is left out"
+    return ""
+
+
+def _differences_finite(design: FloatArray, yes: FloatArray, total: FloatArray, methods: int) -> NDArray[np.bool_]:
+    """Which strengths are finitely apart, shape (methods, methods)."""
+    pairs = np.array(np.triu_indices(methods, 1)).T
+    contrasts = np.zeros((len(pairs), design.shape[1]))
+    contrasts[np.arange(len(pairs)), pairs[:, 0]], contrasts[np.arange(len(pairs)), pairs[:, 1]] = 1.0, -1.0
+    found = np.eye(methods, dtype=bool)
+    found[pairs[:, 0], pairs[:, 1]] = found[pairs[:, 1], pairs[:, 0]] = _finite(design, yes, total, contrasts)
+    return found
+
+
+def _finite(design: FloatArray, yes: FloatArray, total: FloatArray, contrasts: FloatArray) -> NDArray[np.bool_]:
+    """Which contrasts of the effects have a finite maximum of likelihood.
+
+    The likelihood does not fall along a direction that goes with every answer; what changes along one is not finite.
+    """
+    from scipy.optimize import linprog
+
+    signed = np.unique(np.concatenate([design[yes > 0], -design[yes < total]]), axis=0)
+
+    def highest(aim: FloatArray) -> float:
+        found = linprog(-aim, A_ub=-signed, b_ub=np.zeros(len(signed)), bounds=(-1, 1)).fun
+        assert found is not None, "no step at all is always allowed"
+        return -float(found)
+
+    if highest(signed.sum(axis=0)) < 1e-7:
+        return np.ones(len(contrasts), dtype=bool)
+    return np.array([max(highest(one), highest(-one)) < 1e-7 for one in contrasts])
 
 
 def _fitted(
@@ -126,6 +178,8 @@ def _fitted(
     held: str,
     groups: NDArray[np.intp] | None,
     confidence: float,
+    told: NDArray[np.bool_],
+    note: str,
 ) -> BradleyTerry:
     from scipy.special import expit, xlogy
 
@@ -144,20 +198,25 @@ def _fitted(
     best = maximise(value, scores, np.zeros((1, size)), np.full(size, -WIDEST), np.full(size, WIDEST))
     point = best.point[0]
     _, information = scores(point[None], np.zeros(1, dtype=np.intp))
-    errors = _errors(information[0], (yes - total * share(point[None])[0])[:, None] * design, groups)
+    errors = np.full(size, np.nan)
+    scored = (yes - total * share(point[None])[0])[:, None] * design
+    errors[told] = _errors(information[0][np.ix_(told, told)], scored[:, told], groups)
     people = None if groups is None else int(groups.max()) + 1
     times = normal_quantile(confidence) if people is None else t_quantile(confidence, max(people - 1, 1))
     # By place, not by name: a method may well be called "order".
     found = [
-        _strength(name, float(at), float(error), times, confidence)
-        for name, at, error in zip([*others, "order"], point, errors, strict=False)
+        _strength(name, float(at) if finite else None, float(error), times, confidence)
+        for name, at, finite, error in zip([*others, "order"], point, told, errors, strict=False)
     ]
     order = found.pop() if size > len(others) else None
     ranked = [*zip(point, found, strict=False), (0.0, Strength(held, 0.0, None, Interval(0.0, 0.0, confidence)))]
     ranked.sort(key=lambda pair: -pair[0])
     every = (*found, *([order] if order else []))
     endless = [row.method for row in every if row.value is None]
-    notes = [f"always or never favoured, so without a finite strength: {', '.join(endless)}"] if endless else []
+    notes = [note] if note else []
+    if endless:
+        one_way = f"the answers for or against it all go one way, so its distance from {held} has no finite estimate"
+        notes.append(f"{', '.join(endless)}: {one_way}")
     if any(row.value is not None and row.standard_error is None for row in every):
         notes.append(f"{counted(people or 0, 'participant')}: too few, or too much alike, for standard errors")
     # Rows may hold single answers: the saturated model is one share for every pair and order.
@@ -183,24 +242,20 @@ def _fitted(
 def _errors(information: FloatArray, scores: FloatArray, groups: NDArray[np.intp] | None) -> FloatArray:
     """Standard errors: of independent answers, or of participants; NaN where these are no more than the strengths."""
     inverse = np.linalg.pinv(information)
-    single = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     if groups is None:
-        return np.asarray(single, dtype=np.float64)
+        return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)), dtype=np.float64)
     people = int(groups.max()) + 1
     if people <= len(inverse):
         return np.full(len(inverse), np.nan)
     sums = np.zeros((people, scores.shape[1]))
     np.add.at(sums, groups, scores)
     spread = np.diag(inverse @ (sums.T @ sums) @ inverse) * people / (people - 1)
-    # Where strengths grow without end the scores vanish, and with them what would show it.
-    return np.asarray(np.where(single > 50, single, np.sqrt(np.maximum(spread, 0.0))), dtype=np.float64)
+    return np.asarray(np.sqrt(np.maximum(spread, 0.0)), dtype=np.float64)
 
 
-def _strength(name: str, value: float, error: float, times: float, confidence: float) -> Strength:
-    """A strength, or none where it grows without end; without a standard error where nothing tells it."""
-    if abs(value) > 0.9 * WIDEST or error > 50:
-        return Strength(name, None, None, Interval(None, None, confidence))
+def _strength(name: str, value: float | None, error: float, times: float, confidence: float) -> Strength:
+    """A strength, or none where it has no finite estimate; without a standard error where nothing tells it."""
     # Participants who answer just alike leave no spread that could be judged by.
-    if not np.isfinite(error) or error < 1e-9:
+    if value is None or not np.isfinite(error) or error < 1e-9:
         return Strength(name, value, None, Interval(None, None, confidence))
     return Strength(name, value, error, Interval(value - times * error, value + times * error, confidence))

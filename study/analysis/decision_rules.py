@@ -135,7 +135,8 @@ def fit_independent(counts: Counts, level: float = 0.75) -> Independent | None:
 def compare_rules(independent: Independent | None, differencing_log_likelihood: float | None) -> dict[str, Any]:
     """Return which rule the answers speak for; both have as many parameters, so the likelihoods stand as they are."""
     if independent is None or differencing_log_likelihood is None:
-        return {"independent": None, "log_likelihood_gain": None, "answer": "No rule can be fitted."}
+        text = "No rule can be fitted."
+        return {"independent": None, "log_likelihood_gain": None, "answer": text, "note": text}
     gain = differencing_log_likelihood - independent.log_likelihood
     if abs(gain) < DECIDED:
         text = "The answers do not tell the two rules apart"
@@ -143,7 +144,10 @@ def compare_rules(independent: Independent | None, differencing_log_likelihood: 
         better = "differencing" if gain > 0 else "independent observations"
         text = f"The answers speak for {better}"
     text += f" (log likelihood of differencing less that of independent observations: {gain:+.1f})."
-    return {"independent": estimates.plain(independent), "log_likelihood_gain": gain, "answer": text}
+    unreached = [side for side, frames in independent.thresholds.items() if frames is None]
+    note = f"not reached within the levels by that of independent observations: {', '.join(unreached)}"
+    found = {"independent": estimates.plain(independent), "log_likelihood_gain": gain, "answer": text}
+    return {**found, "note": note if unreached else ""}
 
 
 # Does the order matter?

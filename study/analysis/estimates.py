@@ -76,12 +76,15 @@ class Clustering:
         independent answers.
     effective_answers
         The answers divided by the design effect.
+    note
+        Why nothing can be given; empty where all can.
     """
 
     intraclass_correlation: float | None
     answers_per_participant: float | None
     design_effect: float | None
     effective_answers: float | None
+    note: str = ""
 
 
 def normal_quantile(confidence: float) -> float:
@@ -202,17 +205,19 @@ def clustering(successes: ArrayLike, trials: ArrayLike) -> Clustering:
     yes, shown = yes[shown > 0], shown[shown > 0]
     groups, total = len(shown), float(shown.sum())
     if groups < 2 or total <= groups:
-        return Clustering(None, None, None, None)
+        return Clustering(None, None, None, None, "fewer than two participants, or one answer each: no telling")
     share, pooled = yes / shown, float(yes.sum()) / total
     between = float((shown * (share - pooled) ** 2).sum()) / (groups - 1)
     within = float((shown * share * (1 - share)).sum()) / (total - groups)
     size = (total - float((shown**2).sum()) / total) / (groups - 1)
     spread = between + (size - 1) * within
     if spread <= 1e-12:
-        return Clustering(None, size, None, None)
+        return Clustering(None, size, None, None, "all answers alike: there is no variance to divide")
     correlation = (between - within) / spread
     effect = max(1 + (size - 1) * correlation, 0.0)
-    return Clustering(correlation, size, effect, total / effect if effect > 0 else None)
+    if effect <= 0:
+        return Clustering(correlation, size, effect, None, "participants are all alike, more than chance would have it")
+    return Clustering(correlation, size, effect, total / effect)
 
 
 def holm(p_values: ArrayLike) -> FloatArray:

@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 
 MOST_ROUNDS = 60
 CLOSE_ENOUGH = 1e-6
+ADMISSIBLE = 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,8 @@ def estimating_equations(design: ArrayLike, yes: ArrayLike, who: ArrayLike) -> E
     Notes
     -----
     Scale and correlation are moment estimates with the number of effects taken off the numbers of answers and of pairs
-    of answers.
+    of answers. The correlation is kept where all answers of a participant can have it: above -1 / (answers - 1) of the
+    participant with most answers, and below 1. The standard errors hold whatever the correlation.
     """
     rows, answers = np.asarray(design, dtype=np.float64), np.asarray(yes, dtype=np.float64)
     people = np.asarray(who)
@@ -94,8 +96,10 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _mean(values: FloatArray, rows: FloatArray) -> FloatArray:
+    from scipy.special import expit
+
     # Kept off 0 and 1, where a residual could not be scaled.
-    return np.asarray(1 / (1 + np.exp(-(rows @ values).clip(-25, 25))))
+    return np.asarray(expit((rows @ values).clip(-25, 25)), dtype=np.float64)
 
 
 def _independent(rows: FloatArray, answers: FloatArray) -> FloatArray:
@@ -116,8 +120,11 @@ def _correlation(values: FloatArray, rows: FloatArray, answers: FloatArray, grou
     residuals = (answers - mean) / np.sqrt(mean * (1 - mean))
     products = sum((residuals[own].sum() ** 2 - (residuals[own] ** 2).sum()) / 2 for own in groups)
     pairs = sum(len(own) * (len(own) - 1) / 2 for own in groups) - rows.shape[1]
-    scale = float((residuals**2).sum()) / (len(answers) - rows.shape[1])
-    return float(products) / pairs / scale if pairs > 0 and scale > 0 else 0.0
+    scale = float((residuals**2).sum()) / max(len(answers) - rows.shape[1], 1)
+    if pairs <= 0 or scale <= 0:
+        return 0.0
+    most = max(len(own) for own in groups)
+    return float(np.clip(products / pairs / scale, -ADMISSIBLE / max(most - 1, 1), ADMISSIBLE))
 
 
 def _sums(

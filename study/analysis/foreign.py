@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from study.analysis.foreign_words import BLANK, NO, YES
 from study.counting import counted
 from study.errors import AnalysisError
 
@@ -21,17 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TASKS = ("2afc", "yes-no", "same-different")
-YES = {
-    "2afc": ("1", "true", "correct", "right", "yes", "hit"),
-    "yes-no": ("1", "true", "yes", "y", "seen", "present"),
-    "same-different": ("different", "d", "diff", "1", "true"),
-}
-NO = {
-    "2afc": ("0", "false", "incorrect", "wrong", "no", "miss"),
-    "yes-no": ("0", "false", "no", "n", "unseen", "absent"),
-    "same-different": ("same", "s", "0", "false"),
-}
-BLANK = ("", "nan", "none", "null", "na", "n/a")
+# Larger and smaller numbers are slips, and their squares are past what a computer counts with.
+LARGEST, SMALLEST, MOST_ANSWERS = 1e12, 1e-12, 1_000_000
 
 
 @dataclass(frozen=True)
@@ -163,6 +155,7 @@ def numbers(text: pd.Series[str], name: str, means: str, decimal: str | None = N
     """
     import pandas as pd
 
+    text = text.str.replace("\u2212", "-", regex=False)
     given = text[text != ""]
     if decimal == "comma" or (decimal is None and _has_decimal_commas(given, name)):
         text = text.where(~text.str.fullmatch(_WITH_COMMA), text.str.replace(",", ".", regex=False))
@@ -172,6 +165,13 @@ def numbers(text: pd.Series[str], name: str, means: str, decimal: str | None = N
         raise AnalysisError(
             f"row {row_of(strange)}, column {name!r}: expected a number as the {means}, found {strange.iloc[0]!r}; "
             "correct it, or take other rows with --where"
+        )
+    size = found.abs()
+    unusual = text[(size > LARGEST) | ((size > 0) & (size < SMALLEST))]
+    if len(unusual):
+        raise AnalysisError(
+            f"row {row_of(unusual)}, column {name!r}: expected a {means} between {SMALLEST:g} and {LARGEST:g} in size, "
+            f"or 0, found {unusual.iloc[0]!r}; correct it, or write all in another unit"
         )
     return found
 
@@ -283,6 +283,10 @@ def _answers(
             f"row {row_of(wrong)}: expected at most {columns.shown} answers, found {wrong.iloc[0]} of "
             f"{shown[wrong.index[0]]:g}"
         )
+    if shown.sum() > MOST_ANSWERS:
+        raise AnalysisError(
+            f"expected at most {MOST_ANSWERS:,} answers in all, found {shown.sum():,.0f}; check --shown"
+        )
     return count, shown
 
 
@@ -299,14 +303,15 @@ def _understood(answer: pd.Series[str], columns: Columns, task: str) -> pd.Serie
                 "--yes what counts as right, yes or different"
             )
         return found.astype(float)
-    strange = answer[~text.isin([*YES[task], *NO[task]])]
+    right, wrong = YES[task].split(), NO[task].split()
+    strange = answer[~text.isin([*right, *wrong])]
     if len(strange):
         counts_as = {"2afc": "right", "yes-no": "yes"}.get(task, "different")
         raise AnalysisError(
-            f"row {row_of(strange)}, column {columns.answer!r}: expected {YES[task][0]} or {NO[task][0]} (or such "
+            f"row {row_of(strange)}, column {columns.answer!r}: expected {right[0]} or {wrong[0]} (or such "
             f"words), found {strange.iloc[0]!r}; say with --yes which of {few(answer)} counts as {counts_as}"
         )
-    return text.isin(YES[task]).astype(float)
+    return text.isin(right).astype(float)
 
 
 def few(answer: pd.Series[str]) -> str:

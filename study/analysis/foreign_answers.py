@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis.foreign import column, few, numbers, row_of, taken
+from study.analysis.foreign_words import FIRST, SECOND
 from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FIRST = ("first", "1", "left")
-SECOND = ("second", "2", "right")
+# Numbers that questionnaires write where there is no answer.
+CODES = (-9.0, -99.0, -999.0, 99.0, 999.0, 9999.0)
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,10 @@ class AnswerColumns:
         Rows to take: pairs of column and value.
     decimal
         "point" or "comma" in ratings; found out where None.
+    scale
+        Rating: the points that words stand for, pairs of a word and a number.
+    ends
+        Rating: the lowest and the highest point of the scale; not known where None.
     """
 
     answer: str
@@ -56,6 +61,8 @@ class AnswerColumns:
     tie: tuple[str, ...] = ()
     where: tuple[tuple[str, str], ...] = ()
     decimal: str | None = None
+    scale: tuple[tuple[str, float], ...] = ()
+    ends: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +136,8 @@ def _chose_first(
             )
         one, other = text.isin(yes), text.isin(others)
     else:
-        one = text.isin(FIRST) | (text == first.str.lower())
-        other = text.isin(SECOND) | (text == second.str.lower())
+        one = text.isin(FIRST.split()) | (text == first.str.lower())
+        other = text.isin(SECOND.split()) | (text == second.str.lower())
     found[one.to_numpy()], found[other.to_numpy()], found[ties.to_numpy()] = 1.0, 0.0, 0.5
     strange = answer[(text != "") & np.isnan(found)]
     if len(strange):
@@ -154,14 +161,14 @@ def read_ratings(table: pd.DataFrame, columns: AnswerColumns) -> ForeignAnswers:
     Raises
     ------
     AnalysisError
-        When a column is missing, or a rating is not a number.
+        When a column is missing, or a rating is no number and no word of the scale, or lies off the scale.
     """
     rows = len(table)
     table = taken(table, columns.where)
     if columns.method is not None:
         table = table[column(table, columns.method, "method") != ""]
     answer = column(table, columns.answer, "rating")
-    rating = numbers(answer, columns.answer, "rating", columns.decimal)
+    rating = _ratings(answer, columns)
     if not rating.notna().any():
         raise _nothing(columns.answer, rows)
     found = _common(table, columns, "rating", answer)
@@ -170,6 +177,44 @@ def read_ratings(table: pd.DataFrame, columns: AnswerColumns) -> ForeignAnswers:
     if columns.item:
         found["item"] = column(table, columns.item, "question")
     return _counted(found, rows, rating.notna())
+
+
+def _ratings(answer: pd.Series[str], columns: AnswerColumns) -> pd.Series[float]:
+    """Points of the scale, from numbers or from the words that stand for them."""
+    points = {word.strip().lower(): f"{point:g}" for word, point in columns.scale}
+    text = answer.str.lower().map(points).fillna(answer) if points else answer
+    first = text[text.str.contains(r"[^\W\d_]") & ~text.str.fullmatch(r"[-+]?[\d.,]+[eE][-+]?\d+")]
+    if len(first):
+        words = sorted(set(first))
+        asked = " ".join(f'--scale "{word}=..."' for word in words[:12])
+        raise AnalysisError(
+            f"row {row_of(first)}, column {columns.answer!r}: expected a number as the rating, found "
+            f"{first.iloc[0]!r}; give each word its point of the scale: {asked}, or take other rows with --where"
+        )
+    rating = numbers(text, columns.answer, "rating", columns.decimal)
+    _refuse_off_scale(answer, rating, columns)
+    return rating
+
+
+def _refuse_off_scale(answer: pd.Series[str], rating: pd.Series[float], columns: AnswerColumns) -> None:
+    """Ratings outside the ends that were given; else codes for no answer that lie far from all others."""
+    if columns.ends is not None:
+        low, high = columns.ends
+        if off := list(rating.index[(rating < low) | (rating > high)]):
+            raise AnalysisError(
+                f"row {row_of(answer[off])}, column {columns.answer!r}: expected ratings of {low:g} to {high:g}, found "
+                f"{answer[off[0]]!r}; correct it, or take other rows with --where"
+            )
+        return
+    others = rating[rating.notna() & ~rating.isin(CODES)]
+    far = (rating > 5 * others.max()) | ((rating < 0) & (others.min() >= 0))
+    row = answer[rating.isin(CODES) & far]
+    if len(row):
+        raise AnalysisError(
+            f"row {row_of(row)}, column {columns.answer!r}: expected ratings like the others ({others.min():g} to "
+            f"{others.max():g}), found {row.iloc[0]!r}, which looks like a code for no answer; empty such cells, or "
+            "say with --ends what the scale's lowest and highest points are"
+        )
 
 
 def _common(table: pd.DataFrame, columns: AnswerColumns, task: str, answer: pd.Series[str]) -> pd.DataFrame:

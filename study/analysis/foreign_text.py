@@ -9,32 +9,43 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from study.analysis.foreign_kinds import other_kind
 from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "space": " "}
 END = "END OF FILE"
 
 
 def decoded(content: bytes) -> str:
-    """Return the text of a file: UTF-8, or UTF-16 with its mark (as spreadsheets save "Unicode text").
+    """Return the text of a file: UTF-8, or UTF-16 (as spreadsheets save "Unicode text").
 
     Raises
     ------
     AnalysisError
-        When it is neither.
+        When it is neither; where it is another kind of file, by its name and with what to do.
     """
-    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    if found := other_kind(content):
+        raise AnalysisError(f"expected a table as text (CSV), found {found[0]}, whatever its name; {found[1]}")
+    encoding = "utf-8-sig"
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        encoding = "utf-16"
+    elif 0 in content[:2]:
+        encoding = "utf-16-be" if content[0] == 0 else "utf-16-le"
     try:
-        return content.decode(encoding)
+        text = content.decode(encoding)
     except UnicodeDecodeError as error:
         raise AnalysisError(f"expected a table of UTF-8 text: {error}; save it as CSV, UTF-8") from error
+    if "\0" in text:
+        raise AnalysisError("expected a table as text (CSV), found binary data; export it as CSV (UTF-8)")
+    return text.lstrip("\ufeff")
 
 
 def parse_table(text: str, needed: Sequence[str], delimiter: str | None = None) -> pd.DataFrame:
@@ -63,11 +74,14 @@ def parse_table(text: str, needed: Sequence[str], delimiter: str | None = None) 
     """
     import pandas as pd
 
-    mark = DELIMITERS[delimiter] if delimiter else _delimiter(text, needed)
-    records = _records(text, mark)
+    stated = re.match(r"sep=(.)\r?\n", text, re.IGNORECASE)  # for spreadsheets, which then show it in no cell
+    mark = DELIMITERS[delimiter] if delimiter else stated[1] if stated else _delimiter(text, needed)
+    records = _records(text, mark)[1 if stated else 0 :]
     if not records:
         raise AnalysisError("expected a table with a heading, found an empty file")
     heading, rows = records[0][1], records[1:]
+    if len(rows) > 1 and any(cell.startswith('{"ImportId"') for cell in rows[1][1]):
+        rows = rows[2:]  # Qualtrics repeats its heading, as questions and as names of its own
     twice = [name for name in needed if heading.count(name) > 1]
     if twice:
         raise AnalysisError(f"expected one column {twice[0]!r}, found {heading.count(twice[0])}; rename the others")

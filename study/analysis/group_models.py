@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from study.analysis import estimates
 from study.analysis.estimating_equations import estimating_equations
 from study.analysis.mixed import Link, MixedFit, fit_mixed, marginal_share
+from study.analysis.random_effects import LARGEST_EFFECT, LARGEST_ERROR
 from study.counting import counted
 from study.errors import AnalysisError
 
@@ -25,10 +26,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FEWEST_FOR_GEE = 4
-
-
-def _logistic(value: float | None) -> float | None:
-    return None if value is None else 1 / (1 + math.exp(-value))
+NO_ORDER = "without a term for the order of presentation, which is not known or never changed"
 
 
 def preference_models(part: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]:
@@ -52,6 +50,9 @@ def preference_models(part: pd.DataFrame, confidence: float = 0.95) -> dict[str,
     who = part["participant"].astype(str).to_numpy()
     mixed = _mixed(design, chosen, who, confidence)
     gee = _gee(design, chosen, who, confidence)
+    if order is None:
+        for model in (mixed, gee):
+            model["note"] = "; ".join(filter(None, (model["note"], NO_ORDER)))
     return {"mixed": mixed, "gee": gee, "differ": _differ(mixed, gee)}
 
 
@@ -73,7 +74,7 @@ def _mixed(design: FloatArray, chosen: FloatArray, who: NDArray[Any], confidence
     second = fit.effects[1] if len(fit.effects) > 1 else None
     population = marginal_share(fit, [1.0, 0.0][: design.shape[1]])
     return {
-        "percent": 100 * (_logistic(main.value) or 0.0) if known else None,
+        "percent": _percent(main.value) if known else None,
         "low": _percent(main.interval.low),
         "high": _percent(main.interval.high),
         "p_value": main.p_value,
@@ -99,8 +100,9 @@ def _counted(
 
 
 def _percent(logit: float | None) -> float | None:
-    share = _logistic(logit)
-    return None if share is None else 100 * share
+    from scipy.special import expit
+
+    return None if logit is None else 100 * float(expit(logit))
 
 
 def _gee(design: FloatArray, chosen: FloatArray, who: NDArray[Any], confidence: float) -> dict[str, Any]:
@@ -122,6 +124,8 @@ def _gee(design: FloatArray, chosen: FloatArray, who: NDArray[Any], confidence: 
     values, errors = found.values, found.errors
     if not (np.isfinite(values).all() and np.isfinite(errors).all()) or (errors <= 1e-9).any():
         return too_alike
+    if (np.abs(values) >= LARGEST_EFFECT).any() or (errors > LARGEST_ERROR).any():
+        return {**nothing, "note": "the answers separate, or nearly so: effects can't be estimated by these equations"}
     times = estimates.t_quantile(confidence, people - 1)
     tests = [estimates.t_probability(float(v / e), people - 1) for v, e in zip(values, errors, strict=True)]
     return {

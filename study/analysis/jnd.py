@@ -292,6 +292,9 @@ def d_prime(
     return {"d_prime": value, "criterion": criterion, "standard_error": error, "low": low, "high": high}
 
 
+OPEN = "no more “different” than without a difference, or no end above: what is missing can't be told"
+
+
 def d_prime_table(counts: Counts, confidence: float = 0.95) -> list[dict[str, Any]]:
     """Return d-prime at every level against the pairs with no difference, answers pooled over participants."""
     same = counts.differences == 0
@@ -300,5 +303,6 @@ def d_prime_table(counts: Counts, confidence: float = 0.95) -> list[dict[str, An
     for level in np.flatnonzero(~same):
         hits, pairs = float(counts.different[:, level].sum()), float(counts.shown[:, level].sum())
         found = d_prime(hits, pairs, alarms, same_pairs, confidence)
-        rows.append({"difference_frames": float(counts.differences[level]), **found})
+        note = "" if None not in found.values() else "no pairs to tell it by" if found["d_prime"] is None else OPEN
+        rows.append({"difference_frames": float(counts.differences[level]), **found, "note": note})
     return rows

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from study.analysis import estimates
-from study.analysis.rank_tests import signed_rank
+from study.analysis.rank_tests import NO_RANKS, signed_rank
 from study.analysis.ratings import rated
 from study.counting import counted
 from study.errors import AnalysisError
@@ -74,6 +74,7 @@ def pair_ratings(answers: pd.DataFrame, points: int, confidence: float = 0.95) -
             "published": {
                 "mean": float(part["score"].mean()),
                 "standard_deviation": float(part["score"].std(ddof=1)) if len(part) > 1 else None,
+                "note": "" if len(part) > 1 else "one answer: no spread",
             },
             "participants": _over_participants(part, middle, confidence),
             "order": order_effect(part, confidence),
@@ -112,11 +113,12 @@ def _means(part: pd.DataFrame) -> pd.Series[float]:
 def _over_participants(part: pd.DataFrame, middle: float, confidence: float) -> dict[str, Any]:
     """One mean score a participant against the middle of the scale, by Student's t and by signed ranks."""
     means = _means(part).to_numpy(dtype=np.float64)
-    spread = float(means.std(ddof=1)) if len(means) > 1 else None
+    found, by_ranks = _against(means, middle, confidence), signed_rank(means - middle)
     return {
-        **_against(means, middle, confidence),
-        "standard_deviation": spread,
-        "signed_rank_p_value": signed_rank(means - middle),
+        **found,
+        "standard_deviation": float(means.std(ddof=1)) if len(means) > 1 else None,
+        "signed_rank_p_value": by_ranks,
+        "note": "; ".join(filter(None, (found["note"], NO_RANKS if by_ranks is None else ""))),
     }
 
 
@@ -161,7 +163,7 @@ def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
             means = _means(own)
             groups.append(means)
             test = _against(means, 0.0, confidence)
-            shown = {key: test[key] for key in ("participants", "mean", "standard_error", "low", "high")}
+            shown = {key: test[key] for key in ("participants", "mean", "standard_error", "low", "high", "note")}
             rows.append(
                 {"first": str(own.iloc[0]["method_a" if a_first else "method_b"]), "answers": len(own), **shown}
             )

@@ -142,12 +142,13 @@ def logit_normal(share: float, correlation: float, order_bias: float = 0.0) -> t
             f"expected a share between 0 and 1 and a correlation from 0 to 0.9, found {share:g} and {correlation:g}"
         )
     from scipy.optimize import brentq
+    from scipy.special import expit
 
     points, weights = np.polynomial.hermite_e.hermegauss(61)
     weights = weights / weights.sum()
 
     def shares(mean: float, spread: float) -> FloatArray:
-        both = [1 / (1 + np.exp(-(mean + spread * points + bias))) for bias in (order_bias, -order_bias)]
+        both = [expit(mean + spread * points + bias) for bias in (order_bias, -order_bias)]
         return np.asarray(np.mean(both, axis=0), dtype=np.float64)
 
     def mean_for(spread: float) -> float:

@@ -42,6 +42,8 @@ class Published:
         Two-sided binomial test of the same.
     interval
         Wilson's interval of the share (0 to 1).
+    note
+        Why nothing can be given; empty where all can.
     """
 
     favouring: int
@@ -52,6 +54,7 @@ class Published:
     p_value: float | None
     exact_p_value: float | None
     interval: estimates.Interval
+    note: str = ""
 
 
 def published_test(favouring: int, answers: int, confidence: float = 0.95) -> Published:
@@ -78,7 +81,7 @@ def published_test(favouring: int, answers: int, confidence: float = 0.95) -> Pu
         raise AnalysisError(f"expected 0 <= favouring <= answers, found {favouring} of {answers}; check the counts")
     interval = estimates.wilson_interval(favouring, answers, confidence)
     if answers == 0:
-        return Published(0, 0, None, None, 1, None, None, interval)
+        return Published(0, 0, None, None, 1, None, None, interval, "no answer chose between the two")
     chi_square = (2 * favouring - answers) ** 2 / answers
     return Published(
         favouring=favouring,
@@ -169,6 +172,8 @@ def _compare_two(
     chosen, shown = by_participant["sum"].to_numpy(dtype=np.float64), by_participant["count"].to_numpy(dtype=np.float64)
     published = _without_ties(part, confidence)
     participants = participant_tests(chosen, shown, confidence)
+    order = order_effect(part, confidence)
+    said = _in_words(method_a, method_b, published, participants, order, alpha)
     return {
         "method_a": method_a,
         "method_b": method_b,
@@ -178,9 +183,9 @@ def _compare_two(
         "clustering": estimates.plain(estimates.clustering(chosen, shown)),
         "motions": estimates.plain(motion_table(part, confidence).to_dict("records")),
         "motions_as_sample": motions_as_sample(part, confidence),
-        "order": order_effect(part, confidence),
+        "order": order,
         "no_preference": estimates.plain(no_preference(chosen[shown > 0] / shown[shown > 0], margin)),
-        "answer": _in_words(method_a, method_b, published, participants, alpha),
+        "answer": _order_in_words(method_a, method_b, order, alpha) or said,
     }
 
 
@@ -216,6 +221,20 @@ def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
     return {"note": found} if isinstance(found, str) else dict(estimates.plain(found))
 
 
+def strengths_in_words(found: dict[str, Any]) -> str:
+    """Return the strengths of the methods in a sentence, and what can't be told of them."""
+    if not found.get("strengths"):
+        return f"Strengths of the methods: {found['note']}."
+    told = [row for row in found["strengths"] if row["value"] is not None and row["method"] != found["reference"]]
+    parts = [
+        f"{row['method']} {row['value']:+.2f}"
+        + ("" if row["standard_error"] is None else f" ({row['interval']['low']:.2f} to {row['interval']['high']:.2f})")
+        for row in told
+    ]
+    said = f"Strengths in logits beside {found['reference']}: {', '.join(parts) or 'none is finite'}"
+    return f"{said}. {found['note'][:1].upper()}{found['note'][1:]}." if found["note"] else f"{said}."
+
+
 def confirmatory(
     comparisons: dict[str, list[dict[str, Any]]], family: Sequence[str] | None = None
 ) -> list[dict[str, Any]]:
@@ -235,6 +254,7 @@ def confirmatory(
             "method_b": compared["method_b"],
             "test": compared["participants"]["test"],
             "p_value": compared["participants"]["p_value"],
+            "note": compared["participants"]["note"] if compared["participants"]["p_value"] is None else "",
         }
         for study, found in comparisons.items()
         if family is None or study in family
@@ -254,7 +274,7 @@ def motion_table(part: pd.DataFrame, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         `motion`, `favouring`, `answers`, `percent`, `low`, `high` (percent, Wilson), `chi_square`, `p_value`,
-        `exact_p_value`, `holm_p_value` (the exact one, adjusted over the motions).
+        `exact_p_value`, `holm_p_value` (the exact one, adjusted over the motions), `note`.
     """
     import pandas as pd
 
@@ -268,11 +288,12 @@ def motion_table(part: pd.DataFrame, confidence: float = 0.95) -> pd.DataFrame:
                 "favouring": test.favouring,
                 "answers": test.answers,
                 "percent": test.percent,
-                "low": 100 * (test.interval.low or 0.0),
-                "high": 100 * (test.interval.high or 0.0),
+                "low": None if test.interval.low is None else 100 * test.interval.low,
+                "high": None if test.interval.high is None else 100 * test.interval.high,
                 "chi_square": test.chi_square,
                 "p_value": test.p_value,
                 "exact_p_value": test.exact_p_value,
+                "note": test.note,
             }
         )
     table = pd.DataFrame(rows)
@@ -287,41 +308,78 @@ def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> dict[str, Any]
     Returns
     -------
     dict
-        `first_percent` (how often the one shown first was favoured), `answers`, `p_value` (Student's t of one share a
-        participant against one half), `percent_a_first`, `percent_a_second` (favouring the first method, by place),
-        `balanced_percent` (the mean of these two: free of the order effect), `note`.
+        `first_percent` (how often the one shown first was favoured), `answers`, `p_value` (the default test of one
+        share a participant against one half), `percent_a_first`, `percent_a_second` (favouring the first method, by
+        place), `balanced_percent` (the mean of these two: free of the order effect), `note`.
     """
+    nothing = dict.fromkeys(("first_percent", "p_value", "percent_a_first", "percent_a_second", "balanced_percent"))
     if "a_first" not in part.columns or part["a_first"].isna().all():
-        return {"first_percent": None, "answers": 0, "p_value": None, "note": "the order of presentation is not known"}
+        return {**nothing, "answers": 0, "note": "the order of presentation is not known"}
     known = part[part["a_first"].notna()]
     a_first = known["a_first"].astype(bool)
     chose_first = known["chose_a"].where(a_first, 1 - known["chose_a"])
-    shares = chose_first.groupby(known["participant"].astype(str)).mean().to_numpy(dtype=np.float64)
-    test = estimates.mean_test(shares, 0.5, confidence)
+    shares = chose_first.groupby(known["participant"].astype(str))
+    test = participant_tests(shares.sum(), shares.count(), confidence)
     first = 100 * float(known.loc[a_first, "chose_a"].mean()) if a_first.any() else None
     second = 100 * float(known.loc[~a_first, "chose_a"].mean()) if (~a_first).any() else None
+    one_order = ONE_ORDER if first is None or second is None else ""
     return {
         "first_percent": 100 * float(chose_first.mean()),
         "answers": len(known),
-        "p_value": test.p_value,
+        "p_value": test["p_value"],
         "percent_a_first": first,
         "percent_a_second": second,
         "balanced_percent": None if first is None or second is None else (first + second) / 2,
-        "note": test.note,
+        "note": "; ".join(filter(None, (one_order, test["note"]))),
     }
 
 
-def _in_words(method_a: str, method_b: str, published: Published, participants: dict[str, Any], alpha: float) -> str:
-    """One sentence: who was favoured, how often, and whether it can be told from chance."""
+ONE_ORDER = "the two were always shown in the same order: a preference can't be told from an effect of the order"
+
+
+def _order_in_words(method_a: str, method_b: str, order: dict[str, Any], alpha: float) -> str:
+    """What is to be said in place of a preference where the order of presentation decided every answer."""
+    if order["balanced_percent"] is None or order["first_percent"] not in (0.0, 100.0):
+        return ""
+    if (estimates.binomial_probability(0, order["answers"]) or 1.0) >= alpha:
+        return ""
+    place = "first" if order["first_percent"] else "second"
+    return (
+        f"Each of {order['answers']} answers favoured the one shown {place}: the order of presentation decided, and "
+        f"nothing can be said about {method_a} and {method_b}."
+    )
+
+
+def _in_words(
+    method_a: str,
+    method_b: str,
+    published: Published,
+    participants: dict[str, Any],
+    order: dict[str, Any],
+    alpha: float,
+) -> str:
+    """Who was favoured, how often, whether it can be told from chance, and what the order had to do with it."""
     if published.percent is None:
-        return f"There are no answers that compare {method_a} with {method_b}."
+        return f"There are no answers that choose between {method_a} and {method_b}."
     p_value = participants["p_value"]
     share = f"{published.percent:.1f}% of {counted(published.answers, 'answer')} favoured {method_a} over {method_b}"
     if p_value is None:
-        return f"{share}; with one participant nothing can be said about others."
-    if p_value < alpha:
-        return f"{share}; across participants this is not chance (p {_p_in_words(p_value)})."
-    return f"{share}; across participants this can't be told from chance (p {_p_in_words(p_value)})."
+        said = f"{share}; with one participant nothing can be said about others."
+    elif p_value < alpha:
+        said = f"{share}; across participants this is not chance (p {_p_in_words(p_value)})."
+    else:
+        said = f"{share}; across participants this can't be told from chance (p {_p_in_words(p_value)})."
+    if ONE_ORDER in order["note"]:
+        return f"{said} {ONE_ORDER[0].upper()}{ONE_ORDER[1:]}."
+    if order["p_value"] is not None and order["p_value"] < alpha:
+        place, percent = ("first", order["first_percent"])
+        if percent < 50:
+            place, percent = "second", 100 - percent
+        return (
+            f"{said} The order of presentation mattered: {percent:.1f}% favoured the one shown {place} "
+            f"(p {_p_in_words(order['p_value'])})."
+        )
+    return said
 
 
 def _p_in_words(p_value: float) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study.analysis import estimates
-from study.analysis.rank_tests import signed_rank
+from study.analysis.rank_tests import NO_RANKS, signed_rank
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,6 +96,7 @@ def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0
     p_value = estimates.finite(float(default_p_values(yes, total)))
     robust = _robust_chi_square(yes, total)
     low, high = test.interval.low, test.interval.high
+    by_ranks = signed_rank(share - 0.5)
     return {
         "participants": test.participants,
         "mean_percent": None if test.mean is None else 100 * test.mean,
@@ -106,13 +107,13 @@ def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0
         "degrees_of_freedom": test.degrees_of_freedom,
         "p_value": p_value,
         "test": "none" if p_value is None else SIGN if test.p_value is None else STUDENT,
-        "wilcoxon_p_value": signed_rank(share - 0.5),
+        "wilcoxon_p_value": by_ranks,
         "robust_chi_square": robust,
         "robust_p_value": None if robust is None else estimates.f_probability(robust, 1, test.participants - 1),
         "for_a": int((share > 0.5).sum()),
         "for_b": int((share < 0.5).sum()),
         "undecided": int((share == 0.5).sum()),
-        "note": test.note,
+        "note": "; ".join(filter(None, (test.note, NO_RANKS if by_ranks is None else ""))),
     }
 
 

@@ -193,7 +193,7 @@ def fit_likelihood(
         p_value=p_value,
         dispersion=deviance / freedom if freedom > 0 else None,
         at_bound=bounds,
-        note=note,
+        note="; ".join(filter(None, (note, "" if freedom > 0 else "no more levels than parameters: no dispersion"))),
     )
 
 

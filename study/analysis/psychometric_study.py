@@ -49,7 +49,7 @@ def analyse_psychometric(
         JSON-able: `confidence`, `participants` (one fit each), `pooled` (all answers as one person's), `likelihood`
         (maximum, profile interval and deviance of the same), `group` (mean over participants of their thresholds, with
         Student's interval), `mixed` (threshold of a typical participant by a mixed model; None for one participant),
-        `levels` (answers by level), `answer` (a sentence).
+        `mixed_note` (why it can't be had), `levels` (answers by level), `answer` (a sentence).
 
     Raises
     ------
@@ -65,13 +65,15 @@ def analyse_psychometric(
     levels, yes, shown = (trials[column].to_numpy(dtype=np.float64) for column in ("level", "yes", "shown"))
     best = fit_likelihood(levels, yes, shown, chosen, confidence=confidence, simulations=simulations)
     pooled = _one(trials, chosen, confidence)
+    mixed = _typical(trials, chosen, best, confidence)
     result: dict[str, Any] = {
         "confidence": confidence,
         "participants": own,
         "pooled": pooled,
         "likelihood": {"note": best} if isinstance(best, str) else estimates.plain(best),
         "group": _group(own, chosen, confidence),
-        "mixed": _typical(trials, chosen, best, confidence),
+        "mixed": None if isinstance(mixed, str) else mixed,
+        "mixed_note": mixed if isinstance(mixed, str) else mixed["note"],
         "levels": _by_level(trials),
     }
     return {**dict(estimates.plain(result)), "answer": _in_words(result)}
@@ -97,10 +99,14 @@ def describe(fit: PsychometricFit) -> dict[str, Any]:
     }
 
 
-def _typical(trials: pd.DataFrame, model: Model, best: LikelihoodFit | str, confidence: float) -> dict[str, Any] | None:
-    """The threshold of a typical participant; guess and lapse rate are held at those of all answers."""
-    if isinstance(best, str) or trials["participant"].nunique() < 2 or model.sigmoid.name not in LINKS_OF:
-        return None
+def _typical(trials: pd.DataFrame, model: Model, best: LikelihoodFit | str, confidence: float) -> dict[str, Any] | str:
+    """The threshold of a typical participant, rates held at those of all answers; or why there is none."""
+    if isinstance(best, str):
+        return best
+    if trials["participant"].nunique() < 2:
+        return "one participant: nothing can be said about others"
+    if model.sigmoid.name not in LINKS_OF:
+        return f"mixed models are fitted with the sigmoids {' and '.join(LINKS_OF)} only"
     link = LINKS_OF[model.sigmoid.name]
     found = psychometric_mixed(trials, link=link, guess=best.guess, lapse=best.lapse, confidence=confidence)
     shown = trials.loc[trials["shown"] > 0, "level"]

@@ -19,6 +19,7 @@ from study.analysis import estimates
 FloatArray = NDArray[np.float64]
 
 LARGEST_EXACT = 50
+NO_RANKS = "fewer than two participants lean either way: no test by ranks"
 
 
 def mid_ranks(values: ArrayLike) -> FloatArray:

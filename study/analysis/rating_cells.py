@@ -31,7 +31,7 @@ def rating_cells(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[s
     -------
     list of dict
         `item`, `method`, `order` (the method seen first), `answers`, `participants`, `mean` (over participants of their
-        means), `standard_error`, `low`, `high` (Student's t over participants).
+        means), `standard_error`, `low`, `high` (Student's t over participants), `note`.
 
     Raises
     ------
@@ -53,5 +53,5 @@ def rating_cells(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[s
         test = estimates.mean_test(means, 0.0, confidence)
         row: dict[str, Any] = {"item": item, "method": name, "order": first, "answers": len(values)}
         row |= {"participants": test.participants, "mean": test.mean, "standard_error": test.standard_error}
-        rows.append(row | {"low": test.interval.low, "high": test.interval.high})
+        rows.append(row | {"low": test.interval.low, "high": test.interval.high, "note": test.note})
     return [dict(estimates.plain(row)) for row in rows]

@@ -8,6 +8,7 @@ for no more than ordered.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from study.analysis import estimates
 from study.analysis.anova import two_way
 from study.analysis.ordinal import OrdinalFit, fit_ordinal
-from study.analysis.rank_tests import anova_type, friedman, signed_rank
+from study.analysis.rank_tests import NO_RANKS, anova_type, friedman, signed_rank
 from study.analysis.ratings import rated
 from study.analysis.repeated_measures import likeness, mixed_design
 from study.errors import AnalysisError
@@ -45,8 +46,10 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: boo
     list of dict
         One entry a question: `item`, `participants`, `answers`, `anova` (see `two_way`, type III; empty where it can't
         be had), `balanced` (whether all combinations have as many answers), `type_ii` (the same by type II where they
-        have not, else None), `difference` (of each participant's mean ratings, where there are two methods: `of`,
-        `mean`, `low`, `high`, `t`, `degrees_of_freedom`, `p_value`), `mixed_design` (`effects`, `participants`,
+        have not, else None), `differences` (of each participant's mean ratings, one entry a pair of methods: `of`,
+        `mean`, `low`, `high`, `t`, `degrees_of_freedom`, `p_value`, `test`, `holm_p_value`, `note`; `test` is Student's
+        t, or the exact sign test where all participants differ alike), `difference` (the same where there are two
+        methods, else None), `mixed_design` (`effects`, `participants`,
         `left_out`, `factors`, `intraclass_correlation` with what that does to the published test, `note`), `ranks`
         (`between`, `participants`, `note`), `ordinal` (`effects`, `spread`, `likelihood_ratio`, `degrees_of_freedom`,
         `p_value`, `note`; None without models), `note`.
@@ -71,6 +74,7 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: boo
 
 def _question(name: str, part: pd.DataFrame, confidence: float, models: bool) -> dict[str, Any]:
     table, type_ii, note = _as_published(part, 1 - confidence)
+    differences = _differences(part, confidence)
     return {
         "item": name,
         "participants": int(part["participant"].nunique()),
@@ -78,7 +82,8 @@ def _question(name: str, part: pd.DataFrame, confidence: float, models: bool) ->
         "anova": table,
         "balanced": bool(part.groupby(["method_a", "order"]).size().nunique() == 1),
         "type_ii": type_ii,
-        "difference": _difference(part, confidence),
+        "differences": differences,
+        "difference": differences[0] if len(differences) == 1 else None,
         "mixed_design": _mixed_design(part, 1 - confidence),
         "ranks": _ranks(part),
         "ordinal": _ordinal(part, confidence) if models else None,
@@ -93,8 +98,9 @@ def _as_published(part: pd.DataFrame, alpha: float) -> tuple[list[dict[str, Any]
         table = two_way(*factors, alpha=alpha)
     except AnalysisError as error:
         return [], None, f"no analysis of variance: {error}"
+    note = "the ratings of each combination are all alike: no F" if table[0]["f"] is None else ""
     uneven = part.groupby(["method_a", "order"]).size().nunique() > 1
-    return table, two_way(*factors, squares="II", alpha=alpha) if uneven else None, ""
+    return table, two_way(*factors, squares="II", alpha=alpha) if uneven else None, note
 
 
 def _means(part: pd.DataFrame) -> pd.DataFrame:
@@ -102,22 +108,31 @@ def _means(part: pd.DataFrame) -> pd.DataFrame:
     return part.groupby(["participant", "method_a"])["rating"].mean().unstack()
 
 
-def _difference(part: pd.DataFrame, confidence: float) -> dict[str, Any] | None:
-    """The difference of the two methods over participants; None where there are not two."""
-    methods = sorted(part["method_a"].unique())
-    if len(methods) != 2:
-        return None
+def _differences(part: pd.DataFrame, confidence: float) -> list[dict[str, Any]]:
+    """The difference of each two methods over participants, p-values adjusted over the pairs by Holm's method."""
     means = _means(part)
-    apart = (means[methods[1]] - means[methods[0]]).dropna().to_numpy(dtype=np.float64)
+    rows = [_difference(means[one], means[other], confidence) for one, other in combinations(sorted(means.columns), 2)]
+    known = np.array([np.nan if row["p_value"] is None else row["p_value"] for row in rows], dtype=np.float64)
+    return [{**row, "holm_p_value": estimates.finite(p)} for row, p in zip(rows, estimates.holm(known), strict=True)]
+
+
+def _difference(one: pd.Series[float], other: pd.Series[float], confidence: float) -> dict[str, Any]:
+    """How much higher the other method was rated; by the exact sign test where all participants differ alike."""
+    apart = (other - one).dropna().to_numpy(dtype=np.float64)
     test = estimates.mean_test(apart, 0.0, confidence)
+    p_value = signed_rank(apart) if test.p_value is None else test.p_value
+    note = "the two were rated alike by everybody" if len(apart) > 1 and not apart.any() else test.note
     return {
-        "of": f"{methods[1]} minus {methods[0]}",
+        "of": f"{other.name} minus {one.name}",
+        "participants": test.participants,
         "mean": test.mean,
         "low": test.interval.low,
         "high": test.interval.high,
         "t": test.statistic,
         "degrees_of_freedom": test.degrees_of_freedom,
-        "p_value": test.p_value,
+        "p_value": p_value,
+        "test": "none" if p_value is None else "exact sign test" if test.p_value is None else "Student's t",
+        "note": "nobody rated both" if not len(apart) else note,
     }
 
 
@@ -131,13 +146,18 @@ def _mixed_design(part: pd.DataFrame, alpha: float) -> dict[str, Any]:
         if len(who)
         else "no participant rated every method"
     )
+    if isinstance(found, str):
+        effects, note = [], found
+    else:
+        still = [row["source"] for row in found if row["f"] is None]
+        effects, note = found, f"participants do not vary in {', '.join(still)}: no F" if still else ""
     return {
-        "effects": [] if isinstance(found, str) else found,
+        "effects": effects,
         **likeness(values, group[who].to_numpy()),
         "factors": factors,
         "participants": len(who),
         "left_out": people - len(who),
-        "note": found if isinstance(found, str) else "",
+        "note": note,
     }
 
 
@@ -172,11 +192,12 @@ def _ranks(part: pd.DataFrame) -> dict[str, Any]:
             if counted.min() > 0
             else "a combination of method and order has no answers"
         )
+    over = _ranks_over_participants(part)
     note = between if isinstance(between, str) else ""
     return {
         "between": [] if isinstance(between, str) else between,
-        "participants": _ranks_over_participants(part),
-        "note": note,
+        "participants": over,
+        "note": "; ".join(filter(None, (note, NO_RANKS if over is None else ""))),
     }
 
 
@@ -211,7 +232,11 @@ def _ordinal(part: pd.DataFrame, confidence: float) -> dict[str, Any]:
     ratio = 2 * (fit.log_likelihood - without.log_likelihood) if isinstance(without, OrdinalFit) else None
     return {
         "effects": [
-            {**estimates.plain(effect), "odds_ratio": float(np.exp(effect.value)) if effect.standard_error else None}
+            {
+                **estimates.plain(effect),
+                "value": effect.value if effect.standard_error else None,
+                "odds_ratio": float(np.exp(effect.value)) if effect.standard_error else None,
+            }
             for effect in fit.effects
         ],
         "spread": fit.spread,
@@ -240,27 +265,47 @@ def anova_sentences(questions: list[dict[str, Any]], alpha: float) -> list[str]:
     """Each effect of each question in words, degrees of freedom always with it, and what holds over participants."""
     found = []
     for question in questions:
-        for row in question["anova"]:
-            if row.get("f") is None:
-                continue
-            verdict = "significant" if row["p_value"] < alpha else "not significant"
-            found.append(
-                f"{question['item'] or 'rating'}: {row['source']} F({row['degrees_of_freedom']}, "
-                f"{row['error_degrees_of_freedom']}) = {row['f']:.2f}, MS = {row['mean_square']:.2f}, "
-                f"p = {row['p_value']:.3g} ({verdict} at {alpha:g})"
-            )
-        found += _difference_in_words(question, alpha)
+        name = question["item"] or "rating"
+        found += [
+            f"{name}: {row['source']} F({row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}) = "
+            f"{row['f']:.2f}, MS = {row['mean_square']:.2f}, {_verdict(row['p_value'], alpha)}"
+            for row in question["anova"]
+            if row.get("f") is not None
+        ]
+        if len(question["differences"]) > 1:
+            found.append(f"{name}: {omnibus_in_words(question, alpha)}")
+        found += [
+            f"{name}: {difference_in_words(row, alpha)}" for row in question["differences"] if row["participants"]
+        ]
     return found
 
 
-def _difference_in_words(question: dict[str, Any], alpha: float) -> list[str]:
-    """The difference of two methods over participants; nothing where it can't be tested."""
-    test = question["difference"]
-    if not test or test["p_value"] is None:
-        return []
-    verdict = "significant" if test["p_value"] < alpha else "not significant"
-    return [
-        f"{question['item'] or 'rating'}: {test['of']} over participants {test['mean']:.2f} ({test['low']:.2f} to "
-        f"{test['high']:.2f}), t({test['degrees_of_freedom']}) = {test['t']:.2f}, p = {test['p_value']:.3g} "
-        f"({verdict} at {alpha:g})"
-    ]
+def _verdict(p_value: float, alpha: float, name: str = "p") -> str:
+    return f"{name} = {p_value:.3g} ({'' if p_value < alpha else 'not '}significant at {alpha:g})"
+
+
+def omnibus_in_words(question: dict[str, Any], alpha: float) -> str:
+    """Return whether more than two methods differ at all over participants: by their means, and by ranks."""
+    design, ranks = question["mixed_design"], question["ranks"]["participants"]
+    row = next((effect for effect in design["effects"] if effect["source"] == "method"), None)
+    said = "all methods over participants"
+    if row is None or row["f"] is None:
+        said = f"{said}: {design['note']}"
+    else:
+        said += (
+            f" F({row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}) = {row['f']:.2f}, corrected by "
+            f"Greenhouse and Geisser {_verdict(row['corrected_p_value'], alpha)}"
+        )
+    return said if ranks is None else f"{said}; by ranks (Friedman) {_verdict(ranks['p_value'], alpha)}"
+
+
+def difference_in_words(row: dict[str, Any], alpha: float) -> str:
+    """Return the difference of two methods over participants, with its test or why there is none."""
+    said = f"{row['of']} over participants {row['mean']:.2f}"
+    if row["p_value"] is None:
+        return f"{said}; {row['note']}"
+    if row["t"] is None:
+        return f"{said}, the same for all {row['participants']}, {row['test']} {_verdict(row['p_value'], alpha)}"
+    adjusted = row["holm_p_value"] > row["p_value"]
+    verdict = _verdict(row["holm_p_value"], alpha, "p adjusted by Holm" if adjusted else "p")
+    return f"{said} ({row['low']:.2f} to {row['high']:.2f}), t({row['degrees_of_freedom']}) = {row['t']:.2f}, {verdict}"

@@ -42,8 +42,8 @@ def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[s
     -------
     list of dict
         `item`, `method`, `answers`, `participants`, `mean` (over participants of their means), `standard_error`,
-        `low`, `high` (Student's t over participants), `standard_deviation` (of all answers), `median`, `distribution`
-        (answers a value).
+        `low`, `high` (Student's t over participants), `standard_deviation` (of all answers), `median`, `note`,
+        `distribution` (answers a value).
 
     Raises
     ------
@@ -70,6 +70,7 @@ def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[s
                 "high": test.interval.high,
                 "standard_deviation": float(values.std(ddof=1)) if len(values) > 1 else math.nan,
                 "median": float(values.median()),
+                "note": test.note,
                 "distribution": {
                     f"{value:g}": int(count) for value, count in values.value_counts().sort_index().items()
                 },

@@ -136,8 +136,14 @@ def fit_model(
         fit_p_value=estimates.chi_square_probability(deviance, freedom) if freedom > 0 else None,
         curve=tuple((float(x), 100 * float(y)) for x, y in zip(line, curve, strict=True)),
         log_likelihood=float(best.log_likelihood[0]),
-        note=_caution(best),
+        note="; ".join(
+            filter(None, (_caution(best), NO_TEST if freedom <= 0 else "", ONE_SIDE if len(sides) < 2 else ""))
+        ),
     )
+
+
+NO_TEST = "as many parameters as levels: how well the model fits can't be tested"
+ONE_SIDE = "differences on one side only: its slope can't be compared with another"
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,4 +286,5 @@ def _equal_slopes(
         "p_value_participants_independent": (
             estimates.t_probability(statistic, freedom) if statistic is not None else None
         ),
+        "note": "" if statistic is not None else "participants' slopes don't spread so that they could be judged by",
     }

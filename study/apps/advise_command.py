@@ -116,9 +116,10 @@ def _write(out: Path, result: dict[str, Any]) -> None:
     import pandas as pd
 
     from study.analysis.estimates import plain
+    from study.spreadsheets import safe_table
 
     out.mkdir(parents=True, exist_ok=True)
-    pd.DataFrame(result["advice"]).to_csv(out / "advice.csv", index=False)
+    safe_table(pd.DataFrame(result["advice"])).to_csv(out / "advice.csv", index=False)
     (out / "advice.json").write_text(json.dumps(plain(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 

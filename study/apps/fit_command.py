@@ -24,26 +24,42 @@ OWN = {
     "yes-no": ("level", "shown", "yes", "sigmoid", "guess", "lapse"),
     "same-different": ("level", "shown", "yes", "order", "reference_first", "threshold"),
     "preference": ("first", "second", "motion", "yes", "tie", "alpha"),
-    "rating": ("method", "motion", "item", "alpha"),
+    "rating": ("method", "motion", "item", "scale", "ends", "alpha"),
 }
 COLUMNS = ("level", "answer", "participant", "shown", "order", "first", "second", "method", "motion", "item")
 
 
 def read_table(path: Path, needed: tuple[str, ...], delimiter: str | None = None) -> pd.DataFrame:
-    """A table of texts from a file whose cells are parted by commas, semicolons or tabs.
+    """A table of texts from a file: delimited text, or trials in JSON.
 
     Raises
     ------
     AnalysisError
         When it can't be read as one.
     """
+    from study.analysis.foreign_json import looks_like_json, parse_json
     from study.analysis.foreign_text import decoded, parse_table
 
     try:
         content = path.read_bytes()
     except OSError as error:
         raise AnalysisError(f"expected a table, found a file that can't be read: {error}") from error
-    return parse_table(decoded(content), needed, delimiter)
+    text = decoded(content)
+    return parse_json(text) if looks_like_json(text) else parse_table(text, needed, delimiter)
+
+
+def _scale(given: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
+    """Words of a scale and their points."""
+    found = []
+    for text in given:
+        word, equals, point = text.rpartition("=")
+        try:
+            found.append((word, float(point)))
+        except ValueError:
+            equals = ""
+        if not equals or not word.strip():
+            raise AnalysisError(f'expected --scale "WORD=POINT" as in "Agree=4", found {text!r}')
+    return tuple(found)
 
 
 def _pairs(where: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
@@ -105,12 +121,14 @@ def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Serie
 
 def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
     """Preferences and ratings, through the analysis of our own studies; `answer` in words."""
+    from study.analysis.preference import strengths_in_words
     from study.analysis.rating_comparisons import anova_sentences
     from study.analysis.summary import analyse
 
     alpha = options["alpha"] or 0.05
     result = analyse(found.table, confidence=options["confidence"], alpha=alpha)
     said = [compared["answer"] for study in result["preference"].values() for compared in study]
+    said += [strengths_in_words(found) for found in result["bradley_terry"].values() if found]
     for questions in result["rating_anova"].values():
         said += anova_sentences(questions, alpha)
     for row in (row for rows in result["ratings"].values() for row in rows):
@@ -137,6 +155,8 @@ def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
 @click.option("--method", help="Rating: column of the method.")
 @click.option("--motion", help="Preference, rating: column of the motion.")
 @click.option("--item", help="Rating: column of the question.")
+@click.option("--scale", multiple=True, help="Rating: WORD=POINT, where words stand for points; once for each word.")
+@click.option("--ends", type=(float, float), help="Rating: lowest and highest point of the scale.")
 @click.option("--sigmoid", type=click.Choice(["normal", "logistic", "gumbel", "weibull"]), help="[default: normal]")
 @click.option("--choices", type=click.IntRange(min=2), help="2afc: of how many.  [default: 2]")
 @click.option("--guess", type=click.FloatRange(0, 1, max_open=True), help="Hold the guess rate (yes-no).")
@@ -144,11 +164,13 @@ def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
 @click.option("--threshold", type=click.FloatRange(0.5, 1, True, True), help="Same-different.  [default: 0.75]")
 @click.option("--alpha", type=click.FloatRange(0, 1, True, True), help="Preference, rating.  [default: 0.05]")
 @click.option("--confidence", type=click.FloatRange(0.5, 1, True, True), default=0.95, show_default=True)
-@click.option("--delimiter", type=click.Choice(["comma", "semicolon", "tab"]), help="Found out unless given.")
+@click.option(
+    "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "pipe", "space"]), help="Found out unless given."
+)
 @click.option("--decimal", type=click.Choice(["point", "comma"]), help="Found out unless given.")
 @json_option
 def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
-    """Analyse data that another program wrote (PsychoPy, jsPsych, Gorilla): CSV, with its columns named here.
+    """Analyse data that another program wrote (PsychoPy, jsPsych, Gorilla): CSV or JSON, with its columns named here.
 
     Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
     """
@@ -190,7 +212,8 @@ def _read(data: Path, task: str, options: dict[str, Any]) -> Trials | ForeignAns
         table = read_table(data, tuple(needed), options["delimiter"])
         if task in ("preference", "rating"):
             own = {name: options[name] for name in ("first", "second", "method", "motion", "item")}
-            named = AnswerColumns(**shared, **own, tie=tuple(options["tie"]))
+            rated = {"scale": _scale(options["scale"]), "ends": options["ends"]}
+            named = AnswerColumns(**shared, **own, **rated, tie=tuple(options["tie"]))
             return (read_preferences if task == "preference" else read_ratings)(table, named)
         levels = {name: options[name] for name in ("level", "shown", "order")}
         return read_trials(table, Columns(**shared, **levels), task)

@@ -22,7 +22,6 @@ from study.experiment.observer_models import (
     PreferenceObserver,
     RatingObserver,
     default_observer,
-    logistic,
     probability_different,
 )
 from study.experiment.observers import person, respond
@@ -109,9 +108,11 @@ def preference_study(design: Design, alpha: float, share: float) -> Run:
     lean = typical.utility[design.study.reference] - typical.utility.get(design.study.comparison or "", 0.0)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        from scipy.special import expit
+
         people = max(sizes)
         own = lean + typical.participant_sd * rng.standard_normal((studies, people, 1))
-        chance = logistic(own + typical.order_bias * signs[:people])
+        chance = expit(own + typical.order_bias * signs[:people])
         chose_a = rng.random(chance.shape) < chance
         response_s, given = _times(design, rng, np.abs(2 * chance - 1))
         kept = _kept(design, rng, response_s, given)

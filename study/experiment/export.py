@@ -21,6 +21,7 @@ import study
 from study.counting import counted
 from study.errors import SessionError
 from study.experiment.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, Variable
+from study.spreadsheets import safe_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,7 +105,8 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
         participants[column] = sessions["id"].map(said)
     asked = {column: Variable(f"Asked in the form: {label}") for column, label in labels.items()}
     tables = {"answers": ANSWERS, "presentations": PRESENTATIONS, "participants": {**PARTICIPANTS, **asked}}
-    return Shared(protocol, answers, presentations, participants, tables)
+    safe = (safe_table(table) for table in (answers, presentations, participants))
+    return Shared(protocol, *safe, tables)
 
 
 def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) -> Path:

@@ -209,9 +209,11 @@ def _interpolated(observer: SameDifferentObserver, levels: Sequence[int], level:
 
 def preference_probability(observer: PreferenceObserver, study: StudySpec) -> float:
     """Probability over participants and both orders that method a (the reference) is chosen."""
+    from scipy.special import expit
+
     nodes, weights = np.polynomial.hermite_e.hermegauss(31)
     leaning = lean(observer, study.reference, study.comparison or study.reference) + observer.participant_sd * nodes
-    both = 0.5 * (logistic(leaning + observer.order_bias) + logistic(leaning - observer.order_bias))
+    both = 0.5 * (expit(leaning + observer.order_bias) + expit(leaning - observer.order_bias))
     chosen = float((both * weights).sum() / weights.sum())
     return observer.lapse / 2 + (1 - observer.lapse) * chosen
 
@@ -230,8 +232,3 @@ def mean_score(settings: ObserverSettings, study: StudySpec) -> float:
 def lean(observer: PreferenceObserver, method_a: str, method_b: str) -> float:
     """Log-odds of choosing method a over b, order apart."""
     return observer.utility.get(method_a, 0.0) - observer.utility.get(method_b, 0.0)
-
-
-def logistic(x: float | FloatArray) -> FloatArray:
-    """Probability of log-odds, in their shape."""
-    return np.asarray(1.0 / (1.0 + np.exp(-np.asarray(x, dtype=np.float64))))

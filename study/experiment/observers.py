@@ -23,7 +23,6 @@ from study.experiment.observer_models import (
     SameDifferentObserver,
     default_observer,
     lean,
-    logistic,
     probability_different,
     truth,
 )
@@ -129,10 +128,12 @@ def _judge(who: Person, trial: Trial, step: sitting.Step, rng: np.random.Generat
         different = float(probability_different(who.settings.same_different, float(trial.difference_frames or 0)))
         return ("different" if rng.random() < different else "same"), abs(2 * different - 1)
     if trial.task == "preference":
+        from scipy.special import expit
+
         preference = who.settings.preference
         leaning = lean(preference, trial.method_a, trial.method_b) + who.lean
         towards_first = (leaning if trial.a_first else -leaning) + preference.order_bias
-        chance = preference.lapse / 2 + (1 - preference.lapse) * float(logistic(towards_first))
+        chance = preference.lapse / 2 + (1 - preference.lapse) * float(expit(towards_first))
         return ("first" if rng.random() < chance else "second"), abs(2 * chance - 1)
     rating = who.settings.rating
     higher = rating.utility_weight * _rated(who.settings.preference, trial) + who.leniency

@@ -34,6 +34,7 @@ from study.experiment.response_tables import (
     withdrawals,
 )
 from study.experiment.session import Answer, right_answer
+from study.spreadsheets import safe_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -524,5 +525,5 @@ def answers_frame(
 def export_csv(responses: Responses, path: str | Path) -> Path:
     """Write all answers, every showing and every role, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
     table = answers_frame(responses, all_attempts=True, roles=("trial", "practice", "check"))
-    write_whole(Path(path), table.to_csv(index=False).encode())
+    write_whole(Path(path), safe_table(table).to_csv(index=False).encode())
     return Path(path)

@@ -78,7 +78,8 @@ def _headline(title: str, rows: Sequence[Result], variance: Sequence[Result], po
         return Headline(f"{title}: there are no ratings.", "")
     known = [question for question in variance if question["difference"] and question["difference"]["mean"] is not None]
     if not known:
-        return _highest(rows, points)
+        highest = _highest(rows, points)
+        return Headline(highest.statement, " ".join(filter(None, (highest.detail, _tests(variance)))))
     return _of_one(known[0], points, alpha) if len(known) == 1 else _of_several(known, alpha)
 
 
@@ -148,15 +149,30 @@ def _significant(question: Result, alpha: float) -> bool:
 
 
 def _tests(questions: Sequence[Result]) -> str:
-    """Both tests of every question: as published and over participants."""
+    """The tests of every question: as published and over participants."""
     parts = []
     for question in questions:
         found = [f"as published {_f(question['anova'][0])}"] if question["anova"] else []
-        if question["difference"]["t"] is not None:
+        if question["difference"] and question["difference"]["p_value"] is not None:
             found.append(f"over participants {_difference(question['difference'])}")
+        found += _omnibus(question)
         name = words.sentence(words.readable(question["item"]) or "rating")
         parts.append(f"{name}: {'; '.join(found) or 'no test can be made'}.")
     return " ".join(parts)
+
+
+def _omnibus(question: Result) -> list[str]:
+    """Whether more than two methods differ at all, by participants' means and by ranks."""
+    if len(question["differences"]) < 2:
+        return []
+    ranks = question["ranks"]["participants"]
+    effects = [row for row in question["mixed_design"]["effects"] if row["source"] == "method"]
+    found = [
+        f"all methods over participants {_f({**row, 'p_value': row['corrected_p_value']})} (corrected by Greenhouse "
+        "and Geisser)"
+        for row in effects
+    ]
+    return [*found, *([f"by ranks (Friedman) {words.p(ranks['p_value'])}"] if ranks else [])]
 
 
 def _f(row: Result) -> str:
@@ -167,10 +183,18 @@ def _f(row: Result) -> str:
 
 
 def _difference(found: Result) -> str:
-    text = f"{words.decimals(found['mean'], 2)} [{words.bare_interval(found, 2)}]"
+    text = words.decimals(found["mean"], 2)
     if found["t"] is None:
-        return text
-    return f"{text}, t({found['degrees_of_freedom']}) = {words.decimals(found['t'], 2)}, {words.p(found['p_value'])}"
+        tested = found["p_value"] is not None
+        return f"{text} for every participant, {found['test']} {words.p(found['p_value'])}" if tested else text
+    interval = f"[{words.bare_interval(found, 2)}]"
+    return f"{text} {interval}, t({found['degrees_of_freedom']}) = {words.decimals(found['t'], 2)}, {_p_of(found)}"
+
+
+def _p_of(difference: Result) -> str:
+    """The p-value of a difference, adjusted where there are several."""
+    adjusted = difference["holm_p_value"] > difference["p_value"]
+    return f"{words.p(difference['holm_p_value'])} adjusted by Holm" if adjusted else words.p(difference["p_value"])
 
 
 def _notes(question: Result) -> list[str]:
@@ -183,19 +207,15 @@ def _notes(question: Result) -> list[str]:
 
 
 def _readings(variance: Sequence[Result]) -> list[dict[str, Any]]:
-    rows = []
-    for question in variance:
-        difference = question["difference"]
-        known = difference and difference["mean"] is not None
-        item = words.readable(question["item"]) or "rating"
-        rows.append(
-            {
-                "result": f"{item}: {words.readable(difference['of']) if difference else 'methods'}",
-                "published": _f(question["anova"][0]) if question["anova"] else "–",
-                "corrected": _difference(difference) if known else "–",
-            }
-        )
-    return rows
+    return [
+        {
+            "result": f"{words.readable(question['item']) or 'rating'}: {words.readable(difference['of'])}",
+            "published": _f(question["anova"][0]) if question["anova"] else "–",
+            "corrected": _difference(difference) if difference["mean"] is not None else "–",
+        }
+        for question in variance
+        for difference in question["differences"]
+    ]
 
 
 # Tables
@@ -237,9 +257,10 @@ def difference_table(name: str, questions: Sequence[Result]) -> Table:
     """Return the difference of the methods over participants."""
     return tables.make(
         f"{name}_differences",
-        "Corrected: difference of each participant’s own ratings of the two methods. Mean, 95% interval, and t test.",
-        "item of mean low high t degrees_of_freedom p_value",
-        _by_question(questions, lambda question: [question["difference"]] if question["difference"] else []),
+        "Corrected: difference of each participant’s own ratings of two methods. Mean, 95% interval, and t test (the "
+        "exact sign test where all participants differ alike); p-values of several pairs adjusted by Holm’s method.",
+        "item of mean low high t degrees_of_freedom p_value holm_p_value",
+        _by_question(questions, lambda question: question["differences"]),
     )
 
 

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast, get_args
 
+from study.spreadsheets import safe_cell
+
 LONGEST_SHORT = 30
 """Longer text may break into lines. [characters]"""
 
@@ -245,7 +247,8 @@ def as_csv(table: Table) -> str:
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([column.key for column in table.columns])
     for row in table.rows:
-        writer.writerow(["" if row.get(column.key) is None else row[column.key] for column in table.columns])
+        cells = (row.get(column.key) for column in table.columns)
+        writer.writerow(["" if cell is None else safe_cell(cell) for cell in cells])
     return buffer.getvalue()
 
 

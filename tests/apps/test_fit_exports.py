@@ -2,47 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import norm
-
-from study.apps.cli import run
-
-
-@pytest.fixture
-def fitted(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """A function that writes a file, fits it, and gives the JSON."""
-
-    def fit(text: str | bytes, *arguments: str) -> dict[str, Any]:
-        path = tmp_path / "data.csv"
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        code = run(["fit", str(path), *arguments, "--json"])
-        output = capsys.readouterr()
-        assert code == 0, output.err
-        found: dict[str, Any] = json.loads(output.out)
-        return found
-
-    return fit
-
-
-@pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., str]:
-    """A function that writes a file, expects a refusal in one line, and gives it."""
-
-    def refuse(text: str | bytes, *arguments: str) -> str:
-        path = tmp_path / "data.csv"
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        assert run(["fit", str(path), *arguments]) == 2
-        message = capsys.readouterr().err.strip()
-        assert len(message.splitlines()) == 1
-        return message
-
-    return refuse
 
 
 def chance_different(frames: float) -> float:

@@ -14,7 +14,6 @@ from starlette.testclient import TestClient
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from study.apps.server import hosting
-from study.apps.server.researcher import csv_safe
 from study.apps.server.running import configuration
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
@@ -314,16 +313,6 @@ def test_the_researchers_token_is_long_and_stands_in_no_log(serve, caplog):
         assert TOKEN not in reply.text
     assert TOKEN not in caplog.text
     assert TOKEN not in "".join(serving.client.get(path).text for path in ("/", "/researcher", "/api/study"))
-
-
-@pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠"])
-def test_cells_that_begin_like_formulas_are_text(sign):
-    assert csv_safe(f"{sign}1+1") == f"'{sign}1+1"
-
-
-def test_cells_that_are_none_stay_what_they_are():
-    for cell in ("a=b", "", -1.5, 3, None, True, " x"):
-        assert csv_safe(cell) == cell
 
 
 def test_a_name_that_begins_like_a_formula_is_text_in_every_table(serve):

@@ -13,7 +13,14 @@ from study.errors import SessionError
 from study.experiment.export import export, label, labels
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.responses import begin_session, open_responses, record_answer, record_form
+from study.experiment.responses import (
+    Presentation,
+    begin_session,
+    export_csv,
+    open_responses,
+    record_answer,
+    record_form,
+)
 from study.experiment.session import Answer
 
 
@@ -55,6 +62,29 @@ def test_psych_ds_names_and_describes_everything(tmp_path, toy_protocol, respons
     with responses.engine.connect() as connection:
         assert answers == connection.exec_driver_sql("SELECT count(*) FROM answers").scalar()
     assert (folder / "materials" / "protocol.toml").read_text(encoding="utf-8") == toy_protocol.text
+
+
+@pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t=", "\r", " =", "\ufeff=", "＝"])
+@pytest.mark.parametrize("kind", ["csv", "psych-ds", "bids"])
+def test_no_text_in_any_export_begins_like_a_formula(tmp_path, toy_protocol, toy_stimuli, sign, kind):
+    """What participants type, and what a browser sends of its presentations."""
+    said = f"{sign}HYPERLINK(1)"
+    with open_responses(tmp_path / "answers.sqlite") as opened:
+        record = begin_session(opened, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, said))
+        record_form(opened, record, {field.name: said for field in toy_protocol.form})
+        shown = Presentation(1, 1, "first", "x", said, 9, 9, 1.0, True)
+        record_answer(opened, record, Answer(1, "", 1, "same", 0.75), [shown])
+        if kind == "csv":
+            files = [export_csv(opened, tmp_path / "answers.csv")]
+        else:
+            files = [*export(toy_protocol, opened, kind, tmp_path / "out").rglob("*.[ct]sv")]
+    cells = [cell for file in files for row in rows(file, "\t" if kind == "bids" else ",") for cell in row.values()]
+    assert sum("HYPERLINK" in cell for cell in cells) >= (1 if kind == "csv" else 2)
+    assert not [cell for cell in cells if cell.lstrip(" \ufeff")[:1] in "=+-@＝\t\r" and "HYPERLINK" in cell]
+    differences = [
+        row.get("difference_frames") for file in files for row in rows(file, "\t" if kind == "bids" else ",")
+    ]
+    assert [float(value) for value in differences if value]
 
 
 def test_bids_has_a_file_a_participant_and_study_with_its_sidecar(tmp_path, toy_protocol, responses):

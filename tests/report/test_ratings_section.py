@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+import pandas as pd
+
+from study.analysis.rating_comparisons import rating_anova
+from study.analysis.ratings import rating_table
 from study.report.ratings_section import ratings_section
+from study.report.sections import Section
 
 
 def question(item: str, mean: float, f: float, p: float) -> dict[str, Any]:
@@ -12,10 +18,10 @@ def question(item: str, mean: float, f: float, p: float) -> dict[str, Any]:
     effect |= {"source": "method", "f": f, "p_value": p, "partial_eta_squared": 0.1}
     rest = {"source": "residual", "degrees_of_freedom": 48, "sum_of_squares": 48.0, "mean_square": 1.0}
     difference = {"of": "cut-wang2003 minus cut-lee2002", "mean": mean, "low": 0.0, "high": 1.0, "t": 2.0}
-    difference |= {"degrees_of_freedom": 25, "p_value": p}
+    difference |= {"degrees_of_freedom": 25, "p_value": p, "holm_p_value": p, "test": "Student's t", "note": ""}
     nothing = {"type_ii": None, "ordinal": None, "participants": 26, "answers": 52, "note": ""}
     nothing |= {"mixed_design": {"effects": [], "note": ""}, "ranks": {"between": [], "participants": None, "note": ""}}
-    return {"item": item, "anova": [effect, rest], "difference": difference, **nothing}
+    return {"item": item, "anova": [effect, rest], "difference": difference, "differences": [difference], **nothing}
 
 
 ROWS = [
@@ -46,6 +52,50 @@ def test_the_worse_method_is_not_called_better() -> None:
         "participants "
         "this is not chance (p = .015)."
     )
+
+
+def ratings_of(values: dict[str, list[float]]) -> pd.DataFrame:
+    """One rating of each method a participant, all shown in the same order."""
+    rows = [
+        (f"p{person}", "rating", method, trial, str(value))
+        for trial, (method, own) in enumerate(values.items())
+        for person, value in enumerate(own)
+    ]
+    return pd.DataFrame(rows, columns=["participant", "task", "method_a", "trial", "answer"])
+
+
+def section_of(values: dict[str, list[float]]) -> Section:
+    answers = ratings_of(values)
+    return ratings_section("s", "Sliders", rating_table(answers), rating_anova(answers), mark="", points=101)
+
+
+def test_three_methods_are_tested_together_and_in_pairs() -> None:
+    """F by statsmodels' repeated-measures analysis of variance, p-values of pairs by Holm's method."""
+    from statsmodels.stats.anova import AnovaRM
+
+    rng = np.random.default_rng(4)
+    values = {
+        name: [round(float(x), 2) for x in rng.normal(mean, 15, 16)]
+        for name, mean in zip("abc", (30, 45, 60), strict=True)
+    }
+    section = section_of(values)
+    table = ratings_of(values).astype({"answer": float})
+    expected = AnovaRM(table, "answer", "participant", within=["method_a"]).fit().anova_table.iloc[0]["F Value"]
+    assert f"all methods over participants F(2, 30) = {expected:.2f}, p" in section.headlines[0].detail
+    assert "by ranks (Friedman) p" in section.headlines[0].detail
+    differences = next(shown for shown in section.tables if shown.name == "s_differences")
+    assert [row["of"] for row in differences.rows] == ["b minus a", "c minus a", "c minus b"]
+    assert all(row["holm_p_value"] >= row["p_value"] for row in differences.rows)
+    assert len(section.readings) == 3
+
+
+def test_participants_who_all_differ_alike_are_tested_by_signs() -> None:
+    section = section_of({"a": [5.0] * 12, "b": [1.0] * 12})
+    assert "A was rated 4.00 points higher than b" in section.headlines[0].statement
+    assert "over participants −4.00 for every participant, exact sign test p < .001" in section.headlines[0].detail
+    ordinal = next(table for table in section.folded if table.name == "s_ordinal")
+    assert ordinal.rows[0]["odds_ratio"] is ordinal.rows[0]["value"] is None
+    assert any("separate perfectly" in note for note in section.notes)
 
 
 def test_a_single_method_has_no_comparison() -> None:

@@ -22,14 +22,11 @@ from study.experiment import session as flow
 from study.experiment.observers import questions
 from study.experiment.response_tables import events, form_values, participants, presentations, sessions, withdrawals
 from study.experiment.responses import answers_frame, session_by_id
+from study.spreadsheets import safe_cell, safe_table
 
 Handler = Callable[[Request], Awaitable[Response]]
 
 LATEST_FAULTS = 50
-
-FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r", "\n", "\N{FULLWIDTH EQUALS SIGN}", "\N{FULLWIDTH PLUS SIGN}",
-                 "\N{FULLWIDTH HYPHEN-MINUS}", "\N{FULLWIDTH COMMERCIAL AT}")  # fmt: skip
-"""What a spreadsheet takes for the beginning of a formula, or passes over before one."""
 
 
 def researcher_routes(host: Host, guarded: Callable[[Handler], Handler]) -> list[Route]:
@@ -121,25 +118,17 @@ def _questions(host: Host, session_id: int, sitting: Sitting | None) -> int:
     return host.questions[session_id]
 
 
-def csv_safe(value: Any) -> Any:
-    """A cell that no spreadsheet runs: text that begins like a formula gets an apostrophe."""
-    if isinstance(value, str) and value.startswith(FORMULA_SIGNS):
-        return f"'{value}"
-    return value
-
-
 def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text)
     writer.writerow(columns)
-    writer.writerows([csv_safe(cell) for cell in row] for row in rows)
+    writer.writerows([safe_cell(cell) for cell in row] for row in rows)
     return text.getvalue()
 
 
 def _answers(host: Host) -> str:
     table = answers_frame(host.responses, all_attempts=True, roles=("trial", "practice", "check"))
-    text = table.select_dtypes(["object", "string"]).columns
-    return str(table.assign(**{name: table[name].map(csv_safe) for name in text}).to_csv(index=False))
+    return str(safe_table(table).to_csv(index=False))
 
 
 def _joined(host: Host, table: sa.Table, *columns: sa.Column[Any]) -> str:
