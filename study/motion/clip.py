@@ -20,6 +20,10 @@ FloatArray = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
 
+MOST_POSES = 20_000_000
+"""Frames times joints that a clip may have: half an hour at 120 frames a second of a body with hands, in 640 MB."""
+LOWEST_FPS, HIGHEST_FPS = 1 / 3600, 100_000.0
+
 
 @dataclass(frozen=True, eq=False)
 class Clip:
@@ -103,6 +107,15 @@ class Clip:
         return replace(self, history=(*self.history, what))
 
 
+def refuse_large(frames: int, joints: int, who: str) -> None:
+    """`MotionError` where a clip of so many frames and joints would fill the memory; `who` is for the message."""
+    if frames * joints > MOST_POSES:
+        raise MotionError(
+            f"Expected at most {MOST_POSES:,} frames times joints in {who}, found {frames:,} x {joints:,}. "
+            "Cut it into pieces, or take a lower frame rate."
+        )
+
+
 def _by_part(rotations: FloatArray) -> FloatArray:
     """A new array `(4, joints, frames)`: whole rows of one part of one joint, which products run through quickly.
 
@@ -166,6 +179,7 @@ def resample(clip: Clip, fps: float) -> Clip:
     ratio = clip.fps / fps
     # The tolerance keeps the last frame where (frames - 1) / ratio is whole but for rounding.
     count = int(np.floor((clip.frames - 1) / ratio + 1e-6)) + 1
+    refuse_large(count, clip.skeleton.joints, f"{clip.name or 'the clip'} at {fps:g} fps")
     times = np.minimum(np.arange(count) * ratio, clip.frames - 1)
     nearest = np.round(times)
     times = np.where(np.abs(times - nearest) < 1e-6, nearest, times)
