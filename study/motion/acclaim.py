@@ -448,7 +448,7 @@ def _assemble(
     offsets = np.where(parents[:, None] >= 0, tips[parents], 0.0)
     names = tuple(bone.name for bone in bones)
     frames = len(next(iter(values.values())))
-    refuse_large(frames, len(bones), str(source.path))
+    refuse_large(frames, len(bones), str(source.path), sum(each.size for each in values.values()))
     rotations = np.empty((frames, len(bones), 4))
     for j, bone in enumerate(bones):
         rotations[:, j] = _rotation(bone, values.get(bone.name), frames, degrees)

@@ -324,7 +324,7 @@ def _assemble(
     parents = np.array([joint.parent for joint in hierarchy.joints])
     offsets = np.array([joint.offset for joint in hierarchy.joints])
     ends = hierarchy.ends
-    refuse_large(len(values), len(names), str(source.path))
+    refuse_large(len(values), len(names), str(source.path), values.size)
     rotations = _rotations(hierarchy.joints, values)
     paths = {j: _path(joint, values) for j, joint in enumerate(hierarchy.joints) if joint.columns("position") or j == 0}
     # Constant places first: on rigs with six channels everywhere the data say how long the bones are.

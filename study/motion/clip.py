@@ -22,6 +22,8 @@ _UNIT_TOLERANCE = 1e-6
 
 MOST_POSES = 20_000_000
 """Frames times joints that a clip may have: half an hour at 120 frames a second of a body with hands, in 640 MB."""
+# A file of few numbers can ask for many joints in many frames; up to so many it may.
+_FEW_POSES, _POSES_A_NUMBER = 1_000_000, 8
 LOWEST_FPS, HIGHEST_FPS = 1 / 3600, 100_000.0
 
 
@@ -107,8 +109,23 @@ class Clip:
         return replace(self, history=(*self.history, what))
 
 
-def refuse_large(frames: int, joints: int, who: str) -> None:
-    """`MotionError` where a clip of so many frames and joints would fill the memory; `who` is for the message."""
+def refuse_large(frames: int, joints: int, who: str, values: int | None = None) -> None:
+    """`MotionError` where a clip would fill the memory, or is far larger than the numbers that a file has for it.
+
+    Parameters
+    ----------
+    frames, joints
+        Of the clip.
+    who
+        What it is called, for the message.
+    values
+        Numbers that the file holds.
+    """
+    if values is not None and frames * joints > max(_FEW_POSES, _POSES_A_NUMBER * values):
+        raise MotionError(
+            f"Expected most joints of {who} to move, found {joints:,} joints and {values // frames} numbers a frame. "
+            "Leave out the joints that have no channels."
+        )
     if frames * joints > MOST_POSES:
         raise MotionError(
             f"Expected at most {MOST_POSES:,} frames times joints in {who}, found {frames:,} x {joints:,}. "
