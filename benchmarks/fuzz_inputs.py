@@ -5,6 +5,7 @@ Some of them are built, not damaged: deep or wide skeletons, one name many times
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import sqlite3
@@ -24,9 +25,10 @@ NUMBERS = (
     "3", "4", "7", "0.25", "0.9", "0.99", "1.5", "12.0", "20", "45", "60", "-2", "240", "600", "0.001", "1e-3", "90",
 )  # fmt: skip
 WORDS = (
-    "", " ", "a", "A" * 300, "word" * 2500, "=1+1", "@x", "-", "_", ".", "..", "../x", "con", "é", "日本語", "\u202e", "\ufeff",
-    "\0", "\x1b[31m", "{standard}", "{nonsense}", "{", "}", "%s", "${x}", "<b>", "&amp;", "'", '"', "\\", "ROOT", "MOTION",
-    "End", ":root", "begin", "end", "#", ",", ";", "\t", "\r", "nan", "None", "null", "first", "second", "same", "1 2",
+    "", " ", "a", "A" * 300, "word" * 2500, "=1+1", "@x", "-", "_", ".", "..", "../x", "con", "é", "日本語",
+    "\u202e", "\ufeff", "\0", "\x1b[31m", "{standard}", "{nonsense}", "{", "}", "%s", "${x}", "<b>", "&amp;",
+    "'", '"', "\\", "ROOT", "MOTION", "End", ":root", "begin", "end", "#", ",", ";", "\t", "\r", "nan",
+    "None", "null", "first", "second", "same", "1 2",
 )  # fmt: skip
 
 
@@ -158,7 +160,9 @@ def _tree() -> list[tuple[int, str, str]]:
     return joints
 
 
-def _bvh_text(joints: Sequence[tuple[int, str, str]], rows: int, generator: Generator, channels: bool = True) -> bytes:
+def _bvh_text(
+    joints: Sequence[tuple[int, str, str]], rows: int, generator: Generator, channels: bool = True, turn: float = 2.0
+) -> bytes:
     """A BVH file of a tree of joints; without channels but for the root's where `channels` is false."""
     lines = ["HIERARCHY"]
     for number, (depth, name, offset) in enumerate(joints):
@@ -172,7 +176,7 @@ def _bvh_text(joints: Sequence[tuple[int, str, str]], rows: int, generator: Gene
             lines += ["End Site", "{", "OFFSET 0 3 0", "}"]
             lines += ["}"] * (depth + 1 - up)
     columns = 6 + (3 * (len(joints) - 1) if channels else 0)
-    values = np.cumsum(generator.normal(0.0, 2.0, (rows, columns)), axis=0)
+    values = np.cumsum(generator.normal(0.0, turn, (rows, columns)), axis=0)
     lines += ["MOTION", f"Frames: {rows}", "Frame Time: 0.033333"]
     lines += [" ".join(f"{value:.4f}" for value in row) for row in values]
     return "\n".join(lines).encode() + b"\n"
@@ -211,6 +215,58 @@ def bvh(generator: Generator) -> bytes:
     )
 
 
+def sound_bvh(generator: Generator) -> bytes:
+    """A BVH file without mistakes."""
+    return _bvh_text(_tree(), 20, generator, turn=0.2)
+
+
+_LIBRARY = """\
+[defaults]
+unit = "cm"
+up = "Y"
+
+[clips.walk]
+file = "walk.bvh"
+kind = "walking"
+words = "a walk"
+start_s = 0.1
+end_s = 0.5
+fps = 30.0
+
+[clips.run]
+file = "run.bvh"
+mirrored = true
+first_frame = 1
+last_frame = 15
+
+[clips.run.joints]
+"hip.L" = "LeftUpLeg"
+pelvis = "Hips"
+"""
+
+
+def library(generator: Generator) -> bytes:
+    """A `library.toml` with mistakes."""
+    if generator.random() < 0.03:
+        size = int(pick(generator, (300, 5000, 30_000)))
+        return (_LIBRARY + f"deep = {'[' * size}{']' * size}\n").encode()
+    return (
+        _with_other_values(generator, _LIBRARY)
+        if generator.random() < 0.6
+        else damaged(generator, _LIBRARY.encode(), 2)
+    )
+
+
+def _with_other_values(generator: Generator, text: str) -> bytes:
+    """One or two sound lines with another value: mistakes that the TOML survives."""
+    for _ in range(int(generator.integers(1, 3))):
+        line = pick(generator, list(_KEYS.finditer(text)))
+        value = pick(generator, NUMBERS) if generator.random() < 0.6 else json.dumps(pick(generator, WORDS))
+        value = f"[{', '.join([value] * int(generator.integers(1, 4)))}]" if generator.random() < 0.3 else value
+        text = text[: line.start()] + f"{line[1]} = {value}" + text[line.end() :]
+    return text.encode("utf-8", "replace")
+
+
 _ASF = """\
 :version 1.10
 :name body
@@ -234,14 +290,14 @@ def acclaim(generator: Generator) -> tuple[bytes, bytes]:
     for side in "lr":
         leg = [f"{side}{part}" for part in ("hipjoint", "femur", "tibia", "foot")]
         names += leg
-        children |= {parent: [child] for parent, child in zip(leg, leg[1:], strict=False)}
+        children |= {parent: [child] for parent, child in itertools.pairwise(leg)}
     if generator.random() < 0.02:
         names += [f"b{k}" for k in range(int(pick(generator, (1500, 6000, 15_000))))]
         many = [name for name in names if re.fullmatch(r"b\d+", name)]
         if generator.random() < 0.5:
             children |= {"head": many}
         else:
-            children |= {parent: [child] for parent, child in zip(["head", *many], many, strict=False)}
+            children |= {parent: [child] for parent, child in itertools.pairwise(["head", *many])}
     free = {name: pick(generator, (("rx", "ry", "rz"), ("rx",), ())) for name in names}
     if generator.random() < 0.1:
         free = dict.fromkeys(names, ())
@@ -391,13 +447,7 @@ def protocol(generator: Generator) -> bytes:
     if generator.random() < 0.04:
         return _large_protocol(generator).encode("utf-8", "replace")
     if generator.random() < 0.6:
-        # One or two sound lines with another value: mistakes that the TOML survives.
-        for _ in range(int(generator.integers(1, 3))):
-            line = pick(generator, list(_KEYS.finditer(text)))
-            value = pick(generator, NUMBERS) if generator.random() < 0.6 else json.dumps(pick(generator, WORDS))
-            value = f"[{', '.join([value] * int(generator.integers(1, 4)))}]" if generator.random() < 0.3 else value
-            text = text[: line.start()] + f"{line[1]} = {value}" + text[line.end() :]
-        return text.encode()
+        return _with_other_values(generator, text)
     return damaged(generator, text.encode(), 2)
 
 
@@ -437,9 +487,9 @@ def _large_protocol(generator: Generator) -> str:
 def table(generator: Generator) -> tuple[bytes, tuple[str, ...]]:
     """A few answers of a few people, of all degrees of agreement; and the options that `fit` needs for it."""
     task = pick(generator, ("preference", "preference", "rating", "same-different", "2afc", "yes-no"))
-    people, trials = int(generator.integers(1, 13)), int(generator.integers(1, 9))
+    people, trials = int(pick(generator, (1, 2, 3, 4, 4, 5, 7, 12))), int(pick(generator, (1, 2, 3, 3, 4, 8)))
     agree, motions = float(generator.choice([0.0, 0.5, 0.7, 0.9, 1.0])), int(generator.integers(1, 4))
-    methods = ("geo", "fix", "cut")[: int(generator.integers(2, 4))]
+    methods = ("geo", "fix", "cut")[: int(pick(generator, (2, 2, 2, 3)))]
     rows = []
     for person in range(people):
         for _ in range(int(generator.integers(1, trials + 1))):

@@ -202,8 +202,8 @@ def _next(view: dict[str, Any]) -> tuple[str, dict[str, Any]]:
 
 _PATHS = ("begin", "done", "answer", "happened", "alive", "leave", "withdraw")
 _STRANGE = (
-    None, True, -1, 0, 1e308, 10**30, "", "x", "x" * 5000, [], {}, [[]], {"a": {}}, "\u0000", "\ud800", "=1+1", 0.5, "=cmd",
-    [1e308] * 3, {"a" * 100: 1}, "first", "2", "focus-lost", 2**63,
+    None, True, -1, 0, 1e308, 10**30, "", "x", "x" * 5000, [], {}, [[]], {"a": {}}, "\u0000", "\ud800", "=1+1", 0.5,
+    "=cmd", [1e308] * 3, {"a" * 100: 1}, "first", "2", "focus-lost", 2**63,
 )  # fmt: skip
 
 
