@@ -24,6 +24,12 @@ NUMBERS = (
     '""', "[]", "{}", "'a'", "1979-05-27", "0b" + "1" * 20_000, "0x" + "f" * 5000, "3.5", "-5", "100000", "1e-5", "30",
     "3", "4", "7", "0.25", "0.9", "0.99", "1.5", "12.0", "20", "45", "60", "-2", "240", "600", "0.001", "1e-3", "90",
 )  # fmt: skip
+_PLAUSIBLE = (
+    "0", "1", "2", "3", "5", "12", "24", "60", "0.0", "0.1", "0.5", "0.95", "1.0", "1.5", "30.0", "1e-9", "true", "false",
+    '"random"', '"balanced"', '"both"', '"by-group"', '"as-listed"', '"walk"', '"jog"', '"stand"', '"geodesic"', '"cut"',
+    '"fixed"', '"velocity"', '"timewarp"', '"cut-wang2003"', '"one-hop"', '"front"', '"clearest"', '"de"', '"ja"', '"xx"',
+    '"text"', '"choice"', '"{standard}"', '"pair"', '"rating"', '"preference"', '"walk_run"', '"jnd"', '"liking"', '"x"',
+)  # fmt: skip
 WORDS = (
     "", " ", "a", "A" * 300, "word" * 2500, "=1+1", "@x", "-", "_", ".", "..", "../x", "con", "é", "日本語",
     "\u202e", "\ufeff", "\0", "\x1b[31m", "{standard}", "{nonsense}", "{", "}", "%s", "${x}", "<b>", "&amp;",
@@ -153,11 +159,15 @@ def _tree() -> list[tuple[int, str, str]]:
     """A small body: depth, name and offset of each joint, depth first."""
     joints = [(0, "Hips", "0 95 0")]
     for side in _SIDES:
-        joints += [(depth + 1, side + name, offset) for depth, (name, offset) in enumerate(_LEG)]
+        joints += [(depth + 1, side + name, _mirrored(side, offset)) for depth, (name, offset) in enumerate(_LEG)]
     joints += [(1, "Spine", "0 12 0"), (2, "Neck", "0 35 0"), (3, "Head", "0 10 0")]
     for side in _SIDES:
-        joints += [(depth + 2, side + name, offset) for depth, (name, offset) in enumerate(_ARM)]
+        joints += [(depth + 2, side + name, _mirrored(side, offset)) for depth, (name, offset) in enumerate(_ARM)]
     return joints
+
+
+def _mirrored(side: str, offset: str) -> str:
+    return f"-{offset}".replace("--", "") if side == "Right" else offset
 
 
 def _bvh_text(
@@ -261,8 +271,11 @@ def _with_other_values(generator: Generator, text: str) -> bytes:
     """One or two sound lines with another value: mistakes that the TOML survives."""
     for _ in range(int(generator.integers(1, 3))):
         line = pick(generator, list(_KEYS.finditer(text)))
-        value = pick(generator, NUMBERS) if generator.random() < 0.6 else json.dumps(pick(generator, WORDS))
-        value = f"[{', '.join([value] * int(generator.integers(1, 4)))}]" if generator.random() < 0.3 else value
+        how = generator.random()
+        value = (
+            pick(generator, _PLAUSIBLE if how < 0.4 else NUMBERS) if how < 0.7 else json.dumps(pick(generator, WORDS))
+        )
+        value = f"[{', '.join([value] * int(generator.integers(1, 4)))}]" if generator.random() < 0.2 else value
         text = text[: line.start()] + f"{line[1]} = {value}" + text[line.end() :]
     return text.encode("utf-8", "replace")
 
