@@ -55,9 +55,9 @@ def with_words(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _question(known: Mapping[str, Any], field: Any) -> Any:
     """A question of the form; one that has a name and no label is the built-in one of that name."""
-    if not isinstance(field, dict) or "label" in field or field.get("name") not in known:
+    if not isinstance(field, dict) or "label" in field or not isinstance(name := field.get("name"), str):
         return field
-    return {**known[field["name"]], **field}
+    return {**known.get(name, {}), **field}
 
 
 def built_in_questions() -> tuple[str, ...]:

@@ -92,7 +92,8 @@ _NUMBERS = {
     **dict.fromkeys(("nine", "neun", "neuf"), 9),
     **dict.fromkeys(("ten", "zehn", "dix"), 10),
 }
-_SECONDS = re.compile(r"(\d+(?:[.,]\d+)?|\w+)\s*(?:seconds?|secondes?|Sekunden?|秒)(?!\w)", re.IGNORECASE)
+# A number or a word is looked at from its beginning only, so that one long word is run through once.
+_SECONDS = re.compile(r"((?<!\d)\d+(?:[.,]\d+)?|(?<!\w)\w+)\s*(?:seconds?|secondes?|Sekunden?|秒)(?!\w)", re.IGNORECASE)
 
 
 def _other_windows(protocol: Protocol, study: StudySpec) -> list[str]:

@@ -10,6 +10,7 @@ What a key means stands in its `description`; `docs/protocols.md` is written fro
 from __future__ import annotations
 
 import hashlib
+import re
 import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -18,11 +19,12 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
+from study.counting import counted
 from study.errors import ProtocolError
 from study.experiment.languages import with_words
 from study.experiment.protocol_checks import check_whole
-from study.experiment.protocol_errors import explain, full_location, line_of, telling
-from study.experiment.protocol_parts import Consent, FormField, Keys, Part, Slug, Texts
+from study.experiment.protocol_errors import explain, full_location, key_lines, key_path, line_of, telling
+from study.experiment.protocol_parts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
 from study.experiment.protocol_stimuli import Points, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec
 
@@ -38,6 +40,14 @@ __all__ = [
     "parse_protocol",
     "protocols_folder",
 ]
+
+LARGEST_TEXT = 1_000_000
+"""Letters of a protocol."""
+MOST_PROBLEMS = 50
+"""So many are told at once."""
+_DEEPEST = 20
+# More keys in a row than that, parted by points: the time to read them grows with the square of their number.
+_DEEP_KEY = re.compile(r"""(?<![\w\-"'])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){200}""")
 
 
 class Protocol(Part):
@@ -63,16 +73,16 @@ class Protocol(Part):
     )
     touch: bool = Field(default=True, description="Whether tablets and telephones may take part.")
     consent: Consent = Field(default=Consent(), description="What participants agree to.")
-    form: Annotated[tuple[FormField, ...], Field(strict=False)] = Field(
+    form: Annotated[tuple[FormField, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(), description="Questions about the participant, one `[[form]]` each."
     )
     keys: Keys = Field(default=Keys(), description="Keys that answer.")
     texts: Texts = Field(default=Texts(), description="What participants read.")
     analysis: AnalysisSettings = Field(default=AnalysisSettings(), description="Decisions about the analysis.")
-    transitions: Annotated[tuple[TransitionSpec, ...], Field(strict=False, min_length=1)] = Field(
-        description="The transitions, one `[[transitions]]` each."
+    transitions: Annotated[tuple[TransitionSpec, ...], Field(strict=False, min_length=1, max_length=MOST_PARTS)] = (
+        Field(description="The transitions, one `[[transitions]]` each.")
     )
-    studies: Annotated[tuple[StudySpec, ...], Field(strict=False, min_length=1)] = Field(
+    studies: Annotated[tuple[StudySpec, ...], Field(strict=False, min_length=1, max_length=100)] = Field(
         description="The studies of the sitting, one `[[studies]]` each, in order."
     )
 
@@ -101,16 +111,16 @@ class Protocol(Part):
 
     def study(self, name: str) -> StudySpec:
         """A study by name."""
-        return _named(self.studies, name, "study")
+        return _named(self.studies, (name,), "study")[0]
 
     def transition(self, name: str) -> TransitionSpec:
         """A transition by name."""
-        return _named(self.transitions, name, "transition")
+        return _named(self.transitions, (name,), "transition")[0]
 
     def transitions_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
         """The transitions that a study's trials show, in its order: without those for practice alone."""
         if study.transitions:
-            return tuple(self.transition(name) for name in study.transitions)
+            return _named(self.transitions, study.transitions, "transition")
         for_practice = {name for other in self.studies for name in other.practice_transitions}
         return tuple(transition for transition in self.transitions if transition.name not in for_practice)
 
@@ -136,7 +146,7 @@ class Protocol(Part):
 
     def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
         """The transitions that a study's practice alone shows."""
-        return tuple(self.transition(name) for name in study.practice_transitions)
+        return _named(self.transitions, study.practice_transitions, "transition")
 
     def points_for(self, study: StudySpec, transition: TransitionSpec) -> Points:
         """The conditions for one transition in one study: the protocol's, the study's and the transition's own."""
@@ -149,11 +159,12 @@ class Protocol(Part):
 Named = TypeVar("Named", StudySpec, TransitionSpec)
 
 
-def _named(parts: Iterable[Named], name: str, kind: str) -> Named:
+def _named(parts: Iterable[Named], names: Iterable[str], kind: str) -> tuple[Named, ...]:
     found = {part.name: part for part in parts}
-    if name not in found:
-        raise ProtocolError(f"Expected the name of a {kind}, found {name!r}; there are {', '.join(found)}.")
-    return found[name]
+    for name in names:
+        if name not in found:
+            raise ProtocolError(f"Expected the name of a {kind}, found {name!r}; there are {', '.join(found)}.")
+    return tuple(found[name] for name in names)
 
 
 def load_protocol(path: str | Path) -> Protocol:
@@ -164,11 +175,12 @@ def load_protocol(path: str | Path) -> Protocol:
     ProtocolError
         For a file that can't be read, TOML that doesn't parse (with its line), and every key that is unknown (with
         the nearest valid one), missing, of the wrong type or out of range (with its line and key path). All such
-        problems are named at once.
+        problems are named at once, up to 50.
     """
     path = Path(path)
     try:
-        text = path.read_bytes().decode("utf-8")
+        with path.open("rb") as file:
+            text = file.read(LARGEST_TEXT + 1).decode("utf-8")
     except OSError as error:
         raise ProtocolError(
             f"{path}: expected a protocol file, found none ({error.strerror}); check the path."
@@ -183,21 +195,51 @@ def load_protocol(path: str | Path) -> Protocol:
 def parse_protocol(text: str, path: Path | None = None) -> Protocol:
     """Check a protocol's text; `path` is for messages."""
     where = str(path) if path else "protocol"
+    data = _read_toml(text, where)
+    try:
+        protocol = Protocol.model_validate(with_words(data))
+    except ValidationError as error:
+        found, lines = list(telling(Protocol, error.errors())), dict(key_lines(text))
+        sentences = []
+        for detail in found[:MOST_PROBLEMS]:
+            line = line_of(lines, full_location(detail))
+            sentences.append(f"{where}{f':{line}' if line else ''}: {explain(Protocol, detail)}")
+        if more := len(found[MOST_PROBLEMS:]):
+            sentences.append(f"{where}: {counted(more, 'more problem')}; mend these first.")
+        raise ProtocolError("\n".join(sentences)) from None
+    protocol._text, protocol._path = text, path
+    return protocol
+
+
+def _read_toml(text: str, where: str) -> dict[str, Any]:
+    """The data of a text; refused where it is no TOML, or is larger, deeper or of larger numbers than any protocol."""
+    too_deep = f"{where}: expected keys and lists at most {_DEEPEST} deep, found deeper ones; remove them."
+    if len(text) > LARGEST_TEXT:
+        raise ProtocolError(
+            f"{where}: expected a protocol of at most {LARGEST_TEXT:,} letters, found more; shorten it."
+        )
+    if _DEEP_KEY.search(text):
+        raise ProtocolError(too_deep)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ProtocolError(f"{where}: expected TOML, found a mistake: {error}. Mend that line.") from error
-    try:
-        protocol = Protocol.model_validate(with_words(data))
-    except ValidationError as error:
-        lines = []
-        for detail in telling(Protocol, error.errors()):
-            location = full_location(detail)
-            line = line_of(text, location)
-            lines.append(f"{where}{f':{line}' if line else ''}: {explain(Protocol, detail)}")
-        raise ProtocolError("\n".join(lines)) from None
-    protocol._text, protocol._path = text, path
-    return protocol
+    except RecursionError:
+        raise ProtocolError(too_deep) from None
+    except ValueError as error:  # Python's own limit for whole numbers, or a date that there is not
+        raise ProtocolError(f"{where}: expected TOML, found a number or a date out of range ({error}).") from error
+    parts: list[tuple[Any, tuple[int | str, ...]]] = [(data, ())]
+    while parts:
+        part, location = parts.pop()
+        if len(location) > _DEEPEST:
+            raise ProtocolError(too_deep)
+        if isinstance(part, int) and not -(2**63) <= part < 2**63:
+            raise ProtocolError(
+                f"{where}: {key_path(location)}: expected a whole number of at most 64 bits, found more."
+            )
+        inner = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
+        parts += [(value, (*location, key)) for key, value in inner]
+    return data
 
 
 def protocols_folder() -> Path:

@@ -12,9 +12,13 @@ from typing import Protocol as Shape
 from pydantic import ValidationError
 
 from study.counting import counted
-from study.experiment.protocol_errors import KeyMismatchError
+from study.experiment.protocol_errors import KeyMismatchError, short
+from study.experiment.protocol_parts import LONGEST_NAME
 from study.experiment.protocol_stimuli import Points, Timing, TransitionSpec
-from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec, check_once
+from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec, check_once, repeated
+
+MOST_TRIALS = 100_000
+"""Of one participant in one study: far beyond what anybody could answer."""
 
 
 class Whole(Shape):
@@ -52,9 +56,10 @@ class Whole(Shape):
 def check_whole(protocol: Whole) -> None:
     """Refuse a protocol whose parts contradict each other."""
     _check_names(protocol)
+    places = {transition.name: index for index, transition in enumerate(protocol.transitions)}
     for study in protocol.studies:
         for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
-            _check_points(protocol, study, transition)
+            _check_points(protocol, study, transition, places[transition.name])
     _check_analysis(protocol)
 
 
@@ -62,10 +67,9 @@ def _check_names(protocol: Whole) -> None:
     """Refuse names that stand twice, and studies that name transitions that there are not."""
     for kind in ("transitions", "studies", "form"):
         names = [part.name for part in getattr(protocol, kind)]
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                message = f"expected each name in {kind} once, found {name!r} twice; rename one"
-                raise KeyMismatchError(message, kind, index, "name")
+        if (index := repeated(names)) is not None:
+            message = f"expected each name in {kind} once, found {names[index]!r} twice; rename one"
+            raise KeyMismatchError(message, kind, index, "name")
     known = [transition.name for transition in protocol.transitions]
     for index, study in enumerate(protocol.studies):
         for key in ("transitions", "practice_transitions"):
@@ -78,11 +82,11 @@ def _check_names(protocol: Whole) -> None:
 
 def _check_known(names: Sequence[str], known: Sequence[str], what: str, *location: int | str) -> None:
     """Refuse names of what there is not, with the nearest one."""
-    for name in names:
-        if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-            raise KeyMismatchError(f"expected names of {what}, found {name!r}; {hint}", *location)
+    there = set(known)
+    if (name := next((name for name in names if name not in there), None)) is not None:
+        near = get_close_matches(name, known, n=1) if len(name) <= LONGEST_NAME else []
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+        raise KeyMismatchError(f"expected names of {what}, found {short(name)}; {hint}", *location)
 
 
 def _check_analysis(protocol: Whole) -> None:
@@ -111,6 +115,12 @@ def _check_analysis(protocol: Whole) -> None:
 def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
     """Refuse more practice, or more attention checks, than a study has trials."""
     trials = protocol.trials_of(study)
+    if trials > MOST_TRIALS:
+        raise KeyMismatchError(
+            f"expected at most {MOST_TRIALS:,} trials in {study.name!r}, found {trials:,}; lower repeats",
+            "studies",
+            index,
+        )
     for key in ("practice", "attention_checks"):
         found = getattr(study, key)
         if found > trials:
@@ -137,9 +147,9 @@ def _check_practice(protocol: Whole, study: StudySpec, index: int) -> None:
             )
 
 
-def _check_points(protocol: Whole, study: StudySpec, transition: TransitionSpec) -> None:
+def _check_points(protocol: Whole, study: StudySpec, transition: TransitionSpec, index: int) -> None:
     """Refuse merged conditions that leave nothing to choose."""
-    where = ("transitions", protocol.transitions.index(transition))
+    where = ("transitions", index)
     who = f"for the transition {transition.name!r} in the study {study.name!r}"
     try:
         points = protocol.points_for(study, transition)

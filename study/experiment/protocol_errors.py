@@ -95,11 +95,12 @@ def explain(model: type[BaseModel], detail: Mapping[str, Any]) -> str:
     unit = _unit(model, location)
     if kind in _BOUNDS:
         bound, words = _BOUNDS[kind]
-        return f"{path}: expected {words} {context[bound]:g}{unit}, found {found!r}; change it."
+        return f"{path}: expected {words} {context[bound]:g}{unit}, found {short(found)}; change it."
     if kind == "literal_error":
-        return f"{path}: expected {context['expected']}, found {found!r}{_nearest_choice(context['expected'], found)}"
-    if kind in ("string_pattern_mismatch", "string_too_short"):
-        return f"{path}: expected {_text_rule(kind, context)}, found {found!r}; change it."
+        hint = _nearest_choice(context["expected"], found)
+        return f"{path}: expected {context['expected']}, found {short(found)}{hint}"
+    if kind in ("string_pattern_mismatch", "string_too_short", "string_too_long"):
+        return f"{path}: expected {_text_rule(kind, context)}, found {short(found)}; change it."
     if kind in ("too_short", "too_long"):
         bound, words = ("min_length", "at least") if kind == "too_short" else ("max_length", "at most")
         entries = counted(context[bound], "entry", "entries")
@@ -117,7 +118,13 @@ def _shown(value: object) -> str:
         list: "a list",
         dict: "a table",
     }
-    return f"{value!r} ({kinds.get(type(value), type(value).__name__)})"
+    return f"{short(value)} ({kinds.get(type(value), type(value).__name__)})"
+
+
+def short(value: object) -> str:
+    """A value as messages give it: not more than its beginning."""
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 _PATTERNS = {
@@ -131,11 +138,13 @@ _PATTERNS = {
 def _text_rule(kind: str, context: Mapping[str, Any]) -> str:
     if kind == "string_too_short":
         return "some text"
+    if kind == "string_too_long":
+        return f"at most {counted(context['max_length'], 'letter')}"
     return next(words for sign, words in _PATTERNS.items() if sign in context["pattern"])
 
 
 def _nearest_choice(expected: str, found: object) -> str:
-    near = get_close_matches(str(found), re.findall(r"'([^']+)'", expected), n=1)
+    near = get_close_matches(str(found)[:80], re.findall(r"'([^']+)'", expected), n=1)
     return f"; did you mean {near[0]!r}?" if near else "; choose one of these."
 
 
@@ -156,7 +165,7 @@ def _unknown_key(model: type[BaseModel], location: Location) -> str:
 def _near_key(model: type[BaseModel], location: Location) -> str:
     """The valid key that an unknown one is nearest to; empty where none is near."""
     parent = model_at(model, location[:-1])
-    near = get_close_matches(str(location[-1]), list(parent.model_fields) if parent else [], n=1)
+    near = get_close_matches(str(location[-1])[:80], list(parent.model_fields) if parent else [], n=1)
     return near[0] if near else ""
 
 
@@ -164,7 +173,10 @@ def key_path(location: Location) -> str:
     """A pydantic location as people write it: `studies[0].task`."""
     path = ""
     for step in location:
-        path += f"[{step}]" if isinstance(step, int) else (f".{step}" if path else step)
+        if isinstance(step, int):
+            path += f"[{step}]"
+        else:
+            path += ("." if path else "") + (step if len(step) <= 80 else f"{step[:77]}...")
     return path
 
 
@@ -212,9 +224,8 @@ def _unit(model: type[BaseModel], location: Location) -> str:
     return f" in {found[1]}" if found else ""
 
 
-def line_of(text: str, location: Location) -> int:
+def line_of(lines: Mapping[tuple[int | str, ...], int], location: Location) -> int:
     """The line (from 1) at which the key of a location, or else its nearest parent, stands; 0 where none does."""
-    lines = dict(_key_lines(text))
     steps = tuple(location)
     while steps:
         if steps in lines:
@@ -223,14 +234,14 @@ def line_of(text: str, location: Location) -> int:
     return 0
 
 
-def _key_lines(text: str) -> Iterator[tuple[tuple[int | str, ...], int]]:
+def key_lines(text: str) -> Iterator[tuple[tuple[int | str, ...], int]]:
     """Each table header and key of a TOML text with its location and line; inline tables count as one key."""
     table: tuple[int | str, ...] = ()
     counts: dict[tuple[int | str, ...], int] = {}
     for number, line in enumerate(text.splitlines(), start=1):
-        if header := re.match(r"\s*\[(\[?)\s*([\w.\-\"' ]+?)\s*\]", line):
+        if header := re.match(r"\s*\[(\[?)([\w.\-\"' \t]+)\]", line):
             table = ()
-            names = [name.strip(" \"'") for name in header[2].split(".")]
+            names = [name.strip(" \t\"'") for name in header[2].split(".")]
             for depth, name in enumerate(names):
                 table = (*table, name)
                 if header[1] and depth == len(names) - 1:

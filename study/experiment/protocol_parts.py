@@ -14,14 +14,26 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from study.experiment.protocol_errors import KeyMismatchError
 
-Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+LONGEST_NAME = 100
+"""Letters of a name, which also names files."""
+
+Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=LONGEST_NAME)]
 Key = Annotated[str, Field(pattern=r"^[a-z0-9]$")]
+
+LONGEST_TEXT = 20_000
+"""Letters of one text."""
+MOST_PARTS = 1000
+"""How long a list may be: of transitions, of a study's names and levels, of questions and choices."""
 
 
 class Part(BaseModel):
-    """What all parts of a protocol share: no unknown keys, no silent conversions, nothing changes later."""
+    """What all parts of a protocol share: no unknown keys or silent conversions, no infinity, no endless text, and
+    nothing changes later.
+    """
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, str_max_length=LONGEST_TEXT
+    )
 
 
 SLOTS = ("standard", "minutes", "trials", "studies", "answer_s", "contact")
@@ -71,7 +83,7 @@ class FormField(Part):
         description="What the participant reads; age, gender, vision and animation can be left to their name.",
     )
     kind: Literal["text", "number", "choice"] = Field(default="text", description="What is filled in.")
-    choices: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+    choices: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(), description="What can be chosen; for `choice` only."
     )
     least: float | None = Field(default=None, description="Smallest number that is taken; for `number` only.")

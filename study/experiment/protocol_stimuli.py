@@ -12,6 +12,9 @@ from pydantic import Field, model_validator
 from study.experiment.protocol_errors import KeyMismatchError
 from study.experiment.protocol_parts import Part, Slug
 
+LONGEST_CLIP_S, LONGEST_CLIP_FRAMES = 86_400, 86_400 * 240
+"""A day, and a day at the highest frame rate: no point of a motion lies further on."""
+
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -76,7 +79,9 @@ class Timing(Part):
         le=3,
         description="How often a trial that was badly shown is shown again, at the end of its study.",
     )
-    break_after: int = Field(default=0, ge=0, description="A break after so many trials; 0 for none. [trials]")
+    break_after: int = Field(
+        default=0, ge=0, le=1_000_000, description="A break after so many trials; 0 for none. [trials]"
+    )
 
 
 class Points(Part):
@@ -89,28 +94,33 @@ class Points(Part):
         default=None, description="`random` draws from the seed (2004 section 4.3); `given` takes the four keys below."
     )
     source_s: float | None = Field(
-        default=None, ge=0, description="Start of the blend in the source, if given. [seconds]"
+        default=None, ge=0, le=LONGEST_CLIP_S, description="Start of the blend in the source, if given. [seconds]"
     )
     destination_s: float | None = Field(
-        default=None, ge=0, description="End of the blend in the destination. [seconds]"
+        default=None, ge=0, le=LONGEST_CLIP_S, description="End of the blend in the destination. [seconds]"
     )
     source_frame: int | None = Field(
-        default=None, ge=0, description="The same as a frame at the protocol's fps. [frames]"
+        default=None, ge=0, le=LONGEST_CLIP_FRAMES, description="The same as a frame at the protocol's fps. [frames]"
     )
-    destination_frame: int | None = Field(default=None, ge=0, description="The same as a frame. [frames]")
+    destination_frame: int | None = Field(
+        default=None, ge=0, le=LONGEST_CLIP_FRAMES, description="The same as a frame. [frames]"
+    )
     shortest_frames: int | None = Field(
         default=None, ge=1, le=600, description="Shortest optimal blend to accept. [frames]"
     )
     longest_frames: int | None = Field(
         default=None, ge=1, le=600, description="Longest optimal blend to accept. [frames]"
     )
-    avoid_frames: int | None = Field(default=None, ge=1, description="A blend length to stay away from. [frames]")
+    avoid_frames: int | None = Field(
+        default=None, ge=1, le=600, description="A blend length to stay away from. [frames]"
+    )
     avoid_within_frames: int | None = Field(
-        default=None, ge=0, description="No optimal blend this near to `avoid_frames` is accepted. [frames]"
+        default=None, ge=0, le=600, description="No optimal blend this near to `avoid_frames` is accepted. [frames]"
     )
     least_warp_frames: int | None = Field(
         default=None,
         ge=0,
+        le=600,
         description="A time-warped blend is accepted if its two windows differ by so much at least. [frames]",
     )
     source_within: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(

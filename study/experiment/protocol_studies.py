@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from study.experiment.protocol_errors import KeyMismatchError
-from study.experiment.protocol_parts import Part, Slug, known_slots
+from study.experiment.protocol_parts import MOST_PARTS, Part, Slug, known_slots
 from study.experiment.protocol_stimuli import Points
 
 Method = Literal[
@@ -21,6 +21,7 @@ Method = Literal[
 Task = Literal["same-different", "preference", "rating"]
 Order = Literal["both", "random", "balanced", "by-group"]
 Show = Literal["single", "pair"]
+Difference = Annotated[int, Field(ge=-600, le=600)]
 
 OPTIMUM_CUTS = {"cut-lee2002": "lee2002", "cut-wang2003": "wang2003", "cut-pointcloud": "pointcloud"}
 """Methods that cut where a metric is least over both motions, and the metric of each (2003 section 4.2)."""
@@ -39,7 +40,7 @@ class Item(Part):
 class OneHop(Part):
     """How the method `one-hop` finds its hops (Koyama and Goto 2019)."""
 
-    hops: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+    hops: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(), description="Motions that may be hops; those of the study's transitions where it is left out."
     )
     stay_s: float = Field(
@@ -58,7 +59,7 @@ class StudySpec(Part):
     name: Slug = Field(description="What plans, answers and reports call it; unique.")
     title: str = Field(default="", description="Heading for reports; the name where it is left out.")
     task: Task = Field(description="What the participant decides.")
-    transitions: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+    transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(), description="Names of the transitions shown; all of them where it is left out."
     )
     reference: Method = Field(
@@ -73,7 +74,7 @@ class StudySpec(Part):
         description="Rating: each transition by itself (`single`, as where it is left out), or both methods' "
         "transitions as a `pair`, with items that compare the second with the first.",
     )
-    differences_frames: Annotated[tuple[int, ...], Field(strict=False)] = Field(
+    differences_frames: Annotated[tuple[Difference, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(),
         description="Same-different: comparison minus reference blend length, a pair each; 0 shows one twice. [frames]",
     )
@@ -102,7 +103,7 @@ class StudySpec(Part):
     practice: int = Field(
         default=0, ge=0, le=100, description="Trials with feedback before the study; they count for nothing. [trials]"
     )
-    practice_transitions: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+    practice_transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(),
         description="Transitions for practice and the example alone, so that neither shows what the study shows; the "
         "study's own where it is left out.",
@@ -111,7 +112,7 @@ class StudySpec(Part):
         default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
     )
     scale_points: int = Field(default=5, ge=2, le=11, description="Points of the rating scale, counted from 0.")
-    items: Annotated[tuple[Item, ...], Field(strict=False)] = Field(
+    items: Annotated[tuple[Item, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(), description="Questions of a rating study."
     )
     points: Points = Field(default=Points(), description="Conditions for this study's transition points.")
@@ -193,9 +194,19 @@ def _check_task(study: StudySpec) -> None:
 
 def check_once(values: Sequence[object], what: str, *location: int | str) -> None:
     """Refuse what stands twice in a list."""
+    if (index := repeated(values)) is not None:
+        found = f"found {values[index]!r} twice"
+        raise KeyMismatchError(f"expected each {what} once, {found}; change or remove one", *location)
+
+
+def repeated(values: Sequence[object]) -> int | None:
+    """Where the first value stands that stood before in a list; None where all differ."""
+    seen: set[object] = set()
     for index, value in enumerate(values):
-        if value in values[:index]:
-            raise KeyMismatchError(f"expected each {what} once, found {value!r} twice; change or remove one", *location)
+        if value in seen:
+            return index
+        seen.add(value)
+    return None
 
 
 class Exclusions(Part):
@@ -234,7 +245,7 @@ class AnalysisSettings(Part):
         lt=50,
         description="How far from an even split a preference may lie and count as none; 10 is 40 to 60%. [points]",
     )
-    confirmatory: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+    confirmatory: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(),
         description="Studies whose tests are adjusted together (Holm) and decide; those with a preference where it is "
         "left out. Tests of the others explore.",

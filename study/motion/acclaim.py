@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from study.counting import counted
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
-from study.motion.clip import Clip
-from study.motion.digits import ByteArray, IntArray, parse_words, split_words
-from study.motion.skeleton import Skeleton
-from study.motion.source import Source, number, read_source
+from study.motion.clip import Clip, refuse_large
+from study.motion.digits import ByteArray, IntArray, are_usable, parse_words, split_words
+from study.motion.skeleton import MOST_JOINTS, Skeleton
+from study.motion.source import Source, number, read_source, shown, whole_number
 from study.motion.units import INCH, find_scale
 
 FloatArray = NDArray[np.float64]
@@ -32,6 +32,8 @@ _LINE = re.compile(rb"[^\r\n]+")
 _WORD = re.compile(rb"[^\s()]+")
 _DOFS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
 _ROOT = "root"
+# Shorter directions and units of length are zero but for rounding.
+_SMALLEST = 1e-9
 
 CMU_FPS = 120.0
 
@@ -131,7 +133,7 @@ def _sections(source: Source) -> Iterator[tuple[str, int, list[_Words]]]:
             heading, lines = (words[0][0][1:].decode("utf-8", "replace").lower(), words[0][1]), []
             words = words[1:]
         elif heading is None:
-            raise source.error(words[0][1], f"Expected a section such as :units, found {_shown(words[0][0])}.")
+            raise source.error(words[0][1], f"Expected a section such as :units, found {shown(words[0][0])}.")
         if words:
             lines.append(words)
     if heading:
@@ -155,7 +157,14 @@ def _read_asf(source: Source) -> _Body:
         if bone.name in bones:
             raise source.error(bone.start, f"Expected each bone once, found {bone.name!r} again.")
         bones[bone.name] = bone
+        if len(bones) > MOST_JOINTS:
+            raise source.error(bone.start, f"Expected at most {MOST_JOINTS} bones, found more.")
     order, parents = _read_hierarchy(source, *sections["hierarchy"], bones)
+    if not any(bone.dofs for bone in bones.values()):
+        raise source.error(
+            root.start,
+            "Expected a degree of freedom in the root's order or a bone's dof, found none: nothing moves.",
+        )
     return _Body(source.path, tuple(bones[n] for n in order), parents, root_position, length_unit, degrees)
 
 
@@ -165,12 +174,12 @@ def _read_units(source: Source, lines: list[_Words]) -> tuple[float, bool]:
         key = words[0][0].lower()
         if key == b"length":
             (length,) = _numbers(source, words, 1, "the length unit")
-            if length <= 0.0:
+            if length < _SMALLEST:
                 raise source.error(words[1][1], f"Expected a length unit above 0, found {length:g}.")
         elif key == b"angle":
             unit = words[1][0].lower() if len(words) > 1 else b""
             if unit not in (b"deg", b"rad"):
-                raise source.error(words[-1][1], f"Expected 'angle deg' or 'angle rad', found {_shown(words[-1][0])}.")
+                raise source.error(words[-1][1], f"Expected 'angle deg' or 'angle rad', found {shown(words[-1][0])}.")
             degrees = unit == b"deg"
     return length, degrees
 
@@ -203,7 +212,7 @@ def _blocks(source: Source, start: int, lines: list[_Words]) -> Iterator[list[_W
             yield block
             block = None
         elif block is None or key == b"begin":
-            raise source.error(words[0][1], f"Expected {'end' if block else 'begin'}, found {_shown(words[0][0])}.")
+            raise source.error(words[0][1], f"Expected {'end' if block else 'begin'}, found {shown(words[0][0])}.")
         else:
             block.append(words)
     if block is not None:
@@ -220,7 +229,7 @@ def _read_bone(source: Source, lines: list[_Words], degrees: bool) -> _Bone:
     bone = _Bone(name, entries[b"name"][1][1])
     bone.direction = _numbers(source, entries[b"direction"], 3, f"the direction of {name!r}")
     size = float(np.linalg.norm(bone.direction))
-    if size == 0.0:
+    if size < _SMALLEST:
         raise source.error(entries[b"direction"][1][1], f"Expected a direction of {name!r} that is not zero.")
     bone.direction = bone.direction / size
     (bone.length,) = _numbers(source, entries[b"length"], 1, f"the length of {name!r}")
@@ -259,9 +268,9 @@ def _read_hierarchy(
         order.append(name)
         parents.append(parent_index)
         stack += [(child, len(order) - 1) for child in reversed(children.get(name, []))]
-    lost = [name for name in bones if name not in order]
-    if lost:
-        raise source.error(bones[lost[0]].start, f"Expected bone {lost[0]!r} to hang on the root in :hierarchy.")
+    if lost := bones.keys() - set(order):
+        first = min(lost, key=lambda name: bones[name].start)
+        raise source.error(bones[first].start, f"Expected bone {first!r} to hang on the root in :hierarchy.")
     return order, np.array(parents, dtype=np.int64)
 
 
@@ -275,7 +284,7 @@ def _axis_order(source: Source, words: _Words, index: int) -> str:
     word, at = words[index] if len(words) > index else (b"XYZ", 0)
     order = word.decode("utf-8", "replace").upper()
     if sorted(order) != ["X", "Y", "Z"]:
-        raise source.error(at, f"Expected an order of axes such as XYZ, found {_shown(word)}.")
+        raise source.error(at, f"Expected an order of axes such as XYZ, found {shown(word)}.")
     return order
 
 
@@ -284,7 +293,7 @@ def _dofs(source: Source, words: _Words) -> tuple[str, ...]:
     for word, at in words:
         dof = word.decode("utf-8", "replace").lower()
         if dof not in _DOFS or dof in dofs:
-            raise source.error(at, f"Expected degrees of freedom out of {', '.join(_DOFS)}, found {_shown(word)}.")
+            raise source.error(at, f"Expected degrees of freedom out of {', '.join(_DOFS)}, found {shown(word)}.")
         dofs.append(dof)
     return tuple(dofs)
 
@@ -299,10 +308,6 @@ def _fixed_axes(order: str, angles: FloatArray, degrees: bool) -> FloatArray:
     if not order:
         return np.broadcast_to(quat.IDENTITY, (*angles.shape[:-1], 4))
     return quat.from_euler(order[::-1], (np.radians(angles) if degrees else angles)[..., ::-1])
-
-
-def _shown(token: bytes) -> str:
-    return repr(token.decode("utf-8", "replace")[:40])
 
 
 # -- The motion -----------------------------------------------------------------------------------------------------
@@ -353,7 +358,7 @@ def _parse_regular(chunk: bytes, moving: dict[str, int]) -> dict[str, FloatArray
         [parse_words(data, starts[p][:, columns].ravel(), stops[p][:, columns].ravel()) for p in pieces]
     )
     table = table.reshape(-1, len(columns))
-    if np.isnan(table).any() or not np.array_equal(table[:, 0], np.arange(1, len(table) + 1)):
+    if not are_usable(table) or not np.array_equal(table[:, 0], np.arange(1, len(table) + 1)):
         return None
     values: dict[str, FloatArray] = {}
     for name, column in blocks.items():
@@ -391,18 +396,19 @@ def _parse_slowly(
             continue
         word, at = words[0]
         if len(words) == 1 and word.isdigit():
+            number_here = whole_number(source, word, at, "a frame's number")
             if frames:
                 _complete(source, frames[-1], moving, last_number, at)
-            gaps += bool(frames) and int(word) != last_number + 1
-            last_number = int(word)
+            gaps += bool(frames) and number_here != last_number + 1
+            last_number = number_here
             first_number = first_number or last_number
             frames.append({})
             continue
         if not frames:
-            raise source.error(at, f"Expected a frame number, found {_shown(word)}.")
+            raise source.error(at, f"Expected a frame number, found {shown(word)}.")
         name = word.decode("utf-8", "replace")
         if name not in known:
-            raise source.error(at, f"Expected a bone of {asf}, found {_shown(word)}. Use the subject's own ASF.")
+            raise source.error(at, f"Expected a bone of {asf}, found {shown(word)}. Use the subject's own ASF.")
         if name in frames[-1]:
             raise source.error(at, f"Expected each bone once in frame {last_number}, found {name!r} again.")
         count = moving.get(name, 0)
@@ -447,6 +453,7 @@ def _assemble(
     offsets = np.where(parents[:, None] >= 0, tips[parents], 0.0)
     names = tuple(bone.name for bone in bones)
     frames = len(next(iter(values.values())))
+    refuse_large(frames, len(bones), str(source.path), sum(each.size for each in values.values()))
     rotations = np.empty((frames, len(bones), 4))
     for j, bone in enumerate(bones):
         rotations[:, j] = _rotation(bone, values.get(bone.name), frames, degrees)

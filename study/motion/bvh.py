@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from study.counting import counted
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
-from study.motion.clip import Clip
+from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip, refuse_large
 from study.motion.digits import parse_table
-from study.motion.skeleton import Skeleton
-from study.motion.source import Source, number, read_source
+from study.motion.skeleton import MOST_JOINTS, Skeleton
+from study.motion.source import LARGEST, Source, number, read_source, shown, whole_number
 from study.motion.units import find_scale
 
 FloatArray = NDArray[np.float64]
@@ -33,6 +33,11 @@ FloatArray = NDArray[np.float64]
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 _CANONICAL = {name.lower(): name for name in _CHANNELS}
 _TOKEN = re.compile(rb"[{}]|[^\s{}]+")
+_NAME = re.compile(rb"[^{}\r\n]*")
+_LONGEST_NAME = 1000
+_MOST_CHANNELS = 12
+# So many joints whose names stand twice are named one by one.
+_NAMED = 3
 # A bone whose length the data changes by less than this (metres) is taken as rigid.
 _RIGID_M = 1e-4
 
@@ -58,6 +63,20 @@ class _Hierarchy:
     joints: list[_Joint] = field(default_factory=list)
     ends: list[tuple[int, FloatArray]] = field(default_factory=list)
     columns: int = 0
+    # Each name that is taken, with the number that the last joint of that name was given.
+    names: dict[str, int] = field(default_factory=dict)
+    renamed: list[tuple[str, str]] = field(default_factory=list)
+
+    def unique(self, name: str) -> str:
+        """A name that no joint has yet: the name itself, or with `_2`, `_3` ... behind it."""
+        unique, number = name, self.names.get(name, 1)
+        while unique in self.names:
+            number += 1
+            unique = f"{name}_{number}"
+        self.names |= {name: number, unique: 1} if unique != name else {name: 1}
+        if unique != name:
+            self.renamed.append((name, unique))
+        return unique
 
 
 def read_bvh(path: Path | str, *, metres_per_unit: float | None = None) -> Clip:
@@ -84,6 +103,10 @@ def read_bvh(path: Path | str, *, metres_per_unit: float | None = None) -> Clip:
     """
     source = read_source(path, "a BVH file")
     hierarchy, offset = _read_hierarchy(source)
+    for name, unique in hierarchy.renamed[:_NAMED]:
+        _warn(f"{source.path}: two joints are called {name!r}; the second is read as {unique!r}")
+    if more := len(hierarchy.renamed[_NAMED:]):
+        _warn(f"{source.path}: {more} more joints have the name of another, and are numbered likewise")
     fps, stated, offset = _read_motion_header(source, offset)
     values = parse_table(source, offset, hierarchy.columns)
     if stated is not None and stated != len(values):
@@ -109,7 +132,7 @@ class _Tokens:
 
     def name(self) -> str:
         """The rest of the line up to a brace: names may hold blanks."""
-        line = re.compile(rb"[^{}\r\n]*").match(self.source.raw, self.offset)
+        line = _NAME.match(self.source.raw, self.offset)
         assert line is not None  # the pattern matches nothing as well
         self.offset = line.end()
         return " ".join(self.source.text(line.start(), line.end()).split())
@@ -117,15 +140,11 @@ class _Tokens:
     def word(self, expected: str) -> None:
         token, start = self.next(expected)
         if token.upper() != expected.encode().upper():
-            raise self.source.error(start, f"Expected {expected}, found {_shown(token)}.")
+            raise self.source.error(start, f"Expected {expected}, found {shown(token)}.")
 
     def number(self, what: str) -> float:
         token, start = self.next(what)
         return number(self.source, token, start, what)
-
-
-def _shown(token: bytes) -> str:
-    return repr(token.decode("utf-8", "replace")[:40])
 
 
 def _read_hierarchy(source: Source) -> tuple[_Hierarchy, int]:
@@ -133,7 +152,7 @@ def _read_hierarchy(source: Source) -> tuple[_Hierarchy, int]:
     tokens = _Tokens(source)
     token, start = tokens.next("HIERARCHY")
     if token.upper() != b"HIERARCHY":
-        raise source.error(start, f"Expected HIERARCHY at the start of a BVH file, found {_shown(token)}.")
+        raise source.error(start, f"Expected HIERARCHY at the start of a BVH file, found {shown(token)}.")
     hierarchy = _Hierarchy()
     open_joints: list[int] = []
     while True:
@@ -160,20 +179,24 @@ def _read_hierarchy(source: Source) -> tuple[_Hierarchy, int]:
             _read_property(tokens, hierarchy, hierarchy.joints[open_joints[-1]], word, start)
         else:
             expected = "OFFSET, CHANNELS, JOINT, End Site or '}'" if open_joints else "ROOT or MOTION"
-            raise source.error(start, f"Expected {expected}, found {_shown(token)}.")
+            raise source.error(start, f"Expected {expected}, found {shown(token)}.")
 
 
 def _open_joint(tokens: _Tokens, hierarchy: _Hierarchy, start: int, open_joints: list[int]) -> int:
     name = tokens.name()
     if not name:
         raise tokens.source.error(start, "Expected a name after ROOT or JOINT, found none.")
+    if len(name) > _LONGEST_NAME:
+        raise tokens.source.error(
+            start, f"Expected a name of at most {_LONGEST_NAME} letters, found {len(name)}. Check the line."
+        )
+    if len(hierarchy.joints) == MOST_JOINTS:
+        raise tokens.source.error(
+            start, f"Expected at most {MOST_JOINTS} joints, found more. Leave out what is no part of the body."
+        )
     tokens.word("{")
-    taken = {joint.name for joint in hierarchy.joints}
-    if name in taken:
-        unique = next(f"{name}_{k}" for k in range(2, len(taken) + 3) if f"{name}_{k}" not in taken)
-        _warn(f"{tokens.source.path}: two joints are called {name!r}; the second is read as {unique!r}")
-        name = unique
-    hierarchy.joints.append(_Joint(name, open_joints[-1] if open_joints else -1, start))
+    unique = hierarchy.unique(name)
+    hierarchy.joints.append(_Joint(unique, open_joints[-1] if open_joints else -1, start))
     return len(hierarchy.joints) - 1
 
 
@@ -199,10 +222,11 @@ def _read_property(tokens: _Tokens, hierarchy: _Hierarchy, joint: _Joint, word: 
         joint.offset = np.array([tokens.number(f"a length in the OFFSET of {joint.name!r}") for _ in range(3)])
         return
     token, at = tokens.next("the number of channels")
-    if not token.isdigit():
-        raise source.error(at, f"Expected the number of channels of {joint.name!r}, found {_shown(token)}.")
+    count = whole_number(source, token, at, f"the number of channels of {joint.name!r}")
+    if count > _MOST_CHANNELS:
+        raise source.error(at, f"Expected at most {_MOST_CHANNELS} channels in {joint.name!r}, found {count}.")
     channels: list[str] = []
-    for k in range(int(token)):
+    for k in range(count):
         token, at = tokens.next("a channel name")
         channels.append(_channel(source, token, at, f"channel {k + 1} of {joint.name!r}"))
         if channels[-1].endswith("position") and channels.count(channels[-1]) > 1:
@@ -218,7 +242,7 @@ def _channel(source: Source, token: bytes, offset: int, what: str) -> str:
     if name is None:
         near = difflib.get_close_matches(token.decode("utf-8", "replace"), _CHANNELS, n=1)
         hint = f" Did you mean {near[0]}?" if near else ""
-        raise source.error(offset, f"Expected {what} to be one of {', '.join(_CHANNELS)}, found {_shown(token)}.{hint}")
+        raise source.error(offset, f"Expected {what} to be one of {', '.join(_CHANNELS)}, found {shown(token)}.{hint}")
     return name
 
 
@@ -237,22 +261,22 @@ def _read_motion_header(source: Source, offset: int) -> tuple[float, int | None,
         if key is None:
             raise source.error(
                 start,
-                f"Expected 'Frame Time:' before the data rows, found {_shown(content)}. "
+                f"Expected 'Frame Time:' before the data rows, found {shown(content)}. "
                 "Add the line, for instance 'Frame Time: 0.0083333' for 120 fps.",
             )
         value, at = content[key.end() :].strip(), start + key.end()
         if key.group(1).lower() == b"frames":
-            if not re.fullmatch(rb"\d+", value):
-                raise source.error(at, f"Expected the number of frames after 'Frames:', found {_shown(value)}.")
-            stated = int(value)
+            stated = whole_number(source, value, at, "the number of frames after 'Frames:'")
             continue
         seconds = number(source, value, at, "the seconds between frames after 'Frame Time:'")
-        if seconds <= 0.0:
+        if not 1.0 / HIGHEST_FPS <= seconds <= 1.0 / LOWEST_FPS:
             raise source.error(
                 at,
-                f"Expected a Frame Time above 0, found {_shown(value)}. Write 1 / fps, such as 0.0083333 for 120 fps.",
+                f"Expected a Frame Time above 0, in seconds, from {1.0 / HIGHEST_FPS:g} to {1.0 / LOWEST_FPS:g}, "
+                f"found {shown(value)}. Write 1 / fps, such as 0.0083333 for 120 fps.",
             )
-        return frame_rate(value.decode()), stated, offset
+        # Digits beyond those of a double say no more.
+        return frame_rate(value.decode() if len(value) <= 40 else repr(seconds)), stated, offset
 
 
 # Frame rates that cameras and tools run at; tried first where few digits are printed.
@@ -301,6 +325,7 @@ def _assemble(
     parents = np.array([joint.parent for joint in hierarchy.joints])
     offsets = np.array([joint.offset for joint in hierarchy.joints])
     ends = hierarchy.ends
+    refuse_large(len(values), len(names), str(source.path), values.size)
     rotations = _rotations(hierarchy.joints, values)
     paths = {j: _path(joint, values) for j, joint in enumerate(hierarchy.joints) if joint.columns("position") or j == 0}
     # Constant places first: on rigs with six channels everywhere the data say how long the bones are.
@@ -317,7 +342,8 @@ def _assemble(
     else:
         history.append(f"lengths x {metres_per_unit:.6g} m, as told")
     root = 0
-    while _rides(root, parents, [p for p, _ in ends], paths, metres_per_unit):
+    carrying = {joint for joint, _ in ends}
+    while _rides(root, parents, carrying, paths, metres_per_unit):
         child = root + 1
         paths[child] = paths[root] + quat.rotate(rotations[:, root], paths[child])
         rotations[:, child] = quat.multiply(rotations[:, root], rotations[:, child])
@@ -366,7 +392,7 @@ def _path(joint: _Joint, values: FloatArray) -> FloatArray:
 
 
 def _rides(
-    root: int, parents: NDArray[np.int64], ends: list[int], paths: dict[int, FloatArray], metres_per_unit: float
+    root: int, parents: NDArray[np.int64], ends: set[int], paths: dict[int, FloatArray], metres_per_unit: float
 ) -> bool:
     """Whether the root only carries one joint, which moves in it: then that one is the body's root."""
     children = np.flatnonzero(parents == root)
@@ -401,13 +427,15 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
     Raises
     ------
     MotionFileError
-        Where the file can't be written.
+        Where the file can't be written, or holds numbers that no reader would take.
     """
     path = Path(path)
     lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
     lines += ["MOTION", f"Frames: {clip.frames}", f"Frame Time: {1.0 / clip.fps!r}"]
     degrees = np.degrees(quat.to_euler("ZYX", clip.rotations)).reshape(clip.frames, -1)
     table = np.concatenate([clip.root_positions / metres_per_unit, degrees], axis=1)
+    if np.max(np.abs(table)) > LARGEST:
+        raise MotionFileError(f"Expected to write no number above {LARGEST:.0e}, but the body moves further.", path)
     row = " ".join(["%.10g"] * table.shape[1])
     lines += [row % tuple(values) for values in table.tolist()]
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -425,22 +453,34 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
 
 
 def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:
+    """The lines of the tree, joint by joint: depth first, as a skeleton has them."""
+
     def place(offset: FloatArray) -> str:
         return "OFFSET " + " ".join(f"{value:.10g}" for value in offset * scale)
 
-    def joint_lines(joint: int, depth: int) -> list[str]:
-        tab = "\t" * depth
+    ends: dict[int, list[FloatArray]] = {}
+    for joint, offset in zip(skeleton.end_parents.tolist(), skeleton.end_offsets, strict=True):
+        ends.setdefault(joint, []).append(offset)
+    lines: list[str] = []
+    open_joints: list[int] = []
+
+    def close_to(parent: int) -> None:
+        while open_joints and open_joints[-1] != parent:
+            open_joints.pop()
+            lines.append("\t" * len(open_joints) + "}")
+
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        close_to(parent)
+        tab = "\t" * len(open_joints)
         position = "6 Xposition Yposition Zposition" if joint == 0 else "3"
-        lines = [f"{tab}{'ROOT' if joint == 0 else 'JOINT'} {skeleton.names[joint]}", f"{tab}{{"]
+        lines += [f"{tab}{'ROOT' if joint == 0 else 'JOINT'} {skeleton.names[joint]}", f"{tab}{{"]
         lines += [f"{tab}\t{place(skeleton.offsets[joint])}"]
         lines += [f"{tab}\tCHANNELS {position} Zrotation Yrotation Xrotation"]
-        for end in np.flatnonzero(skeleton.end_parents == joint):
-            lines += [f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\t{place(skeleton.end_offsets[end])}", f"{tab}\t}}"]
-        for child in np.flatnonzero(skeleton.parents == joint):
-            lines += joint_lines(int(child), depth + 1)
-        return [*lines, f"{tab}}}"]
-
-    return joint_lines(0, 0)
+        for end in ends.get(joint, []):
+            lines += [f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\t{place(end)}", f"{tab}\t}}"]
+        open_joints.append(joint)
+    close_to(-1)
+    return lines
 
 
 def _warn(message: str) -> None:

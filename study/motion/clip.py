@@ -20,6 +20,12 @@ FloatArray = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
 
+MOST_POSES = 20_000_000
+"""Frames times joints that a clip may have: half an hour at 120 frames a second of a body with hands, in 640 MB."""
+# A file of few numbers can ask for many joints in many frames; up to so many it may.
+_FEW_POSES, _POSES_A_NUMBER = 1_000_000, 8
+LOWEST_FPS, HIGHEST_FPS = 1 / 3600, 100_000.0
+
 
 @dataclass(frozen=True, eq=False)
 class Clip:
@@ -109,6 +115,30 @@ class Clip:
         return replace(self, history=(*self.history, what))
 
 
+def refuse_large(frames: int, joints: int, who: str, values: int | None = None) -> None:
+    """`MotionError` where a clip would fill the memory, or is far larger than the numbers that a file has for it.
+
+    Parameters
+    ----------
+    frames, joints
+        Of the clip.
+    who
+        What it is called, for the message.
+    values
+        Numbers that the file holds.
+    """
+    if values is not None and frames * joints > max(_FEW_POSES, _POSES_A_NUMBER * values):
+        raise MotionError(
+            f"Expected most joints of {who} to move, found {joints:,} joints and {values // frames} numbers a frame. "
+            "Leave out the joints that have no channels."
+        )
+    if frames * joints > MOST_POSES:
+        raise MotionError(
+            f"Expected at most {MOST_POSES:,} frames times joints in {who}, found {frames:,} x {joints:,}. "
+            "Cut it into pieces, or take a lower frame rate."
+        )
+
+
 def _by_part(rotations: FloatArray) -> FloatArray:
     """A new array `(4, joints, frames)`: whole rows of one part of one joint, which products run through quickly.
 
@@ -172,6 +202,7 @@ def resample(clip: Clip, fps: float) -> Clip:
     ratio = clip.fps / fps
     # The tolerance keeps the last frame where (frames - 1) / ratio is whole but for rounding.
     count = int(np.floor((clip.frames - 1) / ratio + 1e-6)) + 1
+    refuse_large(count, clip.skeleton.joints, f"{clip.name or 'the clip'} at {fps:g} fps")
     times = np.minimum(np.arange(count) * ratio, clip.frames - 1)
     nearest = np.round(times)
     times = np.where(np.abs(times - nearest) < 1e-6, nearest, times)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.counting import counted
-from study.motion.source import NUMBER, Source, number
+from study.motion.source import LARGEST, NUMBER, Source, number
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,7 +47,7 @@ def parse_table(source: Source, offset: int, columns: int) -> FloatArray:
     Raises
     ------
     MotionFileError
-        Where a row has another number of values, or one of them is not a finite number.
+        Where a row has another number of values, or one of them is not a number up to `LARGEST`.
     """
     if columns == 0:
         raise source.error(offset, "Expected at least one channel in the hierarchy, found none: nothing moves.")
@@ -75,7 +75,12 @@ def _parse_rows(chunk: bytes, columns: int) -> FloatArray | None:
     if not np.all((per_line == columns) | (per_line == 0)):
         return None
     values = parse_words(data, starts, stops)
-    return None if np.isnan(values).any() else values.reshape(-1, columns)
+    return values.reshape(-1, columns) if are_usable(values) else None
+
+
+def are_usable(values: FloatArray) -> bool:
+    """Whether all are numbers, up to the largest that is taken."""
+    return bool(np.all(np.abs(values) <= LARGEST))
 
 
 def split_words(chunk: bytes) -> tuple[ByteArray, IntArray, IntArray]:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from study.errors import MotionError, MotionFileError
 from study.motion.acclaim import CMU_FPS, read_amc
 from study.motion.bvh import read_bvh
-from study.motion.clip import Clip
+from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip
 from study.motion.upright import put_upright
 
 SUFFIXES = (".bvh", ".amc")
@@ -34,9 +32,12 @@ def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: fl
         For another suffix, or a file that can't be read.
     """
     path = Path(path)
-    for label, value in (("metres_per_unit", metres_per_unit), ("fps", fps)):
-        if value is not None and not (np.isfinite(value) and value > 0):
-            raise MotionError(f"Expected {label} above 0 for {path}, got {value}.")
+    for label, value, low, high in (
+        ("metres_per_unit", metres_per_unit, 1e-9, 1e3),
+        ("fps", fps, LOWEST_FPS, HIGHEST_FPS),
+    ):
+        if value is not None and not low <= value <= high:
+            raise MotionError(f"Expected {label} above 0, from {low:.0e} to {high:.0e}, for {path}, got {value}.")
     suffix = path.suffix.lower()
     if suffix == ".amc":
         return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=CMU_FPS if fps is None else fps))

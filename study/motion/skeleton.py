@@ -7,6 +7,7 @@ Roles are the same on every rig: `pelvis`, `spine`, `chest`, `neck`, `head`, and
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +24,9 @@ IntArray = NDArray[np.int64]
 SIDED_ROLES = ("hip", "knee", "ankle", "toe", "collar", "shoulder", "elbow", "wrist")
 CENTRE_ROLES = ("pelvis", "spine", "chest", "neck", "head")
 ROLES = CENTRE_ROLES + tuple(f"{role}.{side}" for role in SIDED_ROLES for side in "LR")
+
+MOST_JOINTS = 4000
+"""Joints that a skeleton may have: several times those of a body with hands and face."""
 
 # Names of the joint at the *start* of the bone, lower case, side and rig prefix removed, digits kept.
 _LEG_NAMES = {
@@ -77,7 +81,7 @@ class Skeleton:
             array.setflags(write=False)
             object.__setattr__(self, field, array)
         if len(set(self.names)) != joints:
-            twice = sorted({name for name in self.names if self.names.count(name) > 1})
+            twice = sorted(name for name, times in Counter(self.names).items() if times > 1)
             raise MotionError(f"Expected unique joint names, found {', '.join(twice)} more than once.")
         if joints == 0 or self.parents[0] != -1 or np.any(self.parents[1:] < 0):
             raise MotionError("Expected joint 0 to be the only root (parent -1).")
@@ -97,7 +101,8 @@ class Skeleton:
         depths = np.zeros(self.joints, dtype=np.int64)
         for joint in range(1, self.joints):
             depths[joint] = depths[self.parents[joint]] + 1
-        levels = [np.flatnonzero(depths == depth) for depth in range(1, int(depths.max()) + 1)]
+        by_depth = np.argsort(depths, kind="stable")
+        levels = np.split(by_depth, np.cumsum(np.bincount(depths))[:-1])[1:]
         return tuple((joints, self.parents[joints]) for joints in levels)
 
     @cached_property
@@ -210,7 +215,8 @@ def _limb(
             if own == side and rest == name and j not in found.values()
         ]
         if below is not None:
-            candidates = [j for j in candidates if j in _ancestors(below, parents)]
+            above = set(_ancestors(below, parents))
+            candidates = [j for j in candidates if j in above]
         if candidates:
             found[role] = below = candidates[0]
     return {f"{role}.{side}": joint for role, joint in found.items()}
@@ -225,15 +231,17 @@ def _trunk(roles: Mapping[str, int], names: Sequence[str], parents: IntArray) ->
     arms = [roles.get(f"collar.{s}", roles.get(f"shoulder.{s}")) for s in "LR"]
     if arms[0] is not None and arms[1] is not None:
         chest = _common_ancestor(arms[0], arms[1], parents)
-        path = [j for j in [*_ancestors(chest, parents)[::-1], chest] if pelvis in _ancestors(j, parents)]
+        below = _below(pelvis, parents)
+        path = [j for j in [*_ancestors(chest, parents)[::-1], chest] if j in below]
         if path:
             trunk["chest"] = path[-1]
             trunk["spine"] = path[0]
-    above = [j for j in range(len(names)) if trunk.get("chest", pelvis) in _ancestors(j, parents)]
+    above = sorted(_below(trunk.get("chest", pelvis), parents))
     heads = [j for j in above if names[j] == "head"]
     if heads:
         trunk["head"] = heads[0]
-    necks = [j for j in above if "neck" in names[j] and (not heads or j in _ancestors(heads[0], parents))]
+    under_head = set(_ancestors(heads[0], parents)) if heads else set(above)
+    necks = [j for j in above if "neck" in names[j] and j in under_head]
     if necks:
         trunk["neck"] = necks[0]
     return trunk
@@ -245,6 +253,15 @@ def _ancestors(joint: int, parents: IntArray) -> list[int]:
     while (joint := int(parents[joint])) >= 0:
         line.append(joint)
     return line
+
+
+def _below(joint: int, parents: IntArray) -> set[int]:
+    """All joints that hang on one, near or far."""
+    found = {joint}
+    for j in range(joint + 1, len(parents)):
+        if int(parents[j]) in found:
+            found.add(j)
+    return found - {joint}
 
 
 def _common_ancestor(a: int, b: int, parents: IntArray) -> int:

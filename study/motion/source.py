@@ -1,4 +1,4 @@
-"""The bytes of a motion file, and refusals that say where in it: `walk.bvh:41:7`.
+"""The bytes of a motion file, its numbers, and refusals that say where in it: `walk.bvh:41:7`.
 
 Lines end with LF, CRLF or CR; a byte order mark is passed over; lines and columns count from 1.
 """
@@ -14,7 +14,10 @@ from study.errors import MotionFileError
 
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 # A number as motion files write it; Python's own reading would also take `1_000`, `nan` and `inf`.
-NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
+
+LARGEST = 1e9
+"""The largest number that is taken: in millimetres a thousand kilometres. What is computed from it can't overflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +83,9 @@ def number(source: Source, token: bytes, offset: int, what: str) -> float:
     """One number, or the refusal that names its place."""
     if NUMBER.fullmatch(token):
         value = float(token)
-        if abs(value) != float("inf"):
+        if abs(value) <= LARGEST:
             return value
-    shown = token.decode("utf-8", "replace")[:40]
+        raise source.error(offset, f"Expected {what} of at most {LARGEST:.0e}, found {shown(token)}. Check the line.")
     hint = "Check the line."
     if b"," in token:
         hint = "Write decimals with a point and separate numbers by blanks."
@@ -90,4 +93,16 @@ def number(source: Source, token: bytes, offset: int, what: str) -> float:
         hint = "The frame holds no measurement: export again, or cut it out."
     elif len(re.findall(rb"\.", token)) > 1 or re.fullmatch(rb".*[\d.][+-]\d.*", token):
         hint = "Two numbers seem to be glued together: put a blank between them."
-    raise source.error(offset, f"Expected {what}, found {shown!r}. {hint}")
+    raise source.error(offset, f"Expected {what}, found {shown(token)}. {hint}")
+
+
+def whole_number(source: Source, token: bytes, offset: int, what: str) -> int:
+    """One whole number from 0, or the refusal that names its place."""
+    if token.isdigit() and len(token.lstrip(b"0")) < len(f"{LARGEST:.0f}"):
+        return int(token)
+    raise source.error(offset, f"Expected {what}, a whole number below {LARGEST:.0e}, found {shown(token)}.")
+
+
+def shown(token: bytes) -> str:
+    """A word of the file in quotes, as messages give it: not more than its beginning."""
+    return repr(token.decode("utf-8", "replace")[:40])

@@ -29,6 +29,9 @@ UNITS = {
     0.001: "millimetres",
 }
 
+# Shorter than this in any unit there is no body to judge by, and a logarithm could fail.
+_SMALLEST = 1e-6
+
 _LEG_M = 0.8
 _BODY_M = 1.7
 # From a toddler's leg to that of the tallest; outside, a unit is a guess.
@@ -69,11 +72,11 @@ def find_scale(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatA
         Each joint in its parent's frame, in the file's unit.
     """
     leg = _leg_length(names, parents, offsets)
-    if leg > 0.0:
+    if leg > _SMALLEST:
         size, usual, plausible, what = leg, _LEG_M, _PLAUSIBLE_LEG_M, "leg"
     else:
         size, usual, plausible, what = _extent(parents, offsets), _BODY_M, _PLAUSIBLE_BODY_M, "longest chain of bones"
-    if size <= 0.0:
+    if size < _SMALLEST:
         return Scale(1.0, False, False, "lengths taken as metres: the rig has no length to judge by")
     scale = min(UNITS, key=lambda unit: abs(math.log(size * unit / usual)))
     metres = size * scale

@@ -104,7 +104,7 @@ def facing(clip: Clip) -> FloatArray:
     across = np.zeros((clip.frames, 3))
     for part in ("hip", "shoulder"):
         line = positions[:, clip.skeleton.role(f"{part}.L")] - positions[:, clip.skeleton.role(f"{part}.R")]
-        across += line / np.linalg.norm(line, axis=1, keepdims=True)
+        across += line / np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-9)
     return np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))
 
 
