@@ -222,7 +222,7 @@ def join(
 
 def joint_frames(given: Sequence[str]) -> dict[str, int]:
     """`hip.L=5` and the like, as a mapping."""
-    from study.motion.skeleton import ROLES
+    from study.motion.joint_names import ROLES
 
     found = {}
     for text in given:

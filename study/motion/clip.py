@@ -6,7 +6,7 @@ every function here returns a new clip.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 from study.errors import MotionError
 from study.motion import quaternions as quat
+from study.motion.rigs import find_roles
 from study.motion.skeleton import Skeleton
 
 FloatArray = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
+# Frames looked at to tell which joint plays which role.
+_POSES = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +154,19 @@ def joint_positions(clip: Clip, *, ends: bool = False) -> FloatArray:
         arms = quat.rotate_parts(world[:, skeleton.end_parents], skeleton.end_offsets.T[..., None])
         positions[:, skeleton.joints :] = positions[:, skeleton.end_parents] + arms
     return np.ascontiguousarray(positions.transpose(2, 1, 0))
+
+
+def with_roles(clip: Clip, mapping: Mapping[str, str] | None = None) -> Clip:
+    """The clip with its joints' roles found anew, from its poses too; `mapping` as `rigs.find_roles` takes it."""
+    some = np.unique(np.linspace(0, clip.frames - 1, min(clip.frames, _POSES)).astype(np.int64))
+    poses = joint_positions(
+        replace(clip, root_positions=clip.root_positions[some], rotations=clip.rotations[some]), ends=True
+    )
+    rig = clip.skeleton
+    known = find_roles(
+        rig.names, rig.parents, rig.offsets, rig.end_parents, rig.end_offsets, poses=poses, mapping=mapping
+    )
+    return replace(clip, skeleton=replace(rig, known=known))
 
 
 def resample(clip: Clip, fps: float) -> Clip:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
-from study.motion.skeleton import Skeleton, split_side
+from study.motion.joint_names import split_side
+from study.motion.skeleton import Skeleton
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
-from study.motion.skeleton import CENTRE_ROLES, SIDED_ROLES, Skeleton
+from study.motion.joint_names import CENTRE_ROLES, SIDED_ROLES
+from study.motion.skeleton import Skeleton
 from study.transitions.blending import facing
 from study.transitions.cost_matrix import cost_matrix, velocities
 from study.transitions.distances import check_same_rig
