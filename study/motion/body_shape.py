@@ -68,8 +68,8 @@ def leg_like(tree: Tree, pairs: Sequence[Pair], legs: Pair, arms: Pair | None) -
 
 
 def _sizes(tree: Tree, legs: Pair, arms: Pair | None) -> dict[str, float]:
-    leg = legs.length
-    thigh, shank = legs.lengths.mean(axis=0)
+    leg = max(legs.length, 1e-9)
+    thigh, shank = np.maximum(legs.lengths.mean(axis=0), 1e-9)
     feet = [legs.chains[limb][legs.picks[limb][2] + 1 :][:1] for limb in (0, 1)]
     sizes = {
         "thigh to shank": thigh / shank,
@@ -77,7 +77,7 @@ def _sizes(tree: Tree, legs: Pair, arms: Pair | None) -> dict[str, float]:
         "pelvis to hip": np.mean([tree.way(legs.joint(limb, 0), legs.at) for limb in (0, 1)]) / leg,
     }
     if arms is not None:
-        upper, fore = arms.lengths.mean(axis=0)
+        upper, fore = np.maximum(arms.lengths.mean(axis=0), 1e-9)
         sizes |= {
             "upper arm to forearm": upper / fore,
             "arm to leg": arms.length / leg,
@@ -122,7 +122,7 @@ def first_is_left(tree: Tree, legs: Pair) -> tuple[float, str]:
         ("the knees", _knees(legs, poses)),
         ("the way through the room", _way(tree, legs)),
     ):
-        sign = float(np.mean(_sided(legs, poses, forward))) / legs.length
+        sign = float(np.mean(_sided(legs, poses, forward))) / max(legs.length, 1e-9)
         if abs(sign) > _TELLING:
             return sign, what
     return float(np.mean(poses[:, legs.joint(0, 0), 0] - poses[:, legs.joint(1, 0), 0])), "the axis X alone"

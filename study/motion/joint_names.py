@@ -57,7 +57,7 @@ _WORDS: Mapping[str, Mapping[float, str]] = {
         _SURE: "wrist handgelenk muneca poignet polso pulso punho 手首",
         _USUAL: "hand mano main mao 手 手掌",
     },
-    "neck": {_SURE: "neck hals nacken cuello cou collo pescoco 首 脖子"},
+    "neck": {_SURE: "neck lowerneck upperneck hals nacken cuello cou collo pescoco 首 脖子"},
     "head": {_SURE: "head skull kopf cabeza tete testa cabeca 頭 头"},
 }
 _SPEAKS: dict[str, dict[str, float]] = {}
@@ -80,7 +80,9 @@ _ANIMAL = frozenset(
     "tentacle feeler mandible cephalothorax carapace feather udder".split()
 )
 
-_LEFT = frozenset("left lft lf links linke linker linkes izq izquierda izquierdo gauche sinistra sinistro esquerda".split())
+_LEFT = frozenset(
+    "left lft lf links linke linker linkes izq izquierda izquierdo gauche sinistra sinistro esquerda".split()
+)
 _RIGHT = frozenset(
     "right rgt rt rght rechts rechte rechter rechtes der derecha derecho droite droit destra destro direita direito".split()
 )
@@ -113,7 +115,8 @@ def read_names(names: Sequence[str]) -> tuple[NamedJoint, ...]:
     """What each name of a rig says; words that all of its joints share, such as an actor's name, say nothing."""
     words = [_words(name) for name in names]
     counts = Counter(word for of_one in words for word in set(of_one))
-    shared = {word for word, count in counts.items() if len(names) > 4 and count >= len(names) - 1}
+    # The root may lack them; a word of the body counts unless it is in all names.
+    shared = {word for word, count in counts.items() if count >= len(names) - (word not in _SPEAKS) and len(names) > 4}
     return tuple(_read([word for word in of_one if word not in shared]) for of_one in words)
 
 

@@ -31,9 +31,12 @@ _MOST_PAIRS = 24
 # Two chains are no pair when their lengths differ by more than this factor, as a logarithm.
 _UNLIKE = 0.35
 # What a choice of joints loses: by a ratio that is off (its logarithm), a bend that never changes, bones beyond a fan of
-# fingers, an end site in place of the third joint.
+# fingers, an end site in place of the third joint, mere bits for bones; a pair loses by a third chain like it beside it.
 _RATIO_COST, _STIFF_COST, _FAN_COST, _TIP_COST, _UNFIT_COST = 2.0, 0.5, 0.5, 1.0, 3.0
+_CROWD_COST = 1.0
 _STIFF_RAD = 0.035
+# Bones within this of each other, as a logarithm, are the same on two sides.
+_SAME = 0.15
 _FAN_SHARE = 0.4
 _WRONG_NAME, _BESIDE = -2.0, -4.0
 
@@ -164,10 +167,17 @@ def find_pairs(tree: Tree) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
         )
         for a, b in combinations(branches[:_MOST_BRANCHES], 2):
             sides = {tree.named[a].side, tree.named[b].side}
-            if unlikeness(tree.length(a), tree.length(b)) <= _UNLIKE or sides == {"L", "R"}:
+            if unlikeness(tree.length(a), tree.length(b)) <= _UNLIKE or sides == {"L", "R"} or _begin_alike(tree, a, b):
                 found.append((a, b))
     found.sort(key=lambda pair: tree.length(pair[0]) + tree.length(pair[1]), reverse=True)
     return [(_chain(tree, a), _chain(tree, b)) for a, b in found[:_MOST_PAIRS]]
+
+
+def _begin_alike(tree: Tree, a: int, b: int) -> bool:
+    """Whether the first bones of two branches have the same lengths: what hangs on one hand may make it longer."""
+    places = [_places(tree, _chain(tree, branch))[:4] for branch in (a, b)]
+    count = min(len(own) for own in places)
+    return bool(np.all(unlikeness(places[0][:count], places[1][:count]) < _SAME))
 
 
 def _chain(tree: Tree, joint: int) -> tuple[int, ...]:
@@ -186,33 +196,47 @@ def read_pair(tree: Tree, chains: tuple[tuple[int, ...], tuple[int, ...]], parts
     tables = [_weigh(tree, chain, parts) for chain in chains]
     if any(not len(combos) for combos, _, _ in tables):
         return None
-    (combos, first, spoken_first), (others, second, spoken_second) = tables
-    if len(chains[0]) == len(chains[1]):
-        best = [int(np.argmax(first + second))] * 2
-    else:
-        best = [int(np.argmax(first)), int(np.argmax(second))]
-    picks = (tuple(combos[best[0]].tolist()), tuple(others[best[1]].tolist()))
-    lengths = np.array([np.diff(_places(tree, chain)[list(pick)]) for chain, pick in zip(chains, picks, strict=True)])
+    at = int(tree.parents[chains[0][0]])
+    crowd = [
+        c for c in tree.children[at] if c not in (chains[0][0], chains[1][0]) and _begin_alike(tree, c, chains[0][0])
+    ]
     tips = (tree.ends.get(chains[0][-1], chains[0][-1:])[0], tree.ends.get(chains[1][-1], chains[1][-1:])[0])
-    unlike = float(np.sum(unlikeness(lengths[0], lengths[1])))
-    score = float(first[best[0]] + second[best[1]]) / 2.0 - unlike
-    spoken = float(spoken_first[best[0]] + spoken_second[best[1]]) / 6.0
-    return Pair(parts, int(tree.parents[chains[0][0]]), chains, picks, tips, score, spoken, lengths)
+    readings = []
+    for best in _choices(tables):
+        picks = (tuple(tables[0][0][best[0]].tolist()), tuple(tables[1][0][best[1]].tolist()))
+        lengths = np.array(
+            [np.diff(_places(tree, chain)[list(pick)]) for chain, pick in zip(chains, picks, strict=True)]
+        )
+        score = float(tables[0][1][best[0]] + tables[1][1][best[1]]) / 2.0
+        score -= float(np.sum(unlikeness(lengths[0], lengths[1]))) + _CROWD_COST * bool(crowd)
+        spoken = float(tables[0][2][best[0]] + tables[1][2][best[1]]) / 6.0
+        readings.append(Pair(parts, at, chains, picks, tips, score, spoken, lengths))
+    return max(readings, key=lambda pair: pair.score)
 
 
-def _weigh(
-    tree: Tree, chain: tuple[int, ...], parts: tuple[str, str, str]
-) -> tuple[IntArray, FloatArray, FloatArray]:
+def _choices(tables: Sequence[tuple[IntArray, FloatArray, FloatArray]]) -> list[tuple[int, int]]:
+    """The rows to look at in two chains' tables: the best joints at equal places; and the best of each by itself."""
+    rows = [{tuple(choice): row for row, choice in enumerate(choices.tolist())} for choices, _, _ in tables]
+    both = [(rows[0][choice], rows[1][choice]) for choice in rows[0] if choice in rows[1]]
+    best = [max(both, key=lambda pair: tables[0][1][pair[0]] + tables[1][1][pair[1]])] if both else []
+    if len(rows[0]) != len(rows[1]):
+        best.append((int(np.argmax(tables[0][1])), int(np.argmax(tables[1][1]))))
+    return best
+
+
+def _weigh(tree: Tree, chain: tuple[int, ...], parts: tuple[str, str, str]) -> tuple[IntArray, FloatArray, FloatArray]:
     """All choices of three joints along a chain `(choices, 3)`, the score of each, and the names' part in it."""
     combos = np.array(list(combinations(range(len(chain) + 1), 3)), dtype=np.int64).reshape(-1, 3)
     places = _places(tree, chain)
     whole = places[-1] - places[0]
     upper, lower = np.diff(places[combos], axis=1).T
-    scores = -unlikeness(upper + lower, whole) - _RATIO_COST * unlikeness(upper, lower * np.exp(_RATIO[parts]))
+    scores = -np.minimum(unlikeness(upper + lower, whole), 1.0) - _RATIO_COST * unlikeness(
+        upper, lower * np.exp(_RATIO[parts])
+    )
     # A limb's first joint lies beside the one that it branches off, not in it; its two parts are no mere bits.
     scores -= _UNFIT_COST * ((np.minimum(upper, lower) < 0.05 * whole) | (places[combos[:, 0]] <= 1e-6 * whole))
     scores -= _STIFF_COST * np.sum(_stiff(tree, chain)[combos], axis=1) + _TIP_COST * (combos[:, 2] == len(chain))
-    fans = np.array([*(_fans_out(tree, joint) for joint in chain), False])
+    fans = np.array([*(fans_out(tree, joint) for joint in chain), False])
     within = np.concatenate([[0], np.cumsum(fans)])
     scores += _FAN_COST * (0.5 * fans[combos[:, 2]] - (within[combos[:, 2]] - within[combos[:, 0]]))
     names = np.array([*([_speaks(tree.named[joint], part) for part in parts] for joint in chain), [0.0, 0.0, 0.0]])
@@ -229,7 +253,9 @@ def unlikeness(a: FloatArray | float, b: FloatArray | float) -> FloatArray:
 def _places(tree: Tree, chain: tuple[int, ...]) -> FloatArray:
     """How far along a chain its joints lie, and then its tip, from the joint that it branches off."""
     places = np.cumsum(tree.lengths[list(chain)])
-    return np.append(places, places[-1] + (tree.reach[chain[-1]] or tree.lengths[chain[-1]]))
+    # A chain of two joints without an end site leaves the third place open; it is taken to be as far again.
+    beyond = tree.reach[chain[-1]] or (tree.lengths[chain[-1]] if len(chain) == 2 else 0.0)
+    return np.append(places, places[-1] + beyond)
 
 
 def _speaks(name: NamedJoint, part: str) -> float:
@@ -240,7 +266,7 @@ def _speaks(name: NamedJoint, part: str) -> float:
     return _WRONG_NAME if max(name.speaks.values(), default=0.0) > 1.0 else 0.0
 
 
-def _fans_out(tree: Tree, joint: int) -> bool:
+def fans_out(tree: Tree, joint: int) -> bool:
     """Whether several chains of like length go on from a joint, as from a hand; a twist lies along its bone."""
     children = sorted(tree.children[joint], key=tree.length, reverse=True)
     if len(children) < 2:
@@ -255,7 +281,7 @@ def _fans_out(tree: Tree, joint: int) -> bool:
 
 def _stiff(tree: Tree, chain: tuple[int, ...]) -> NDArray[np.bool_]:
     """For each joint of a chain, whether the poses show that the bones on its two sides never turn in each other."""
-    stiff = np.zeros(len(chain) + 1, dtype=np.bool_)
+    stiff, known = np.zeros((2, len(chain) + 1), dtype=np.bool_)
     if len(tree.poses) < 2:
         return stiff
     points = [int(tree.parents[chain[0]]), *chain, *tree.ends.get(chain[-1], [])[:1]]
@@ -264,8 +290,9 @@ def _stiff(tree: Tree, chain: tuple[int, ...]) -> NDArray[np.bool_]:
         before, after = (_direction(tree.poses, here, side) for side in (points[k::-1], points[k + 2 :]))
         if before is not None and after is not None:
             angles = np.arccos(np.clip(np.sum(before * after, axis=1), -1.0, 1.0))
-            stiff[k] = float(np.ptp(angles)) < _STIFF_RAD
-    return stiff
+            stiff[k], known[k] = float(np.ptp(angles)) < _STIFF_RAD, True
+    # Arms that only roll about themselves show nothing.
+    return stiff & bool(np.any(known & ~stiff))
 
 
 def _direction(poses: FloatArray, here: FloatArray, points: Sequence[int]) -> FloatArray | None:

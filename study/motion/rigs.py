@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from study.errors import MotionError
 from study.motion.body_shape import NO_TRUNK, SPOKEN, first_is_left, leg_like, trunk_length, why_no_human
 from study.motion.joint_names import ROLES, SIDED_ROLES, read_names
-from study.motion.limbs import ARM, LEG, Pair, Tree, find_pairs, read_pair, unlikeness
+from study.motion.limbs import ARM, LEG, Pair, Tree, fans_out, find_pairs, read_pair, unlikeness
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -56,7 +56,10 @@ class Roles:
     def without_first(self, joints: int) -> Roles:
         """The same where the first joints of the skeleton, which only carry the others, are cut off."""
         kept = {role: joint - joints for role, joint in self.joints.items() if joint >= joints}
-        missing = {**self.missing, **{role: "its joint only carries others" for role in self.joints.keys() - kept.keys()}}
+        missing = {
+            **self.missing,
+            **{role: "its joint only carries others" for role in self.joints.keys() - kept.keys()},
+        }
         return Roles(MappingProxyType(kept), MappingProxyType(missing), self.notes, self.human)
 
 
@@ -265,8 +268,10 @@ def _limb_roles(tree: Tree, pair: Pair, left: int) -> dict[str, int]:
     found = {}
     for side, limb in (("L", left), ("R", 1 - left)):
         chain, pick = pair.chains[limb], pair.picks[limb]
+        # Digits of the foot are no toe where a joint carries them all.
+        fan = next((at for at in range(pick[2] + 1, len(chain)) if fans_out(tree, chain[at])), len(chain))
         found |= {f"{part}.{side}": chain[at] for part, at in zip(pair.parts, pick, strict=True) if at < len(chain)}
-        extra, beyond = ("toe", chain[pick[2] + 1 :]) if pair.parts == LEG else ("collar", chain[: pick[0]])
+        extra, beyond = ("toe", chain[pick[2] + 1 : fan + 1]) if pair.parts == LEG else ("collar", chain[: pick[0]])
         beyond = tuple(joint for joint in beyond if not tree.named[joint].beside)
         if beyond:
             found[f"{extra}.{side}"] = max(beyond, key=lambda joint: tree.named[joint].speaks.get(extra, 0.0))

@@ -20,6 +20,7 @@ from study.motion.rigs import Roles, find_roles
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """A tree of joints, parents before children.
