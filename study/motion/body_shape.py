@@ -26,7 +26,7 @@ _LIMITS = {
     "thigh to shank": (0.65, 1.5),
     "foot to shank": (0.0, 0.6),
     "pelvis to hip": (0.0, 0.35),
-    "upper arm to forearm": (0.75, 1.9),
+    "upper arm to forearm": (0.6, 2.6),
     "arm to leg": (0.4, 1.05),
     "trunk to leg": (0.25, 1.1),
 }

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
 # Frames looked at to tell which joint plays which role.
-_POSES = 24
+_POSES = 12
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ the chain is weighed by that, by where fingers or toes fan out, by joints that n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -32,7 +32,7 @@ _MOST_PAIRS = 24
 _UNLIKE = 0.35
 # What a choice of joints loses: by a ratio that is off (its logarithm), a bend that never changes, bones beyond a fan of
 # fingers, an end site in place of the third joint, mere bits for bones; a pair loses by a third chain like it beside it.
-_RATIO_COST, _STIFF_COST, _FAN_COST, _TIP_COST, _UNFIT_COST = 2.0, 0.5, 0.5, 1.0, 3.0
+_RATIO_COST, _STIFF_COST, _FAN_COST, _TIP_COST, _UNFIT_COST = 2.0, 0.6, 1.0, 1.0, 3.0
 _CROWD_COST = 1.0
 _STIFF_RAD = 0.035
 # Bones within this of each other, as a logarithm, are the same on two sides.
@@ -67,6 +67,8 @@ class Tree:
         The same in some frames; none where there are no frames.
     ends
         The end sites of each joint that has some, as points.
+    weighed
+        What was worked out for a chain: see `_weigh_bones`.
     """
 
     parents: IntArray
@@ -79,6 +81,7 @@ class Tree:
     rest: FloatArray
     poses: FloatArray
     ends: dict[int, list[int]]
+    weighed: dict[tuple[int, ...], tuple[IntArray, FloatArray, FloatArray, FloatArray]] = field(default_factory=dict)
 
     def length(self, joint: int) -> float:
         """From a joint's parent to the farthest tip below the joint."""
@@ -224,24 +227,33 @@ def _choices(tables: Sequence[tuple[IntArray, FloatArray, FloatArray]]) -> list[
     return best
 
 
-def _weigh(tree: Tree, chain: tuple[int, ...], parts: tuple[str, str, str]) -> tuple[IntArray, FloatArray, FloatArray]:
+def _weigh(
+    tree: Tree, chain: tuple[int, ...], parts: tuple[str, str, str]
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """All choices of three joints along a chain `(choices, 3)`, the score of each, and the names' part in it."""
+    if chain not in tree.weighed:
+        tree.weighed[chain] = _weigh_bones(tree, chain)
+    combos, upper, lower, scores = tree.weighed[chain]
+    names = np.array([*([_speaks(tree.named[joint], part) for part in parts] for joint in chain), [0.0, 0.0, 0.0]])
+    spoken = names[combos, [0, 1, 2]].sum(axis=1)
+    scores = scores - _RATIO_COST * unlikeness(upper, lower * np.exp(_RATIO[parts]))
+    return combos, scores + spoken, spoken
+
+
+def _weigh_bones(tree: Tree, chain: tuple[int, ...]) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    """All choices of three joints along a chain, the lengths between them, and what speaks against each on any limb."""
     combos = np.array(list(combinations(range(len(chain) + 1), 3)), dtype=np.int64).reshape(-1, 3)
     places = _places(tree, chain)
     whole = places[-1] - places[0]
     upper, lower = np.diff(places[combos], axis=1).T
-    scores = -np.minimum(unlikeness(upper + lower, whole), 1.0) - _RATIO_COST * unlikeness(
-        upper, lower * np.exp(_RATIO[parts])
-    )
+    scores = -np.minimum(unlikeness(upper + lower, whole), 1.0)
     # A limb's first joint lies beside the one that it branches off, not in it; its two parts are no mere bits.
     scores -= _UNFIT_COST * ((np.minimum(upper, lower) < 0.05 * whole) | (places[combos[:, 0]] <= 1e-6 * whole))
-    scores -= _STIFF_COST * np.sum(_stiff(tree, chain)[combos], axis=1) + _TIP_COST * (combos[:, 2] == len(chain))
+    scores -= _STIFF_COST * _stiff(tree, chain)[combos].sum(axis=1) + _TIP_COST * (combos[:, 2] == len(chain))
     fans = np.array([*(fans_out(tree, joint) for joint in chain), False])
     within = np.concatenate([[0], np.cumsum(fans)])
     scores += _FAN_COST * (0.5 * fans[combos[:, 2]] - (within[combos[:, 2]] - within[combos[:, 0]]))
-    names = np.array([*([_speaks(tree.named[joint], part) for part in parts] for joint in chain), [0.0, 0.0, 0.0]])
-    spoken = np.sum(names[combos, [0, 1, 2]], axis=1)
-    return combos, scores + spoken, spoken
+    return combos, upper, lower, scores
 
 
 def unlikeness(a: FloatArray | float, b: FloatArray | float) -> FloatArray:
@@ -279,20 +291,22 @@ def fans_out(tree: Tree, joint: int) -> bool:
     return tree.length(second) > _FAN_SHARE * tree.length(first)
 
 
-def _stiff(tree: Tree, chain: tuple[int, ...]) -> NDArray[np.bool_]:
-    """For each joint of a chain, whether the poses show that the bones on its two sides never turn in each other."""
-    stiff, known = np.zeros((2, len(chain) + 1), dtype=np.bool_)
+def _stiff(tree: Tree, chain: tuple[int, ...]) -> FloatArray:
+    """For each joint of a chain, from 0 to 1, how much less than the others it bends in the poses."""
+    bends = np.full(len(chain) + 1, np.nan)
     if len(tree.poses) < 2:
-        return stiff
+        return np.zeros(len(bends))
     points = [int(tree.parents[chain[0]]), *chain, *tree.ends.get(chain[-1], [])[:1]]
     for k in range(len(chain)):
         here = tree.poses[:, chain[k]]
         before, after = (_direction(tree.poses, here, side) for side in (points[k::-1], points[k + 2 :]))
         if before is not None and after is not None:
             angles = np.arccos(np.clip(np.sum(before * after, axis=1), -1.0, 1.0))
-            stiff[k], known[k] = float(np.ptp(angles)) < _STIFF_RAD, True
-    # Arms that only roll about themselves show nothing.
-    return stiff & bool(np.any(known & ~stiff))
+            bends[k] = float(np.ptp(angles))
+    most = float(np.nanmax(bends, initial=0.0))
+    if most < _STIFF_RAD:  # a pigtail that hangs, or an arm in a T-pose
+        return np.full(len(bends), 0.5)
+    return np.asarray(np.clip(1.0 - 2.0 * np.nan_to_num(bends, nan=most) / most, 0.0, 1.0))
 
 
 def _direction(poses: FloatArray, here: FloatArray, points: Sequence[int]) -> FloatArray | None:
