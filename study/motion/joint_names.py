@@ -1,8 +1,8 @@
 """What the name of a joint says: its side, and which part of the body it may be.
 
-In: names as rigs have them (`mixamorig:LeftUpLeg`, `J_Bip_L_UpperLeg`, `thigh.L.001`, `lShldr`, `Fuß_links`, `左ひざ`). Out:
-words, sides, and for each role of the body how strongly the name speaks for it. Names only help:
-`study.motion.rigs` finds the roles, by the shape of the skeleton.
+In: names as rigs have them (`mixamorig:LeftUpLeg`, `J_Bip_L_UpperLeg`, `thigh.L.001`, `lShldr`, `Fuß_links`, `左ひざ`).
+Out: sides, and for each role of the body how strongly the name speaks for it. Names only help: `study.motion.rigs` finds
+the roles, by the shape of the skeleton.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 SIDED_ROLES = ("hip", "knee", "ankle", "toe", "collar", "shoulder", "elbow", "wrist")
 CENTRE_ROLES = ("pelvis", "spine", "chest", "neck", "head")
@@ -27,8 +28,8 @@ _WORDS: Mapping[str, Mapping[float, str]] = {
         _MAYBE: "hip hips hipjoint leg buttock huefte hufte cadera hanche anca quadril bein pierna jambe gamba perna",
     },
     "knee": {
-        _SURE: "lowerleg lowleg calf shin shank tibia crus knee unterschenkel knie rodilla genou mollet ginocchio joelho "
-        "ひざ 膝 小腿",
+        _SURE: "lowerleg lowleg loleg calf shin shank tibia crus knee unterschenkel knie rodilla genou mollet ginocchio "
+        "joelho ひざ 膝 小腿",
         _MAYBE: "leg bein pierna jambe gamba perna",
     },
     "ankle": {
@@ -36,7 +37,7 @@ _WORDS: Mapping[str, Mapping[float, str]] = {
         _USUAL: "foot fuss pie pied piede pe 脚",
     },
     "toe": {
-        _SURE: "toe toes toebase toebone ball bigtoe footindex forefoot zehe zehen orteil orteils dedo つま先 足先 脚趾",
+        _SURE: "toe toes toebase toebone ball bigtoe footindex forefoot zehe zehen orteil dedo つま先 足先 脚趾",
         _MAYBE: "foot fuss pie pied piede metatarsal metatarsals",
     },
     "collar": {
@@ -49,7 +50,7 @@ _WORDS: Mapping[str, Mapping[float, str]] = {
         _MAYBE: "shoulder shldr schulter hombro epaule spalla ombro 肩",
     },
     "elbow": {
-        _SURE: "forearm lowerarm lowarm elbow radius ulna unterarm ellbogen ellenbogen antebrazo codo avantbras coude "
+        _SURE: "forearm lowerarm lowarm loarm elbow radius ulna unterarm ellbogen ellenbogen antebrazo codo avantbras coude "
         "avambraccio gomito antebraco cotovelo ひじ 肘",
         _MAYBE: "arm",
     },
@@ -66,25 +67,27 @@ for _role, _by_strength in _WORDS.items():
         for _word in _list.split():
             _SPEAKS.setdefault(_word, {}).setdefault(_role, _strength)
 
+
+def _set(*lines: str) -> frozenset[str]:
+    return frozenset(word for line in lines for word in line.split())
+
+
 # Joints beside the body's own: they help to draw or to steer it, or are worn.
-_BESIDE = frozenset(
-    "twist twst roll ik pole nub end tip site helper target goal eff effector aim ctrl control finger fingers thumb index "
-    "middle ring pinky little metacarpal metacarpals carpal palm prop weapon gun sword attach attachment socket slot "
-    "skirt dress cloth cape coat hair ponytail tail breast boob bust pectoral ear eye eyes brow eyebrow jaw lip tongue "
-    "teeth cheek nose face heel muscle corrective pad holster camera wing wings feather fin antenna ferse daumen zeige "
-    "pulgar indice pouce 捩 親指 人指 中指 薬指 小指 スカート 髪 胸 目".split()
+_BESIDE = _set(
+    "twist twst roll ik pole nub end tip site helper target goal eff effector aim ctrl control finger fingers thumb",
+    "index middle ring pinky little metacarpal metacarpals carpal palm prop weapon gun sword attach attachment socket",
+    "slot skirt dress cloth cape coat hair ponytail tail breast boob bust pectoral ear eye eyes brow eyebrow jaw lip",
+    "tongue teeth cheek nose face heel muscle corrective pad holster camera wing wings feather fin antenna ferse daumen",
+    "zeige pulgar indice pouce 親指 人指 中指 薬指 小指 スカート 髪 胸 目",
 )
 # Words of bodies that are no human's, unless arms are there beside what they name.
-_ANIMAL = frozenset(
-    "wing wings hoof hooves paw paws claw claws pincer beak fin fins fetlock hock pastern cannon snout muzzle antenna "
-    "tentacle feeler mandible cephalothorax carapace feather udder".split()
+_ANIMAL = _set(
+    "wing wings hoof hooves paw paws claw claws pincer beak fin fins fetlock hock pastern cannon snout muzzle antenna",
+    "tentacle feeler mandible cephalothorax carapace feather udder",
 )
-
-_LEFT = frozenset(
-    "left lft lf links linke linker linkes izq izquierda izquierdo gauche sinistra sinistro esquerda".split()
-)
-_RIGHT = frozenset(
-    "right rgt rt rght rechts rechte rechter rechtes der derecha derecho droite droit destra destro direita direito".split()
+_LEFT = _set("left lft lf links linke linker linkes izq izquierda izquierdo gauche sinistra sinistro esquerda")
+_RIGHT = _set(
+    "right rgt rt rght rechts rechte rechter rechtes der derecha derecho droite droit destra destro direita direito"
 )
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[^\W\d_A-Za-z]+")
 
@@ -152,7 +155,7 @@ def _side_of(words: Sequence[str]) -> tuple[str, list[str]]:
 
 
 def _without_side(word: str, side: str, sign: str, letter: str) -> str:
-    """What is left of a word that begins or ends with a side: `leftupleg`, `hipright`, `lfemur`, `左ひざ`; or nothing."""
+    """What is left of a word that begins or ends with a side, such as `leftupleg`, `hipright`, `lfemur`; or nothing."""
     if word[0] == sign:
         return word[1:]
     whole = "left" if side == "L" else "right"
@@ -170,7 +173,7 @@ def _read(words: Sequence[str]) -> NamedJoint:
     side, rest = _side_of(words)
     rest = [word for word in rest if not word[0].isdigit()]
     # Two words together say more than one, in either order: "upper leg", "arm lower", "toe base".
-    pairs = [a + b for one, other in zip(rest, rest[1:], strict=False) for a, b in ((one, other), (other, one))]
+    pairs = [a + b for one, other in pairwise(rest) for a, b in ((one, other), (other, one))]
     found = [_SPEAKS.get(word) or _SPEAKS.get(word.removesuffix("s"), {}) for word in ["".join(rest), *pairs, *rest]]
     speaks = max(found, key=lambda roles: max(roles.values(), default=0.0), default={})
     beside = any(word in _BESIDE or "捩" in word or "指" in word for word in rest) and "footindex" not in pairs

@@ -1,6 +1,6 @@
 """Which joint plays which role, on any rig of a human body: by the shape of the skeleton, helped by names.
 
-In: a `Skeleton`, poses of it where there are frames, and a mapping by hand where there is one. Out: `Roles`. A human body
+In: a skeleton, poses of it where there are frames, and a mapping by hand where there is one. Out: `Roles`. A human body
 has two legs that branch off one joint, and two arms that branch off another. Every pair of like chains is tried as legs
 and as arms (`study.motion.limbs`); the best two pairs together are taken, unless they are no human's
 (`study.motion.body_shape`). Lengths of bones and branches of the tree decide rather than places, as rest poses may be
@@ -12,6 +12,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -58,7 +59,7 @@ class Roles:
         kept = {role: joint - joints for role, joint in self.joints.items() if joint >= joints}
         missing = {
             **self.missing,
-            **{role: "its joint only carries others" for role in self.joints.keys() - kept.keys()},
+            **dict.fromkeys(self.joints.keys() - kept.keys(), "its joint only carries others"),
         }
         return Roles(MappingProxyType(kept), MappingProxyType(missing), self.notes, self.human)
 
@@ -130,7 +131,7 @@ def _successive(roles: Mapping[str, int]) -> Iterator[tuple[str, str]]:
     for side in "LR":
         for parts in (SIDED_ROLES[:4], SIDED_ROLES[4:]):
             there = [f"{part}.{side}" for part in parts if f"{part}.{side}" in roles]
-            yield from zip(there, there[1:], strict=False)
+            yield from pairwise(there)
 
 
 def _in_order(tree: Tree, role: str, found: Mapping[str, int], mapped: Mapping[str, int]) -> bool:
@@ -265,7 +266,7 @@ def _sides(tree: Tree, pair: Pair, hips: tuple[int, int] | None) -> tuple[int, s
 
 def _limb_roles(tree: Tree, pair: Pair, left: int) -> dict[str, int]:
     """The roles of both limbs of a pair, with the toe or the collar where there is one."""
-    found = {}
+    found: dict[str, int] = {}
     for side, limb in (("L", left), ("R", 1 - left)):
         chain, pick = pair.chains[limb], pair.picks[limb]
         # Digits of the foot are no toe where a joint carries them all.

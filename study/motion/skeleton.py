@@ -101,7 +101,7 @@ class Skeleton:
         """The joint that plays a role; `MotionError` where the rig has none."""
         if name not in self.roles:
             raise MotionError(
-                f"Expected a joint for the role {name!r}, found none: {self.body.missing.get(name, 'there is no such role')}. "
+                f"Expected a joint for the role {name!r}, found none: {self.body.missing.get(name, 'no such role')}. "
                 f"Roles found: {', '.join(self.roles) or 'none'}. Map the role to a joint, or use another rig."
             )
         return self.roles[name]
