@@ -186,6 +186,7 @@ def transition(
         "blend_start": joined.blend_start,
         "blend_stop": joined.blend_stop,
         "note": joined.note,
+        "history": list(joined.clip.history),
         **slide,
     }
     emit(result, as_json, f"{out}: {joined.clip.frames} frames; {joined.note}")

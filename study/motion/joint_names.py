@@ -1,8 +1,8 @@
 """What the name of a joint says: its side, and which part of the body it may be.
 
 In: names as rigs have them (`mixamorig:LeftUpLeg`, `J_Bip_L_UpperLeg`, `thigh.L.001`, `lShldr`, `Fuß_links`, `左ひざ`).
-Out: sides, and for each role of the body how strongly the name speaks for it. Names only help: `study.motion.rigs` finds
-the roles, by the shape of the skeleton.
+Out: sides, and for each role of the body how strongly the name speaks for it. Names only help: `study.motion.rigs`
+finds the roles, by the shape of the skeleton.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _WORDS: Mapping[str, Mapping[float, str]] = {
         _MAYBE: "hip hips hipjoint leg buttock huefte hufte cadera hanche anca quadril bein pierna jambe gamba perna",
     },
     "knee": {
-        _SURE: "lowerleg lowleg loleg calf shin shank tibia crus knee unterschenkel knie rodilla genou mollet ginocchio "
-        "joelho ひざ 膝 小腿",
+        _SURE: "lowerleg lowleg loleg calf shin shank tibia crus knee unterschenkel knie rodilla genou mollet "
+        "ginocchio joelho ひざ 膝 小腿",
         _MAYBE: "leg bein pierna jambe gamba perna",
     },
     "ankle": {
@@ -50,8 +50,8 @@ _WORDS: Mapping[str, Mapping[float, str]] = {
         _MAYBE: "shoulder shldr schulter hombro epaule spalla ombro 肩",
     },
     "elbow": {
-        _SURE: "forearm lowerarm lowarm loarm elbow radius ulna unterarm ellbogen ellenbogen antebrazo codo avantbras coude "
-        "avambraccio gomito antebraco cotovelo ひじ 肘",
+        _SURE: "forearm lowerarm lowarm loarm elbow radius ulna unterarm ellbogen ellenbogen antebrazo codo avantbras "
+        "coude avambraccio gomito antebraco cotovelo ひじ 肘",
         _MAYBE: "arm",
     },
     "wrist": {
@@ -77,8 +77,8 @@ _BESIDE = _set(
     "twist twst roll ik pole nub end tip site helper target goal eff effector aim ctrl control finger fingers thumb",
     "index middle ring pinky little metacarpal metacarpals carpal palm prop weapon gun sword attach attachment socket",
     "slot skirt dress cloth cape coat hair ponytail tail breast boob bust pectoral ear eye eyes brow eyebrow jaw lip",
-    "tongue teeth cheek nose face heel muscle corrective pad holster camera wing wings feather fin antenna ferse daumen",
-    "zeige pulgar indice pouce 親指 人指 中指 薬指 小指 スカート 髪 胸 目",
+    "tongue teeth cheek nose face heel muscle corrective pad holster camera wing wings feather fin antenna ferse",
+    "daumen zeige pulgar indice pouce 親指 人指 中指 薬指 小指 スカート 髪 胸 目",
 )
 # Words of bodies that are no human's, unless arms are there beside what they name.
 _ANIMAL = _set(
@@ -116,11 +116,20 @@ class NamedJoint:
 
 def read_names(names: Sequence[str]) -> tuple[NamedJoint, ...]:
     """What each name of a rig says; words that all of its joints share, such as an actor's name, say nothing."""
+    return tuple(_read(words) for words in _without_shared(names))
+
+
+def _without_shared(names: Sequence[str]) -> list[list[str]]:
     words = [_words(name) for name in names]
     counts = Counter(word for of_one in words for word in set(of_one))
     # The root may lack them; a word of the body counts unless it is in all names.
     shared = {word for word, count in counts.items() if count >= len(names) - (word not in _SPEAKS) and len(names) > 4}
-    return tuple(_read([word for word in of_one if word not in shared]) for of_one in words)
+    return [[word for word in of_one if word not in shared] for of_one in words]
+
+
+def bare_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Names without what all of a rig's joints share: `actor1:Hips` and `actor2_Hips` are both `hips`."""
+    return tuple("".join(words) for words in _without_shared(names))
 
 
 def split_side(name: str) -> tuple[str, str]:

@@ -1,8 +1,8 @@
 """Pairs of limbs in a skeleton: like chains that branch off one joint, and the three joints that matter in each.
 
 In: a `Tree` (bones, names, poses). Out: `Pair`s, each read as legs or as arms, with a score. A limb is a chain of which
-two successive parts are long and about equal (thigh and shank, upper arm and forearm); every choice of three joints along
-the chain is weighed by that, by where fingers or toes fan out, by how much joints bend, and by what names say.
+two successive parts are long and about equal (thigh and shank, upper arm and forearm); every choice of three joints
+along it is weighed by that, by where fingers or toes fan out, by how much joints bend, and by what names say.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _MOST_BRANCHES = 12
 _MOST_PAIRS = 24
 # Two chains are no pair when their lengths differ by more than this factor, as a logarithm.
 _UNLIKE = 0.35
-# What a choice of joints loses: by a ratio that is off (its logarithm), a joint that hardly bends, bones beyond a fan of
-# fingers, an end site in place of the third joint, mere bits for bones. A pair loses by a third chain that is like it.
+# What a choice of joints loses: by a ratio that is off (its logarithm), a joint that hardly bends, bones beyond a fan
+# of fingers, an end site in place of the third joint, mere bits for bones. A pair loses by a third chain that is like it.
 _RATIO_COST, _STIFF_COST, _FAN_COST, _TIP_COST, _UNFIT_COST = 2.0, 0.6, 1.0, 1.0, 3.0
 _CROWD_COST = 1.0
 _STIFF_RAD = 0.035

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames, joint_speeds
-from study.transitions.distances import check_same_rig, distance_matrix, joint_differences
+from study.transitions.distances import distance_matrix, joint_differences, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 
 FloatArray = NDArray[np.float64]
@@ -60,6 +60,7 @@ def geodesic_lengths(
     TransitionError
         Where the clips don't supply the longest blend at some of the frames; the message says how many.
     """
+    destination = on_joints_of(source, destination)
     starts, ends, low, high = _transitions(source, destination, start_frames, end_frames, shortest, longest)
     sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
     lengths = np.arange(low, high + 1)
@@ -89,6 +90,7 @@ def velocity_lengths(
 
     Parameters, returns and errors are those of `geodesic_lengths`; lengths outside the range are clipped to it.
     """
+    destination = on_joints_of(source, destination)
     starts, ends, low, high = _transitions(source, destination, start_frames, end_frames, shortest, longest)
     joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
     speeds = [joint_speeds(clip, joints) for clip in (source, destination)]
@@ -116,7 +118,6 @@ def _transitions(
     longest: int | None,
 ) -> tuple[IntArray, IntArray, int, int]:
     """The frames as arrays, and the range of lengths, all of it checked."""
-    check_same_rig(source, destination)
     low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
     high = default_frames(source.fps, LONGEST_S) if longest is None else longest
     if not 1 <= low <= high:

@@ -1,4 +1,4 @@
-"""Joint roles on the rigs that people have: one body under many names and trees, without names, and bodies of animals."""
+"""Joint roles on the rigs that people have: one body under many names and trees, without names, and animals."""
 
 from __future__ import annotations
 
@@ -136,45 +136,150 @@ def found(skeleton: Skeleton) -> dict[str, str]:
 
 _CENTRE = ("pelvis", "spine", "spine2", "chest", "neck", "head")
 _SIDED = ("hip", "knee", "ankle", "toe", "collar", "shoulder", "elbow", "wrist")
-STYLES = {
-    "mixamo": ("mixamorig:{}", "Hips Spine Spine1 Spine2 Neck Head", "UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand", "Left{} Right{}"),
-    "motionbuilder": ("{}", "Hips Spine Spine1 Spine2 Neck Head", "UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand", "Left{} Right{}"),
-    "actor": ("Actor_01_{}", "Hips Spine Spine1 Spine2 Neck Head", "UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand", "Left{} Right{}"),
-    "unreal": ("{}", "pelvis spine_01 spine_02 spine_03 neck_01 head", "thigh calf foot ball clavicle upperarm lowerarm hand", "{}_l {}_r"),
-    "unity": ("{}", "Hips Spine Chest UpperChest Neck Head", "UpperLeg LowerLeg Foot Toes Shoulder UpperArm LowerArm Hand", "Left{} Right{}"),
-    "rigify": ("DEF-{}", "spine spine.001 spine.002 spine.003 spine.004 spine.006", "thigh shin foot toe shoulder upper_arm forearm hand", "{}.L {}.R"),
-    "blender": ("{}", "Hips Spine Chest UpperChest Neck Head", "Upper_Leg Lower_Leg Foot Toe Shoulder Upper_Arm Lower_Arm Hand", "{}.L {}.R"),
-    "daz": ("{}", "hip abdomenLower abdomenUpper chestLower neckLower head", "ThighBend Shin Foot Toe Collar ShldrBend ForearmBend Hand", "l{} r{}"),
-    "poser": ("{}", "hip abdomen waist chest neck head", "Thigh Shin Foot Toe Collar Shldr ForeArm Hand", "l{} r{}"),
-    "biped": ("Bip001 {}", "Pelvis Spine Spine1 Spine2 Neck Head", "Thigh Calf Foot Toe0 Clavicle UpperArm Forearm Hand", "L_{} R_{}"),
-    "xsens": ("{}", "Pelvis L5 L3 T12 Neck Head", "UpperLeg LowerLeg Foot Toe Shoulder UpperArm ForeArm Hand", "Left{} Right{}"),
-    "rokoko": ("{}", "Hips Spine1 Spine2 Spine3 Neck Head", "Thigh Shin Foot Toe Shoulder Arm ForeArm Hand", "Left{} Right{}"),
-    "hips and knees": ("{}", "Hips Chest Chest2 Chest3 Neck Head", "Hip Knee Ankle Toe Collar Shoulder Elbow Wrist", "Left{} Right{}"),
-    "kinect": ("{}", "SpineBase SpineMid Spine3 SpineShoulder Neck Head", "Hip Knee Ankle Foot Clavicle Shoulder Elbow Wrist", "{}Left {}Right"),
-    "smpl": ("{}", "Pelvis Spine1 Spine2 Spine3 Neck Head", "Hip Knee Ankle Foot Collar Shoulder Elbow Wrist", "L_{} R_{}"),
-    "smpl-x": ("{}", "pelvis spine1 spine2 spine3 neck head", "hip knee ankle foot collar shoulder elbow wrist", "left_{} right_{}"),
-    "soma": ("{}", "Hips Spine1 Spine2 Chest Neck1 Head", "Leg Shin Foot ToeBase Shoulder Arm ForeArm Hand", "Left{} Right{}"),
-    "maya": ("{}_jnt", "root spine_a spine_b spine_c neck head", "upLeg loLeg foot ball clav upArm loArm hand", "l_{} r_{}"),
-    "vroid": ("J_Bip_{}", "C_Hips C_Spine C_Chest C_UpperChest C_Neck C_Head", "UpperLeg LowerLeg Foot ToeBase Shoulder UpperArm LowerArm Hand", "L_{} R_{}"),
-    "acclaim": ("{}", "root lowerback upperback thorax lowerneck head", "femur tibia foot toes clavicle humerus radius wrist", "l{} r{}"),
-    "valve": ("ValveBiped.Bip01_{}", "Pelvis Spine Spine1 Spine2 Neck1 Head1", "Thigh Calf Foot Toe0 Clavicle UpperArm Forearm Hand", "L_{} R_{}"),
-    "source 2": ("{}", "pelvis spine_0 spine_1 spine_2 neck_0 head", "leg_upper leg_lower ankle ball clavicle arm_upper arm_lower hand", "{}_L {}_R"),
-    "auto-rig": ("{}", "root.x spine_01.x spine_02.x spine_03.x neck.x head.x", "thigh_stretch leg_stretch foot toes_01 shoulder arm_stretch forearm_stretch hand", "{}.l {}.r"),
-    "cascadeur": ("{}", "pelvis stomach chest0 chest neck head", "thigh calf foot toe clavicle arm forearm hand", "{}_l {}_r"),
-    "full path": ("|world|{}", "Hips Spine Spine1 Spine2 Neck Head", "UpLeg Leg Foot Toe Shoulder Arm ForeArm Hand", "Left{} Right{}"),
-    "capitals": ("{}", "HIPS SPINE SPINE1 SPINE2 NECK HEAD", "THIGH CALF FOOT TOE CLAVICLE UPPERARM FOREARM HAND", "LEFT_{} RIGHT_{}"),
-    "lower case": ("{}", "hips spine spine1 spine2 neck head", "upleg leg foot toe shoulder arm forearm hand", "left{} right{}"),
-    "japanese": ("{}", "センター 上半身 上半身2 上半身3 首 頭", "足 ひざ 足首 つま先 肩 腕 ひじ 手首", "左{} 右{}"),
-    "german": ("{}", "Becken Wirbel1 Wirbel2 Brust Hals Kopf", "Oberschenkel Unterschenkel Fuß Zehen Schlüsselbein Oberarm Unterarm Hand", "{}_links {}_rechts"),
-    "spanish": ("{}", "cadera columna1 columna2 pecho cuello cabeza", "muslo pierna pie dedos clavicula brazo antebrazo mano", "{}_izq {}_der"),
-    "french": ("{}", "bassin dos1 dos2 poitrine cou tête", "cuisse tibia pied orteils clavicule bras avant_bras main", "{}_gauche {}_droite"),
-    "outside ascii": ("体_{}_é", "Hips Spine Spine1 Chest Neck Head", "UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand", "Left{} Right{}"),
-}  # fmt: skip
+_STYLES = """
+mixamo
+    mixamorig:{}, Left{} Right{}
+    Hips Spine Spine1 Spine2 Neck Head
+    UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand
+motionbuilder
+    {}, Left{} Right{}
+    Hips Spine Spine1 Spine2 Neck Head
+    UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand
+actor
+    Actor_01_{}, Left{} Right{}
+    Hips Spine Spine1 Spine2 Neck Head
+    UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand
+unreal
+    {}, {}_l {}_r
+    pelvis spine_01 spine_02 spine_03 neck_01 head
+    thigh calf foot ball clavicle upperarm lowerarm hand
+unity
+    {}, Left{} Right{}
+    Hips Spine Chest UpperChest Neck Head
+    UpperLeg LowerLeg Foot Toes Shoulder UpperArm LowerArm Hand
+rigify
+    DEF-{}, {}.L {}.R
+    spine spine.001 spine.002 spine.003 spine.004 spine.006
+    thigh shin foot toe shoulder upper_arm forearm hand
+blender
+    {}, {}.L {}.R
+    Hips Spine Chest UpperChest Neck Head
+    Upper_Leg Lower_Leg Foot Toe Shoulder Upper_Arm Lower_Arm Hand
+daz
+    {}, l{} r{}
+    hip abdomenLower abdomenUpper chestLower neckLower head
+    ThighBend Shin Foot Toe Collar ShldrBend ForearmBend Hand
+poser
+    {}, l{} r{}
+    hip abdomen waist chest neck head
+    Thigh Shin Foot Toe Collar Shldr ForeArm Hand
+biped
+    Bip001 {}, L_{} R_{}
+    Pelvis Spine Spine1 Spine2 Neck Head
+    Thigh Calf Foot Toe0 Clavicle UpperArm Forearm Hand
+xsens
+    {}, Left{} Right{}
+    Pelvis L5 L3 T12 Neck Head
+    UpperLeg LowerLeg Foot Toe Shoulder UpperArm ForeArm Hand
+rokoko
+    {}, Left{} Right{}
+    Hips Spine1 Spine2 Spine3 Neck Head
+    Thigh Shin Foot Toe Shoulder Arm ForeArm Hand
+hips and knees
+    {}, Left{} Right{}
+    Hips Chest Chest2 Chest3 Neck Head
+    Hip Knee Ankle Toe Collar Shoulder Elbow Wrist
+kinect
+    {}, {}Left {}Right
+    SpineBase SpineMid Spine3 SpineShoulder Neck Head
+    Hip Knee Ankle Foot Clavicle Shoulder Elbow Wrist
+smpl
+    {}, L_{} R_{}
+    Pelvis Spine1 Spine2 Spine3 Neck Head
+    Hip Knee Ankle Foot Collar Shoulder Elbow Wrist
+smpl-x
+    {}, left_{} right_{}
+    pelvis spine1 spine2 spine3 neck head
+    hip knee ankle foot collar shoulder elbow wrist
+soma
+    {}, Left{} Right{}
+    Hips Spine1 Spine2 Chest Neck1 Head
+    Leg Shin Foot ToeBase Shoulder Arm ForeArm Hand
+maya
+    {}_jnt, l_{} r_{}
+    root spine_a spine_b spine_c neck head
+    upLeg loLeg foot ball clav upArm loArm hand
+vroid
+    J_Bip_{}, L_{} R_{}
+    C_Hips C_Spine C_Chest C_UpperChest C_Neck C_Head
+    UpperLeg LowerLeg Foot ToeBase Shoulder UpperArm LowerArm Hand
+acclaim
+    {}, l{} r{}
+    root lowerback upperback thorax lowerneck head
+    femur tibia foot toes clavicle humerus radius wrist
+valve
+    ValveBiped.Bip01_{}, L_{} R_{}
+    Pelvis Spine Spine1 Spine2 Neck1 Head1
+    Thigh Calf Foot Toe0 Clavicle UpperArm Forearm Hand
+source 2
+    {}, {}_L {}_R
+    pelvis spine_0 spine_1 spine_2 neck_0 head
+    leg_upper leg_lower ankle ball clavicle arm_upper arm_lower hand
+auto-rig
+    {}, {}.l {}.r
+    root.x spine_01.x spine_02.x spine_03.x neck.x head.x
+    thigh_stretch leg_stretch foot toes_01 shoulder arm_stretch forearm_stretch hand
+cascadeur
+    {}, {}_l {}_r
+    pelvis stomach chest0 chest neck head
+    thigh calf foot toe clavicle arm forearm hand
+full path
+    |world|{}, Left{} Right{}
+    Hips Spine Spine1 Spine2 Neck Head
+    UpLeg Leg Foot Toe Shoulder Arm ForeArm Hand
+capitals
+    {}, LEFT_{} RIGHT_{}
+    HIPS SPINE SPINE1 SPINE2 NECK HEAD
+    THIGH CALF FOOT TOE CLAVICLE UPPERARM FOREARM HAND
+lower case
+    {}, left{} right{}
+    hips spine spine1 spine2 neck head
+    upleg leg foot toe shoulder arm forearm hand
+japanese
+    {}, 左{} 右{}
+    センター 上半身 上半身2 上半身3 首 頭
+    足 ひざ 足首 つま先 肩 腕 ひじ 手首
+german
+    {}, {}_links {}_rechts
+    Becken Wirbel1 Wirbel2 Brust Hals Kopf
+    Oberschenkel Unterschenkel Fuß Zehen Schlüsselbein Oberarm Unterarm Hand
+spanish
+    {}, {}_izq {}_der
+    cadera columna1 columna2 pecho cuello cabeza
+    muslo pierna pie dedos clavicula brazo antebrazo mano
+french
+    {}, {}_gauche {}_droite
+    bassin dos1 dos2 poitrine cou tête
+    cuisse tibia pied orteils clavicule bras avant_bras main
+outside ascii
+    体_{}_é, Left{} Right{}
+    Hips Spine Spine1 Chest Neck Head
+    UpLeg Leg Foot ToeBase Shoulder Arm ForeArm Hand
+"""
+
+
+def _read_styles() -> dict[str, tuple[str, str, str, str]]:
+    """By name: the pattern of all joints, those of the two sides, the words of the trunk and of a limb."""
+    lines = [line.strip() for line in _STYLES.strip().splitlines()]
+    return {lines[k]: (*lines[k + 1].rsplit(", ", 1), lines[k + 2], lines[k + 3]) for k in range(0, len(lines), 4)}  # type: ignore[misc]
+
+
+STYLES = _read_styles()
 
 
 def style(name: str) -> dict[str, str]:
     """The name of each joint of `human()` in a style."""
-    pattern, centre, sided, sides = STYLES[name]
+    pattern, sides, centre, sided = STYLES[name]
     names = {joint: pattern.format(word) for joint, word in zip(_CENTRE, centre.split(), strict=True)}
     for letter, side in zip("LR", sides.split(), strict=True):
         names |= {f"{j}.{letter}": pattern.format(side.format(w)) for j, w in zip(_SIDED, sided.split(), strict=True)}

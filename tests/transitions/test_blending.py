@@ -214,8 +214,16 @@ def test_the_destination_is_put_on_the_sources_skeleton(make_walk):
     result = blend(make_walk(100), make_walk(100, scale=1.5, speed=3.0), 40, 60, 10)
     assert result.clip.skeleton.leg_length == pytest.approx(0.84)
     assert speeds(result.clip)[-1] == pytest.approx(2.0)
-    with pytest.raises(TransitionError, match="one joint tree"):
-        blend(make_walk(100), make_walk(100, toes=False), 40, 60, 10)
+
+
+def test_rigs_that_differ_in_leaf_joints_alone_are_blended(make_walk):
+    source, destination = make_walk(100), make_walk(100, toes=False)
+    result = blend(source, destination, 40, 60, 10).clip
+    np.testing.assert_allclose(result.rotations, blend(source, make_walk(100), 40, 60, 10).clip.rotations, atol=1e-12)
+    assert "joints at rest LeftToe, RightToe" in " ".join(result.history)
+    back = blend(destination, source, 40, 60, 10).clip
+    assert back.skeleton is destination.skeleton
+    assert "left out joints LeftToe, RightToe" in " ".join(back.history)
 
 
 def test_what_was_done_is_on_record(make_walk):
