@@ -43,10 +43,8 @@ def why_no_human(tree: Tree, legs: Pair, arms: Pair | None, others: Sequence[Pai
     if arms is None and any(name.animal for name in tree.named):
         return "it has parts that only animals have, and no arms"
     named = legs.spoken >= SPOKEN and (arms is None or arms.spoken >= SPOKEN)
-    if not (named and arms is not None):
-        long = [pair for pair in others if pair.length > _LEG_LIKE * legs.length]
-        if long:
-            return f"it has {2 * (len(long) + 1) + (2 if arms is not None else 0)} limbs or more"
+    if not (named and arms is not None) and any(pair.length > _LEG_LIKE * legs.length for pair in others):
+        return "it has more than two legs"
     if not named:
         for what, size in _sizes(tree, legs, arms).items():
             low, high = _LIMITS[what]

@@ -116,20 +116,19 @@ class NamedJoint:
 
 def read_names(names: Sequence[str]) -> tuple[NamedJoint, ...]:
     """What each name of a rig says; words that all of its joints share, such as an actor's name, say nothing."""
-    return tuple(_read(words) for words in _without_shared(names))
-
-
-def _without_shared(names: Sequence[str]) -> list[list[str]]:
     words = [_words(name) for name in names]
-    counts = Counter(word for of_one in words for word in set(of_one))
+    counts = Counter(word for own in words for word in set(own))
     # The root may lack them; a word of the body counts unless it is in all names.
     shared = {word for word, count in counts.items() if count >= len(names) - (word not in _SPEAKS) and len(names) > 4}
-    return [[word for word in of_one if word not in shared] for of_one in words]
+    return tuple(_read([word for word in own if word not in shared]) for own in words)
 
 
 def bare_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Names without what all of a rig's joints share: `actor1:Hips` and `actor2_Hips` are both `hips`."""
-    return tuple("".join(words) for words in _without_shared(names))
+    """Names without the words that all of a rig's begin with: `actor1:Hips` and `Actor_2_Hips` are both `hips`."""
+    words = [_words(name) for name in names]
+    columns = enumerate(zip(*words, strict=False))
+    alike = next((k for k, column in columns if len(set(column)) > 1), 0)
+    return tuple("".join(own[alike:]) for own in words)
 
 
 def split_side(name: str) -> tuple[str, str]:

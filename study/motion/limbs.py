@@ -31,7 +31,7 @@ _MOST_PAIRS = 24
 # Two chains are no pair when their lengths differ by more than this factor, as a logarithm.
 _UNLIKE = 0.35
 # What a choice of joints loses: by a ratio that is off (its logarithm), a joint that hardly bends, bones beyond a fan
-# of fingers, an end site in place of the third joint, mere bits for bones. A pair loses by a third chain that is like it.
+# of fingers, an end site in place of the third joint, mere bits for bones; a pair, by a third chain like it.
 _RATIO_COST, _STIFF_COST, _FAN_COST, _TIP_COST, _UNFIT_COST = 2.0, 0.6, 1.0, 1.0, 3.0
 _CROWD_COST = 1.0
 _STIFF_RAD = 0.035
