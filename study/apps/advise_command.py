@@ -69,8 +69,10 @@ def advise(
             else:
                 rows.append({**row, "source": source, "destination": destination, "fps": fps})
             advance(done / len(pairs), f"{done} of {len(pairs)}")
-    for problem in problems:
+    for problem in problems[:3]:
         say(problem)
+    if len(problems) > 3:
+        say(f"{len(problems) - 3} more pairs have no advice either; --json lists them under problems")
     result = {"fps": fps, "advice": rows, "problems": problems, "cyclic": cyclic}
     if out is not None:
         _write(out, result)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from study.apps.console import say
+
 if TYPE_CHECKING:
     from study.motion.clip import Clip
 
@@ -23,7 +25,15 @@ def load_clip(spec: str, library: str | None, fps: float | None) -> Clip:
 
 def clip_pair(source: str, destination: str, library: str | None, fps: float) -> tuple[Clip, Clip]:
     """Both clips at one frame rate, the destination on the source's skeleton."""
+    first, second = load_clip(source, library, fps), load_clip(destination, library, fps)
+    return first, on_body_of(first, second)
+
+
+def on_body_of(first: Clip, clip: Clip) -> Clip:
+    """A clip on the skeleton of the first; what that changes is said."""
     from study.motion.clip import retarget
 
-    first, second = load_clip(source, library, fps), load_clip(destination, library, fps)
-    return first, retarget(second, first.skeleton)
+    moved = retarget(clip, first.skeleton)
+    for note in moved.history[len(clip.history) :]:
+        say(f"{clip.name}: {note}")
+    return moved

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from study.apps.console import emit, json_option, library_option, say
 from study.counting import counted
+
+if TYPE_CHECKING:
+    from study.motion.skeleton import Skeleton
 
 EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -58,6 +63,9 @@ def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_jso
         "seconds": clip.seconds,
         "joints": list(clip.skeleton.names),
         "roles": roles,
+        "human": clip.skeleton.body.human,
+        "missing_roles": dict(clip.skeleton.body.missing),
+        "role_notes": list(clip.skeleton.body.notes),
         "history": list(clip.history),
         "defects": [
             {
@@ -76,11 +84,29 @@ def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_jso
         f"{file.name}: {counted(clip.frames, 'frame')} at {clip.fps:g} fps, {clip.seconds:.2f} s, "
         f"{counted(clip.skeleton.joints, 'joint')}",
         *clip.history,
-        "roles: " + ", ".join(f"{role} {name}" for role, name in roles.items()),
+        *_role_lines(clip.skeleton),
         *(f"defect: {defect.message}" for defect in defects),
-        "" if defects else "no defects found",
+        "" if defects else _nothing_found(clip.skeleton),
     ]
     emit(result, as_json, "\n".join(line for line in lines if line))
+
+
+def _role_lines(skeleton: Skeleton) -> Iterator[str]:
+    """Which joint plays which role, which roles no joint plays, and why."""
+    body = skeleton.body
+    if not body.human:
+        yield f"no human body was found: {next(iter(body.missing.values()))}. It can be previewed; methods need a human"
+        return
+    yield "roles: " + ", ".join(f"{role} {skeleton.names[joint]}" for role, joint in body.joints.items())
+    for why in dict.fromkeys(body.missing.values()):
+        yield f"missing: {', '.join(role for role, reason in body.missing.items() if reason == why)} ({why})"
+    yield from body.notes
+
+
+def _nothing_found(skeleton: Skeleton) -> str:
+    if {"hip.L", "hip.R", "ankle.L", "ankle.R"} <= skeleton.roles.keys():
+        return "no defects found"
+    return "no jumps found; flipped legs and the floor were not looked for, as no legs were found"
 
 
 @motions.command()

@@ -27,15 +27,14 @@ def load_clips(specs: tuple[str, ...], library: str | None, fps: float) -> tuple
     """Clips as `load_clip` takes them, on the body of the first, named by file or motion."""
     from dataclasses import replace
 
-    from study.apps.clips import load_clip
-    from study.motion.clip import retarget
+    from study.apps.clips import load_clip, on_body_of
 
     names = [Path(spec).stem if Path(spec).is_file() else spec for spec in specs]
     if len(set(names)) < len(names):
         twice = sorted({name for name in names if names.count(name) > 1})
         raise click.UsageError(f"expected clips with names of their own, found {', '.join(twice)} more than once.")
     clips = [replace(load_clip(spec, library, fps), name=name) for spec, name in zip(specs, names, strict=True)]
-    return tuple(retarget(clip, clips[0].skeleton) for clip in clips)
+    return tuple(on_body_of(clips[0], clip) for clip in clips)
 
 
 def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> list[tuple[int, int]]:

@@ -199,6 +199,7 @@ def transition(
         "cost": None if found is None else found.cost,
         "unclipped_s": getattr(found, "unclipped_s", None),
         "note": "; ".join(filter(None, (joined.note, "" if found is None else found.note))),
+        "history": list(joined.clip.history),
         **slide,
     }
     text = (
@@ -244,7 +245,7 @@ def join(
 
 def joint_frames(given: Sequence[str]) -> dict[str, int]:
     """`hip.L=5` and the like, as a mapping."""
-    from study.motion.skeleton import ROLES
+    from study.motion.joint_names import ROLES
 
     found = {}
     for text in given:

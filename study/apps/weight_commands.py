@@ -204,7 +204,7 @@ def fit_weights(
 
 def _cuts(labels: list[Label], library: str | None) -> list[LabelledCut]:
     """The labels with their clips, each clip read once and all on one skeleton."""
-    from study.motion.clip import retarget
+    from study.apps.clips import on_body_of
     from study.transitions.fit_weights import LabelledCut
 
     clips: dict[tuple[str, str | None], Clip] = {}
@@ -213,7 +213,7 @@ def _cuts(labels: list[Label], library: str | None) -> list[LabelledCut]:
         key = (name, library or label.library or None)
         if key not in clips:
             read = load_clip(*key, label.fps)
-            clips[key] = retarget(read, next(iter(clips.values())).skeleton) if clips else read
+            clips[key] = on_body_of(next(iter(clips.values())), read) if clips else read
         return clips[key]
 
     return [

@@ -19,7 +19,7 @@ from study.counting import counted, noun
 from study.errors import MotionError, StimulusError, TransitionError
 from study.experiment.plan import generator
 from study.experiment.protocol import OPTIMUM_CUTS, Points, Protocol, StudySpec, TransitionSpec
-from study.motion.clip import Clip, resample
+from study.motion.clip import Clip, resample, retarget
 from study.transitions.blend_length import BlendLength, blend_length
 from study.transitions.candidates import APART_S, frame_costs
 from study.transitions.timewarp import WarpLength, warp_length
@@ -129,11 +129,7 @@ def settle(
     source_needs, destination_needs = _needs(protocol, study, points)
     source = _supply(protocol, library, transition.source, source_needs, points.source_within)
     destination = _supply(protocol, library, transition.destination, destination_needs, points.destination_within)
-    if not source.clip.skeleton.matches(destination.clip.skeleton):
-        raise StimulusError(
-            f"transition {transition.name!r}: expected motions of one rig, found {transition.source!r} and "
-            f"{transition.destination!r} with different joints; choose motions of one library and rig."
-        )
+    destination = _on_rig_of(source, destination, transition)
     if study.reference in OPTIMUM_CUTS:
         return _at_optima(study, transition, source, destination)
     if points.choose == "random":
@@ -146,6 +142,18 @@ def settle(
             "blend; give other points, or change a method or fixed_frames."
         )
     return settled
+
+
+def _on_rig_of(source: Supply, destination: Supply, transition: TransitionSpec) -> Supply:
+    """The destination with the source's joints, and a note of what retargeting it changes."""
+    try:
+        moved = retarget(destination.clip, source.clip.skeleton)
+    except MotionError as error:
+        raise StimulusError(f"transition {transition.name!r}: {error}") from error
+    said = moved.history[len(destination.clip.history) :]
+    if source.clip.skeleton.matches(destination.clip.skeleton):
+        return replace(destination, notes=(*destination.notes, *said))
+    return replace(destination, clip=moved)
 
 
 def _needs(protocol: Protocol, study: StudySpec, points: Points) -> tuple[Needs, Needs]:

@@ -12,6 +12,7 @@ import difflib
 import os
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from study.counting import counted
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
-from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip, refuse_large
+from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip, refuse_large, with_roles
 from study.motion.digits import parse_table
 from study.motion.skeleton import MOST_JOINTS, Skeleton
 from study.motion.source import LARGEST, Source, number, read_source, shown, whole_number
@@ -79,7 +80,9 @@ class _Hierarchy:
         return unique
 
 
-def read_bvh(path: Path | str, *, metres_per_unit: float | None = None) -> Clip:
+def read_bvh(
+    path: Path | str, *, metres_per_unit: float | None = None, mapping: Mapping[str, str] | None = None
+) -> Clip:
     """Read a BVH file.
 
     Parameters
@@ -89,6 +92,8 @@ def read_bvh(path: Path | str, *, metres_per_unit: float | None = None) -> Clip:
     metres_per_unit
         Metres in a unit of the file; by default found from the size of the body (`study.motion.units`), and said
         in the clip's history.
+    mapping
+        Joint names by role, as `study.motion.rigs.find_roles` takes them.
 
     Raises
     ------
@@ -111,7 +116,7 @@ def read_bvh(path: Path | str, *, metres_per_unit: float | None = None) -> Clip:
     values = parse_table(source, offset, hierarchy.columns)
     if stated is not None and stated != len(values):
         _warn(f"{source.path}: says Frames: {stated}, but holds {counted(len(values), 'row')}; the rows are trusted")
-    return _assemble(source, hierarchy, values, fps, metres_per_unit)
+    return _assemble(source, hierarchy, values, fps, metres_per_unit, mapping)
 
 
 class _Tokens:
@@ -319,12 +324,18 @@ def frame_rate(printed: str) -> float:
 
 
 def _assemble(
-    source: Source, hierarchy: _Hierarchy, values: FloatArray, fps: float, metres_per_unit: float | None
+    source: Source,
+    hierarchy: _Hierarchy,
+    values: FloatArray,
+    fps: float,
+    metres_per_unit: float | None,
+    mapping: Mapping[str, str] | None,
 ) -> Clip:
-    names = [joint.name for joint in hierarchy.joints]
+    names = tuple(joint.name for joint in hierarchy.joints)
     parents = np.array([joint.parent for joint in hierarchy.joints])
     offsets = np.array([joint.offset for joint in hierarchy.joints])
-    ends = hierarchy.ends
+    end_parents = np.array([parent for parent, _ in hierarchy.ends], dtype=np.int64)
+    end_offsets = np.array([offset for _, offset in hierarchy.ends]).reshape(-1, 3)
     refuse_large(len(values), len(names), str(source.path), values.size)
     rotations = _rotations(hierarchy.joints, values)
     paths = {j: _path(joint, values) for j, joint in enumerate(hierarchy.joints) if joint.columns("position") or j == 0}
@@ -333,7 +344,9 @@ def _assemble(
         if j > 0:
             offsets[j] = np.median(path, axis=0)
     history = [f"read from {source.path.name}"]
-    scale = find_scale(names, parents, offsets)
+    whole = Skeleton(names, parents, offsets, end_parents, end_offsets)
+    body = with_roles(Clip(whole, paths[0], rotations, fps), mapping).skeleton
+    scale = find_scale(body)
     if metres_per_unit is None:
         metres_per_unit = scale.metres_per_unit
         history.append(scale.note)
@@ -342,8 +355,7 @@ def _assemble(
     else:
         history.append(f"lengths x {metres_per_unit:.6g} m, as told")
     root = 0
-    carrying = {joint for joint, _ in ends}
-    while _rides(root, parents, carrying, paths, metres_per_unit):
+    while _rides(root, parents, end_parents.tolist(), paths, metres_per_unit):
         child = root + 1
         paths[child] = paths[root] + quat.rotate(rotations[:, root], paths[child])
         rotations[:, child] = quat.multiply(rotations[:, root], rotations[:, child])
@@ -353,11 +365,12 @@ def _assemble(
         if j > root:
             _check_rigid(source, names[j], path, offsets[j], metres_per_unit)
     skeleton = Skeleton(
-        tuple(names[root:]),
+        names[root:],
         np.where(parents[root:] < root, -1, parents[root:] - root),
         offsets[root:] * metres_per_unit,
-        np.array([p - root for p, _ in ends], dtype=np.int64),
-        np.array([o for _, o in ends]).reshape(-1, 3) * metres_per_unit,
+        end_parents - root,
+        end_offsets * metres_per_unit,
+        body.body.without_first(root),
     )
     return Clip(
         skeleton,

@@ -6,7 +6,7 @@ every function here returns a new clip.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,11 +14,15 @@ from numpy.typing import NDArray
 
 from study.errors import MotionError
 from study.motion import quaternions as quat
+from study.motion.rigs import find_roles
+from study.motion.same_rig import shared_joints
 from study.motion.skeleton import Skeleton
 
 FloatArray = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
+# Frames looked at to tell which joint plays which role.
+_POSES = 12
 
 MOST_POSES = 20_000_000
 """Frames times joints that a clip may have: half an hour at 120 frames a second of a body with hands, in 640 MB."""
@@ -189,6 +193,19 @@ def joint_positions(clip: Clip, *, ends: bool = False) -> FloatArray:
     return np.ascontiguousarray(positions.transpose(2, 1, 0))
 
 
+def with_roles(clip: Clip, mapping: Mapping[str, str] | None = None) -> Clip:
+    """The clip with its joints' roles found anew, from its poses too; `mapping` as `rigs.find_roles` takes it."""
+    some = np.unique(np.linspace(0, clip.frames - 1, min(clip.frames, _POSES)).astype(np.int64))
+    poses = joint_positions(
+        replace(clip, root_positions=clip.root_positions[some], rotations=clip.rotations[some]), ends=True
+    )
+    rig = clip.skeleton
+    known = find_roles(
+        rig.names, rig.parents, rig.offsets, rig.end_parents, rig.end_offsets, poses=poses, mapping=mapping
+    )
+    return replace(clip, skeleton=replace(rig, known=known))
+
+
 def resample(clip: Clip, fps: float) -> Clip:
     """The clip at another frame rate: slerp for rotations, linear for the root; the first frame stays.
 
@@ -266,32 +283,46 @@ def moved(clip: Clip, yaw: float, translation: FloatArray) -> Clip:
 
 
 def retarget(clip: Clip, skeleton: Skeleton) -> Clip:
-    """The motion on another body with the same joint tree: rotations kept, root path scaled by leg length.
+    """The motion on another body of the rig: rotations kept, root path scaled by leg length.
 
-    Scaling the root by the ratio of leg lengths keeps the feet from sliding when stature differs.
+    Scaling the root by the ratio of leg lengths keeps the feet from sliding when stature differs. The bodies may differ
+    in leaf joints, such as fingers: those that only the clip has are left out, those that only the skeleton has stay at
+    rest.
 
     Raises
     ------
     MotionError
-        Where names or parents of the joints differ.
+        Where the rigs differ in more than leaf joints and lengths, or in the directions of limbs at rest.
     """
     if clip.skeleton is skeleton:
         return clip
-    if not clip.skeleton.matches(skeleton):
-        missing = sorted(set(clip.skeleton.names) ^ set(skeleton.names))
-        raise MotionError(
-            f"Expected the same joint tree to move {clip.name or 'the clip'} to another skeleton; "
-            f"joints found in only one of them: {', '.join(missing) or 'none, but the parents differ'}. "
-            "Use clips of one rig."
-        )
-    if np.array_equal(clip.skeleton.offsets, skeleton.offsets) and np.array_equal(
-        clip.skeleton.end_offsets, skeleton.end_offsets
-    ):
-        return replace(clip, skeleton=skeleton)
-    scale = skeleton.leg_length / clip.skeleton.leg_length
+    taken = shared_joints(clip.skeleton, skeleton, clip.name or "the clip")
+    has = taken >= 0
+    left_out = sorted(set(range(clip.skeleton.joints)) - set(taken.tolist()))
+    notes = []
+    rotations: FloatArray = clip.rotations
+    if left_out or not np.array_equal(taken, np.arange(skeleton.joints)):
+        rotations = np.tile(quat.IDENTITY, (clip.frames, skeleton.joints, 1))
+        rotations[:, has] = clip.rotations[:, taken[has]]
+        notes += [f"left out joints {_some([clip.skeleton.names[j] for j in left_out])}"] if left_out else []
+        added = [name for name, there in zip(skeleton.names, has, strict=True) if not there]
+        notes += [f"joints at rest {_some(added)}"] if added else []
+    same = all(np.array_equal(a, b) for a, b in zip(_lengths_of(clip.skeleton), _lengths_of(skeleton), strict=True))
+    if same and not notes:
+        return replace(clip, skeleton=skeleton, rotations=rotations)
+    legs = all({"hip.L", "hip.R", "ankle.L", "ankle.R"} <= body.roles.keys() for body in (clip.skeleton, skeleton))
+    scale = skeleton.leg_length / clip.skeleton.leg_length if legs else 1.0
+    notes.insert(0, f"retargeted to another skeleton of the rig, root path times {scale:.3f}")
+    history = (*clip.history, ", ".join(notes))
     return replace(
-        clip,
-        skeleton=skeleton,
-        root_positions=clip.root_positions * scale,
-        history=(*clip.history, f"retargeted to another skeleton of the rig, root path times {scale:.3f}"),
+        clip, skeleton=skeleton, root_positions=clip.root_positions * scale, rotations=rotations, history=history
     )
+
+
+def _lengths_of(skeleton: Skeleton) -> tuple[FloatArray, FloatArray]:
+    return skeleton.offsets, skeleton.end_offsets
+
+
+def _some(names: Sequence[str]) -> str:
+    """The first names of a list, and how many more there are."""
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

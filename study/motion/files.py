@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,13 @@ from study.motion.upright import put_upright
 SUFFIXES = (".bvh", ".amc")
 
 
-def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: float | None = None) -> Clip:
+def read_clip(
+    path: Path | str,
+    *,
+    metres_per_unit: float | None = None,
+    fps: float | None = None,
+    mapping: Mapping[str, str] | None = None,
+) -> Clip:
     """Read a motion file; where another axis than Y is up, the clip is put upright and its history says so.
 
     Parameters
@@ -25,6 +32,8 @@ def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: fl
         Metres in a unit of the file; by default found from the body, and said in the clip's history.
     fps
         Frames per second in place of what the file says (AMC files don't say; 120 is assumed).
+    mapping
+        Joint names by role (`{"hip.L": "bone_12"}`), where the roles found are wrong or missing.
 
     Raises
     ------
@@ -40,9 +49,10 @@ def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: fl
             raise MotionError(f"Expected {label} above 0, from {low:.0e} to {high:.0e}, for {path}, got {value}.")
     suffix = path.suffix.lower()
     if suffix == ".amc":
-        return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=CMU_FPS if fps is None else fps))
+        rate = CMU_FPS if fps is None else fps
+        return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=rate, mapping=mapping))
     if suffix == ".bvh":
-        clip = put_upright(read_bvh(path, metres_per_unit=metres_per_unit))
+        clip = put_upright(read_bvh(path, metres_per_unit=metres_per_unit, mapping=mapping))
         if fps is None or fps == clip.fps:
             return clip
         note = f"taken at {fps:g} fps, as told, and not at the file's {clip.fps:g}"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
+from study.motion.skeleton import Skeleton
 
 FloatArray = NDArray[np.float64]
 
@@ -54,9 +55,9 @@ def leg_flips(clip: Clip, side: str, jumps: NDArray[np.int64]) -> LegFlips:
     slide round the circle ends in it (the jump is spread over the frames of the slide). The cheapest reading is
     taken: few turned frames, and hips no further from rest than need be.
     """
-    hip, knee, ankle = (clip.skeleton.role(f"{part}.{side}") for part in ("hip", "knee", "ankle"))
+    hip, ankle = (clip.skeleton.role(f"{part}.{side}") for part in ("hip", "ankle"))
     rotations = clip.rotations
-    axes = _leg_axes(clip, hip, knee, ankle)
+    axes = _leg_axes(clip, hip, ankle)
     turns = np.array([_twist(axes[k], rotations[k - 1, hip], rotations[k, hip]) for k in jumps])
     flipped = _cheapest_reading(clip, hip, axes, jumps)
     angles = np.zeros(clip.frames)
@@ -81,12 +82,12 @@ def leg_flips(clip: Clip, side: str, jumps: NDArray[np.int64]) -> LegFlips:
 
 def turn_back(clip: Clip, rotations: FloatArray, flips: LegFlips) -> None:
     """Mend one leg in `rotations (frames, joints, 4)`, a copy of the clip's, in place."""
-    hip, knee, ankle = (clip.skeleton.role(f"{part}.{flips.side}") for part in ("hip", "knee", "ankle"))
-    axes = _leg_axes(clip, hip, knee, ankle)
+    hip, ankle = (clip.skeleton.role(f"{part}.{flips.side}") for part in ("hip", "ankle"))
+    axes = _leg_axes(clip, hip, ankle)
     for start, stop in flips.runs:
         run = slice(start, stop)
         turn = quat.from_axis_angle(axes[run], flips.angles[run])
-        shin = quat.multiply(rotations[run, hip], rotations[run, knee])
+        shin = _turn_along(clip.skeleton, rotations[run], hip, int(clip.skeleton.parents[ankle]))
         foot = quat.multiply(shin, rotations[run, ankle])
         rotations[run, hip] = quat.multiply(turn, rotations[run, hip])
         with_shin = rotations[run, ankle].copy()
@@ -107,11 +108,24 @@ def _carried_on(path: FloatArray, before: FloatArray | None, after: FloatArray |
     return quat.multiply(turns, path), float(np.max(quat.half_angle_between(turns, quat.IDENTITY)))
 
 
-def _leg_axes(clip: Clip, hip: int, knee: int, ankle: int) -> FloatArray:
+def _leg_axes(clip: Clip, hip: int, ankle: int) -> FloatArray:
     """The unit vector from hip to ankle in the frame of the hip's parent, `(frames, 3)`."""
-    shin = quat.rotate(clip.rotations[:, knee], clip.skeleton.offsets[ankle])
-    leg = quat.rotate(clip.rotations[:, hip], clip.skeleton.offsets[knee] + shin)
+    leg = np.zeros((clip.frames, 3))
+    joint = ankle
+    while joint != hip:
+        parent = int(clip.skeleton.parents[joint])
+        leg = quat.rotate(clip.rotations[:, parent], clip.skeleton.offsets[joint] + leg)
+        joint = parent
     return np.asarray(leg / np.maximum(np.linalg.norm(leg, axis=1, keepdims=True), 1e-9))
+
+
+def _turn_along(skeleton: Skeleton, rotations: FloatArray, upper: int, lower: int) -> FloatArray:
+    """The rotation of a joint in the frame of the parent of one above it, `(frames, 4)`."""
+    turn = rotations[:, lower]
+    while lower != upper:
+        lower = int(skeleton.parents[lower])
+        turn = quat.multiply(rotations[:, lower], turn)
+    return turn
 
 
 def _twist(axis: FloatArray, before: FloatArray, after: FloatArray) -> float:

@@ -1,4 +1,4 @@
-"""Left-right mirroring of a clip on any rig whose limbs come in named pairs.
+"""Left-right mirroring of a clip on any rig whose limbs come in pairs.
 
 In: a `Clip`. Out: the same motion as a mirror would show it, in the world's plane `x = 0`: a left turn becomes a
 right turn, and what the left hand did the right hand does. Wang & Bodenheimer need the mirror image for nothing;
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
-from study.motion.skeleton import Skeleton, split_side
+from study.motion.joint_names import split_side
+from study.motion.skeleton import Skeleton
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -96,7 +97,10 @@ def mirror_map(clip: Clip) -> MirrorMap:
 
 
 def find_partners(skeleton: Skeleton) -> IntArray:
-    """Each joint's counterpart on the other side `(joints,)`, by name; joints of the trunk are their own."""
+    """Each joint's counterpart on the other side `(joints,)`; joints of the trunk are their own.
+
+    By name, where names tell the sides; else limb by limb, the joints of each in the order of their lengths.
+    """
     sides = [split_side(name) for name in skeleton.names]
     index = {side: joint for joint, side in enumerate(sides) if side[0]}
     partners = np.arange(skeleton.joints)
@@ -108,6 +112,11 @@ def find_partners(skeleton: Skeleton) -> IntArray:
                 "counterpart on the other side. Rename the joint, or leave the clip as it is."
             )
         partners[joint] = other
+    for part in ("hip", "shoulder"):
+        if {f"{part}.L", f"{part}.R"} <= skeleton.roles.keys():
+            left, right = (skeleton.roles[f"{part}.{side}"] for side in "LR")
+            if partners[left] == left:
+                _pair_limbs(skeleton, left, right, partners)
     for joint in range(1, skeleton.joints):
         parent, other = int(skeleton.parents[joint]), int(skeleton.parents[partners[joint]])
         if partners[parent] != other:
@@ -116,6 +125,27 @@ def find_partners(skeleton: Skeleton) -> IntArray:
                 f"they hang on {skeleton.names[parent]!r} and {skeleton.names[other]!r}. The rig can't be mirrored."
             )
     return partners
+
+
+def _pair_limbs(skeleton: Skeleton, left: int, right: int, partners: IntArray) -> None:
+    """Make counterparts, in place, of the joints of two limbs, from where they branch off one joint."""
+    parents = skeleton.parents
+    while parents[left] != parents[right]:
+        left, right = int(parents[left]), int(parents[right])
+        if min(left, right) < 0:
+            return
+    lengths = np.linalg.norm(skeleton.offsets, axis=1)
+    waiting = [(left, right)]
+    while waiting:
+        pair = waiting.pop()
+        partners[list(pair)] = pair[::-1]
+        own = [sorted(np.flatnonzero(parents == joint).tolist(), key=lambda c: lengths[c]) for joint in pair]
+        if len(own[0]) != len(own[1]):
+            raise MotionError(
+                f"Expected as many joints below {skeleton.names[pair[0]]!r} as below {skeleton.names[pair[1]]!r} to "
+                f"mirror them, found {len(own[0])} and {len(own[1])}. The rig can't be mirrored."
+            )
+        waiting += zip(*own, strict=True)
 
 
 def _axis_reflections(skeleton: Skeleton, partners: IntArray, mean: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Skeleton: joints in depth-first order, rest offsets in metres, end sites, and joint roles found by name.
+"""Skeleton: joints in depth-first order, rest offsets in metres, end sites, and the roles that joints play.
 
 Roles are the same on every rig: `pelvis`, `spine`, `chest`, `neck`, `head`, and with `.L` or `.R`: `hip`, `knee`,
 `ankle`, `toe`, `collar`, `shoulder`, `elbow`, `wrist`. A role that a rig does not have is missing from the mapping.
@@ -6,41 +6,23 @@ Roles are the same on every rig: `pelvis`, `spine`, `chest`, `neck`, `head`, and
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import MotionError
+from study.motion.joint_names import split_side
+from study.motion.rigs import Roles, find_roles
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SIDED_ROLES = ("hip", "knee", "ankle", "toe", "collar", "shoulder", "elbow", "wrist")
-CENTRE_ROLES = ("pelvis", "spine", "chest", "neck", "head")
-ROLES = CENTRE_ROLES + tuple(f"{role}.{side}" for role in SIDED_ROLES for side in "LR")
-
 MOST_JOINTS = 4000
 """Joints that a skeleton may have: several times those of a body with hands and face."""
-
-# Names of the joint at the *start* of the bone, lower case, side and rig prefix removed, digits kept.
-_LEG_NAMES = {
-    "hip": ("upleg", "upperleg", "thigh", "femur", "hip"),
-    "knee": ("lowerleg", "lowleg", "leg", "calf", "shin", "tibia", "knee"),
-    "ankle": ("foot", "ankle"),
-    "toe": ("toebase", "toes", "toe", "ball"),
-}
-_ARM_NAMES = {
-    "collar": ("collar", "clavicle", "shoulder"),
-    "shoulder": ("uparm", "upperarm", "arm", "humerus", "shoulder"),
-    "elbow": ("forearm", "lowerarm", "lowarm", "radius", "elbow"),
-    "wrist": ("wrist", "hand"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +41,8 @@ class Skeleton:
         The joints that carry an end site (a bone's tip that has no rotation of its own).
     end_offsets : (ends, 3)
         Each end site in its joint's frame, metres.
+    known
+        Which joints play which roles, where poses or a mapping by hand told it; found from the rest pose unless given.
     """
 
     names: tuple[str, ...]
@@ -66,6 +50,7 @@ class Skeleton:
     offsets: FloatArray
     end_parents: IntArray
     end_offsets: FloatArray
+    known: Roles | None = None
 
     def __post_init__(self) -> None:
         joints = len(self.names)
@@ -106,16 +91,23 @@ class Skeleton:
         return tuple((joints, self.parents[joints]) for joints in levels)
 
     @cached_property
+    def body(self) -> Roles:
+        """What is known of the roles of this rig's joints; see `study.motion.rigs.find_roles`."""
+        if self.known is not None:
+            return self.known
+        return find_roles(self.names, self.parents, self.offsets, self.end_parents, self.end_offsets)
+
+    @property
     def roles(self) -> Mapping[str, int]:
-        """Joint index by role, for the roles that this rig has; see `find_roles`."""
-        return MappingProxyType(find_roles(self.names, self.parents))
+        """Joint index by role, for the roles that this rig has."""
+        return self.body.joints
 
     def role(self, name: str) -> int:
         """The joint that plays a role; `MotionError` where the rig has none."""
         if name not in self.roles:
             raise MotionError(
-                f"Expected a joint for the role {name!r}; the rig has {', '.join(self.names)}. "
-                f"Roles found: {', '.join(self.roles) or 'none'}. Rename the joint, or use another rig."
+                f"Expected a joint for the role {name!r}, found none: {self.body.missing.get(name, 'no such role')}. "
+                f"Roles found: {', '.join(self.roles) or 'none'}. Map the role to a joint, or use another rig."
             )
         return self.roles[name]
 
@@ -131,139 +123,27 @@ class Skeleton:
     @cached_property
     def sides(self) -> tuple[str, ...]:
         """`"left"`, `"right"` or `"centre"` for each joint, then for each end site, inherited down the tree."""
+        own = [split_side(name)[0] for name in self.names]
+        for role, joint in self.roles.items():
+            own[joint] = own[joint] or role.partition(".")[2]
         sides: list[str] = []
-        for name, parent in zip(self.names, self.parents, strict=True):
-            own = split_side(name)[0]
+        for side, parent in zip(own, self.parents, strict=True):
             inherited = sides[parent] if parent >= 0 else "centre"
-            sides.append({"L": "left", "R": "right"}.get(own, inherited))
+            sides.append({"L": "left", "R": "right"}.get(side, inherited))
         return (*sides, *(sides[p] for p in self.end_parents))
 
     @cached_property
     def leg_length(self) -> float:
-        """Mean rest length of hip to ankle over both legs, metres."""
-        lengths = [
-            sum(float(np.linalg.norm(self.offsets[self.role(f"{part}.{side}")])) for part in ("knee", "ankle"))
-            for side in "LR"
-        ]
-        return float(np.mean(lengths))
+        """Mean rest length of hip to knee to ankle over both legs, along all bones between, metres."""
+        return float(np.mean([self._way(f"hip.{side}", f"ankle.{side}") for side in "LR"]))
+
+    def _way(self, upper: str, lower: str) -> float:
+        joint, total = self.role(lower), 0.0
+        while joint != self.role(upper):
+            total += float(np.linalg.norm(self.offsets[joint]))
+            joint = int(self.parents[joint])
+        return total
 
     def matches(self, other: Skeleton) -> bool:
         """Whether another skeleton has the same joints in the same tree (lengths may differ)."""
         return self.names == other.names and np.array_equal(self.parents, other.parents)
-
-
-def split_side(name: str) -> tuple[str, str]:
-    """A joint name as `(side, rest)`: `("L", "upleg")` for `mixamorig:LeftUpLeg`, `l_femur`, `UpLeg_L`, `lUpLeg`.
-
-    The side is `"L"`, `"R"` or `""`; the rest is lower case, without rig prefix, separators or the side.
-    """
-    name = re.split(r"[:|]", name)[-1]
-    name = re.sub(r"^(Bip\d*|mixamorig\d*|Character\d*)[ _]", "", name)
-    patterns = (
-        r"(?P<side>left|right)(?P<rest>.+)",
-        r"(?P<rest>.+?)[ _.\-]?(?P<side>left|right)",
-        r"(?P<side>[lr])[ _.\-](?P<rest>.+)",
-        r"(?P<rest>.+)[ _.\-](?P<side>[lr])",
-    )
-    for pattern in patterns:
-        if found := re.fullmatch(pattern, name, flags=re.IGNORECASE):
-            return found["side"][0].upper(), _plain(found["rest"])
-    if found := re.fullmatch(r"(?P<side>[lrLR])(?P<rest>[A-Z].*)", name):
-        return found["side"].upper(), _plain(found["rest"])
-    # Acclaim: lfemur, rhumerus. Only where the rest is a bone's name, so that "leg" and "ribs" stay whole.
-    known = {n for names in (*_LEG_NAMES.values(), *_ARM_NAMES.values()) for n in names}
-    known |= {"hipjoint", "fingers", "thumb", "toes"}
-    if name[:1].lower() in ("l", "r") and _plain(name[1:]) in known:
-        return name[0].upper(), _plain(name[1:])
-    return "", _plain(name)
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[ _.\-]", "", name).lower()
-
-
-def find_roles(names: Sequence[str], parents: IntArray) -> dict[str, int]:
-    """Joint index by role, from the names and the tree.
-
-    The traps: `LeftShoulder` is the collar when an arm joint hangs below it; `LHipJoint` is not the hip; the
-    pelvis is the nearest common ancestor of both hips, whatever it is called; `Leg` is the knee below `UpLeg`.
-    """
-    sided = [split_side(name) for name in names]
-    roles: dict[str, int] = {}
-    for side in "LR":
-        for part in (_LEG_NAMES, _ARM_NAMES):
-            roles |= _limb(part, side, sided, parents)
-    if "hip.L" in roles and "hip.R" in roles:
-        roles["pelvis"] = _common_ancestor(roles["hip.L"], roles["hip.R"], parents)
-    roles |= _trunk(roles, [rest for _, rest in sided], parents)
-    return {role: roles[role] for role in ROLES if role in roles}
-
-
-def _limb(
-    part: Mapping[str, tuple[str, ...]], side: str, sided: Sequence[tuple[str, str]], parents: IntArray
-) -> dict[str, int]:
-    """The joints of one limb: walks up from its far end, so each name is read with the names below it known."""
-    order = list(part)
-    found: dict[str, int] = {}
-    below: int | None = None
-    for depth in range(len(order) - 1, -1, -1):
-        role = order[depth]
-        candidates = [
-            j
-            for name in part[role]
-            for j, (own, rest) in enumerate(sided)
-            if own == side and rest == name and j not in found.values()
-        ]
-        if below is not None:
-            above = set(_ancestors(below, parents))
-            candidates = [j for j in candidates if j in above]
-        if candidates:
-            found[role] = below = candidates[0]
-    return {f"{role}.{side}": joint for role, joint in found.items()}
-
-
-def _trunk(roles: Mapping[str, int], names: Sequence[str], parents: IntArray) -> dict[str, int]:
-    """Spine, chest, neck and head: the path from the pelvis to where the arms branch, and on to the head."""
-    if "pelvis" not in roles:
-        return {}
-    pelvis = roles["pelvis"]
-    trunk: dict[str, int] = {}
-    arms = [roles.get(f"collar.{s}", roles.get(f"shoulder.{s}")) for s in "LR"]
-    if arms[0] is not None and arms[1] is not None:
-        chest = _common_ancestor(arms[0], arms[1], parents)
-        below = _below(pelvis, parents)
-        path = [j for j in [*_ancestors(chest, parents)[::-1], chest] if j in below]
-        if path:
-            trunk["chest"] = path[-1]
-            trunk["spine"] = path[0]
-    above = sorted(_below(trunk.get("chest", pelvis), parents))
-    heads = [j for j in above if names[j] == "head"]
-    if heads:
-        trunk["head"] = heads[0]
-    under_head = set(_ancestors(heads[0], parents)) if heads else set(above)
-    necks = [j for j in above if "neck" in names[j] and j in under_head]
-    if necks:
-        trunk["neck"] = necks[0]
-    return trunk
-
-
-def _ancestors(joint: int, parents: IntArray) -> list[int]:
-    """Parents from the nearest to the root."""
-    line = []
-    while (joint := int(parents[joint])) >= 0:
-        line.append(joint)
-    return line
-
-
-def _below(joint: int, parents: IntArray) -> set[int]:
-    """All joints that hang on one, near or far."""
-    found = {joint}
-    for j in range(joint + 1, len(parents)):
-        if int(parents[j]) in found:
-            found.add(j)
-    return found - {joint}
-
-
-def _common_ancestor(a: int, b: int, parents: IntArray) -> int:
-    others = {b, *_ancestors(b, parents)}
-    return next(j for j in [a, *_ancestors(a, parents)] if j in others)

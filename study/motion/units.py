@@ -7,15 +7,11 @@ CMU database's 1/0.45 inch, inches, centimetres, millimetres) lie at least a fac
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from study.motion.skeleton import find_roles
-
-FloatArray = NDArray[np.float64]
+from study.motion.skeleton import Skeleton
 
 INCH = 0.0254
 CMU_UNIT = INCH / 0.45
@@ -61,21 +57,19 @@ class Scale:
     note: str
 
 
-def find_scale(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatArray) -> Scale:
+def find_scale(skeleton: Skeleton) -> Scale:
     """The unit in which a rig's legs, or else its whole body, come out nearest to an adult's.
 
     Parameters
     ----------
-    names, parents
-        The joints, parents before children.
-    offsets : (joints, 3)
-        Each joint in its parent's frame, in the file's unit.
+    skeleton
+        The rig, in the file's unit.
     """
-    leg = _leg_length(names, parents, offsets)
+    leg = skeleton.leg_length if {"hip.L", "hip.R", "ankle.L", "ankle.R"} <= skeleton.roles.keys() else 0.0
     if leg > _SMALLEST:
         size, usual, plausible, what = leg, _LEG_M, _PLAUSIBLE_LEG_M, "leg"
     else:
-        size, usual, plausible, what = _extent(parents, offsets), _BODY_M, _PLAUSIBLE_BODY_M, "longest chain of bones"
+        size, usual, plausible, what = _extent(skeleton), _BODY_M, _PLAUSIBLE_BODY_M, "longest chain of bones"
     if size < _SMALLEST:
         return Scale(1.0, False, False, "lengths taken as metres: the rig has no length to judge by")
     scale = min(UNITS, key=lambda unit: abs(math.log(size * unit / usual)))
@@ -88,16 +82,9 @@ def find_scale(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatA
     )
 
 
-def _leg_length(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatArray) -> float:
-    roles = find_roles(names, parents)
-    sides = [side for side in "LR" if f"knee.{side}" in roles and f"ankle.{side}" in roles]
-    lengths = np.linalg.norm(offsets, axis=1)
-    return float(np.mean([lengths[roles[f"knee.{s}"]] + lengths[roles[f"ankle.{s}"]] for s in sides])) if sides else 0.0
-
-
-def _extent(parents: NDArray[np.int64], offsets: FloatArray) -> float:
+def _extent(skeleton: Skeleton) -> float:
     """The longest way from the root along bones, twice where it stands in the body's middle: near the stature."""
-    reach = np.zeros(len(parents))
-    for joint in range(1, len(parents)):
-        reach[joint] = reach[parents[joint]] + np.linalg.norm(offsets[joint])
+    reach = np.zeros(skeleton.joints)
+    for joint in range(1, skeleton.joints):
+        reach[joint] = reach[skeleton.parents[joint]] + np.linalg.norm(skeleton.offsets[joint])
     return float(2.0 * reach.max())

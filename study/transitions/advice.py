@@ -25,7 +25,7 @@ from study.motion.clip import Clip, sample
 from study.motion.cycles import find_cycle
 from study.transitions.batch import geodesic_lengths, velocity_lengths
 from study.transitions.blend_length import FIXED_S, LONGEST_S, blend_length, default_frames
-from study.transitions.distances import check_same_rig, distance_matrix, frame_distance
+from study.transitions.distances import distance_matrix, frame_distance, on_joints_of
 from study.transitions.weights import joint_weights
 
 IntArray = NDArray[np.int64]
@@ -112,7 +112,7 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
     TransitionError
         For clips of different rigs or rates, or too short for a blend of 5 frames.
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     repeats = (is_cyclic(source), is_cyclic(destination)) if cyclic is None else cyclic
     method = "geodesic" if any(repeats) else "velocity"
     starts, ends = _points(source, destination)

@@ -18,7 +18,7 @@ from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames, joint_speeds
-from study.transitions.distances import check_same_rig, distance_matrix, joint_differences
+from study.transitions.distances import distance_matrix, joint_differences, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 
 FloatArray = NDArray[np.float64]
@@ -61,6 +61,7 @@ def geodesic_lengths(
     TransitionError
         Where the clips don't supply even the shortest blend at some of the frames; the message says how many.
     """
+    destination = on_joints_of(source, destination)
     starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames, shortest, longest)
     sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
     lengths = np.arange(low, longest_there.max(initial=low) + 1)
@@ -93,6 +94,7 @@ def velocity_lengths(
 
     Parameters, returns and errors are those of `geodesic_lengths`; lengths outside the range are clipped to it.
     """
+    destination = on_joints_of(source, destination)
     starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames, shortest, longest)
     joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
     speeds = [joint_speeds(clip, joints) for clip in (source, destination)]
@@ -120,7 +122,6 @@ def _transitions(
     longest: int | None,
 ) -> tuple[IntArray, IntArray, int, IntArray]:
     """The frames as arrays, the shortest length, and for each transition the longest that the clips supply; checked."""
-    check_same_rig(source, destination)
     low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
     high = default_frames(source.fps, LONGEST_S) if longest is None else longest
     if not 1 <= low <= high:

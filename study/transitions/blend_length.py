@@ -18,7 +18,7 @@ from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, trim
-from study.transitions.distances import check_same_rig, frame_distance, half_angle_squares, joint_differences
+from study.transitions.distances import frame_distance, half_angle_squares, joint_differences, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 from study.transitions.windows import check_frames, held, longest_available, shortfall, window
 
@@ -124,7 +124,7 @@ def blend_length(
     >>> blend_length(walk, run, 40, 80, method="fixed").blend_frames
     10
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
     low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
     high = default_frames(source.fps, LONGEST_S) if longest is None else longest

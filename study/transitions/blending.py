@@ -26,7 +26,7 @@ from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved, retarget
 from study.motion.skeleton import Skeleton
-from study.transitions.distances import check_same_rig
+from study.transitions.distances import on_joints_of
 from study.transitions.windows import check_frames, shortfall, window
 
 FloatArray = NDArray[np.float64]
@@ -146,7 +146,7 @@ def blend(
     TransitionError
         Where the clips don't supply the frames (the message counts them), or differ in rig or frame rate.
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
     frames = window(start_frame, end_frame, blend_frames, specification)
     if lacking := shortfall(source, destination, frames):
@@ -194,7 +194,7 @@ def cut(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Tr
     The destination's frame `end_frame` stands where the source's frame `start_frame`, whose place it takes, stood,
     and faces as it faced. Cutting a clip to itself at one frame gives the clip.
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
     destination = retarget(destination, source.skeleton)
     turn = float(facing(_pick(source, [start_frame]))[0] - facing(_pick(destination, [end_frame]))[0])

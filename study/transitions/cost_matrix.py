@@ -25,7 +25,7 @@ from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, retarget
 from study.transitions.blending import facing
-from study.transitions.distances import check_same_rig, half_angle_squares
+from study.transitions.distances import half_angle_squares, on_joints_of
 from study.transitions.one_hop.threads import cores, one_blas_thread
 from study.transitions.point_cloud import point_cloud, window_distances
 from study.transitions.weights import joint_weights
@@ -129,7 +129,7 @@ def joint_blocks(
 
     All cores work; no more than one block a core waits to be taken. With `into`, the blocks are written there.
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     destination = retarget(destination, source.skeleton)
     if root not in ROOTS:
         raise TransitionError(f"Expected the root as {', '.join(ROOTS)}, got {root!r}.")
@@ -162,7 +162,7 @@ def pointcloud_blocks(source: Clip, destination: Clip, *, window: int | None = N
 
     `window` is in frames, a third of a second unless given; rows and columns count the windows' first frames.
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     a, b = (point_cloud(clip) for clip in (source, retarget(destination, source.skeleton)))
     window = max(1, round(WINDOW_S * source.fps)) if window is None else window
     count = max(source.frames - window + 1, 1)

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import TransitionError
+from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import Clip
+from study.motion.clip import Clip, retarget
 
 FloatArray = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def half_angle_squares(dots: NDArray[np.floating]) -> NDArray[np.floating]:
 
 def distance_matrix(source: Clip, destination: Clip, weights: FloatArray) -> FloatArray:
     """The difference (2004 Eq. 2) of all source frames from all destination frames, `(frames, frames)`."""
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     used = np.flatnonzero(weights)
     total = np.zeros((source.frames, destination.frames))
     for joint in used:
@@ -66,16 +66,22 @@ def distance_matrix(source: Clip, destination: Clip, weights: FloatArray) -> Flo
     return total
 
 
-def check_same_rig(source: Clip, destination: Clip) -> None:
-    """`TransitionError` unless both clips have the same joint tree and the same frame rate."""
-    names = f"{source.name or 'the source'} and {destination.name or 'the destination'}"
-    if not source.skeleton.matches(destination.skeleton):
-        odd = sorted(set(source.skeleton.names) ^ set(destination.skeleton.names))
-        raise TransitionError(
-            f"Expected {names} to share one joint tree; joints found in only one of them: "
-            f"{', '.join(odd) or 'none, but the parents or their order differ'}. Use clips of one rig."
-        )
+def on_joints_of(source: Clip, destination: Clip) -> Clip:
+    """The destination with the source's joints in their order: itself where it has them, else retargeted.
+
+    Raises
+    ------
+    TransitionError
+        Where the clips are on different rigs (`study.motion.clip.retarget` says what may differ) or at different rates.
+    """
     if not np.isclose(source.fps, destination.fps, rtol=1e-9):
         raise TransitionError(
-            f"Expected {names} at one frame rate, got {source.fps:g} and {destination.fps:g} fps; resample one of them."
+            f"Expected {source.name or 'the source'} and {destination.name or 'the destination'} at one frame rate, "
+            f"got {source.fps:g} and {destination.fps:g} fps; resample one of them."
         )
+    if source.skeleton.matches(destination.skeleton):
+        return destination
+    try:
+        return retarget(destination, source.skeleton)
+    except MotionError as error:
+        raise TransitionError(str(error)) from error

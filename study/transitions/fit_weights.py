@@ -17,10 +17,11 @@ from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
-from study.motion.skeleton import CENTRE_ROLES, SIDED_ROLES, Skeleton
+from study.motion.joint_names import CENTRE_ROLES, SIDED_ROLES
+from study.motion.skeleton import Skeleton
 from study.transitions.blending import facing
 from study.transitions.cost_matrix import cost_matrix, velocities
-from study.transitions.distances import check_same_rig
+from study.transitions.distances import on_joints_of
 from study.transitions.windows import check_frames
 
 FloatArray = NDArray[np.float64]
@@ -133,11 +134,11 @@ def cost_terms(cuts: Sequence[LabelledCut], groups: Sequence[Sequence[str]], nu:
 
 
 def _terms_of(cut: LabelledCut, groups: Sequence[Sequence[str]], nu: float) -> list[float]:
-    check_same_rig(cut.source, cut.destination)
-    check_frames(cut.source, cut.destination, cut.source_frame, cut.destination_frame)
+    destination = on_joints_of(cut.source, cut.destination)
+    check_frames(cut.source, destination, cut.source_frame, cut.destination_frame)
     (pose_a, speed_a), (pose_b, speed_b) = (
         _pose(cut.source, cut.source_frame),
-        _pose(cut.destination, cut.destination_frame),
+        _pose(destination, cut.destination_frame),
     )
     by_joint = quat.half_angle_between(pose_a, pose_b) ** 2 + nu * np.sum((speed_a - speed_b) ** 2, axis=-1)
     return [float(sum(by_joint[cut.source.skeleton.role(role)] for role in group)) for group in groups]
@@ -167,7 +168,7 @@ def fit_weights(cuts: Sequence[LabelledCut], *, nu: float = 1.0) -> FittedWeight
             f"{sum(cut.bad > 0 for cut in cuts)} of them bad. Label more of them."
         )
     for cut in cuts[1:]:
-        check_same_rig(cuts[0].source, cut.source)
+        on_joints_of(cuts[0].source, cut.source)
     groups = weight_groups(cuts[0].source.skeleton)
     return _fit(cost_terms(cuts, groups, nu), np.array([cut.bad for cut in cuts], dtype=np.float64), groups)
 

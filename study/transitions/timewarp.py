@@ -18,7 +18,7 @@ from study.errors import TransitionError
 from study.motion.clip import Clip, retarget, sample
 from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames
 from study.transitions.blending import Stretch, Transition, blend_weights, join, joint_shares
-from study.transitions.distances import check_same_rig, half_angle_squares
+from study.transitions.distances import half_angle_squares, on_joints_of
 from study.transitions.weights import joint_weights
 from study.transitions.windows import check_frames, held
 
@@ -82,7 +82,7 @@ def warp_length(
     TransitionError
         Where the clips don't supply the frames, or differ in rig or frame rate.
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
     low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
     high = default_frames(source.fps, LONGEST_S) if longest is None else longest
@@ -258,7 +258,7 @@ def warped_blend(
     Transition
         With equal lengths, the same as `blend`.
     """
-    check_same_rig(source, destination)
+    destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
     if min(source_frames, destination_frames) < 1:
         raise TransitionError(

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import MotionError, TransitionError
-from study.motion.skeleton import ROLES, Skeleton
+from study.motion.joint_names import ROLES
+from study.motion.skeleton import Skeleton
 
 FloatArray = NDArray[np.float64]
 
@@ -66,9 +67,9 @@ def joint_weights(
     missing = [role for role, weight in by_role.items() if weight > 0 and role not in skeleton.roles]
     if missing:
         raise MotionError(
-            f"Expected joints for the roles {', '.join(missing)} that the weights need; the rig has "
-            f"{', '.join(skeleton.names)}, in which these roles were found: {', '.join(skeleton.roles) or 'none'}. "
-            "Rename the joints, or give weights as a mapping of roles that the rig has."
+            f"Expected joints for the roles {', '.join(missing)} that the weights need, found "
+            f"{', '.join(skeleton.roles) or 'no roles at all'}: {skeleton.body.missing[missing[0]]}. "
+            "Map the roles to joints, or give weights by roles that the rig has."
         )
     result = np.zeros(skeleton.joints)
     for role, weight in by_role.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -123,3 +124,10 @@ def test_captured_rigs(mocap: Path, file: str) -> None:
     assert turned[1:].max() < 60.0
     asymmetry = np.linalg.norm(mirror_map(clip).skeleton.offsets - clip.skeleton.offsets, axis=1)
     assert asymmetry[1:].max() < 0.06
+
+
+def test_limbs_without_sides_in_their_names_are_paired_by_their_roles() -> None:
+    clip = _random_clip(_skeleton())
+    silent = replace(clip, skeleton=_skeleton(names=tuple(f"joint_{k}" for k in range(len(_NAMES)))))
+    np.testing.assert_array_equal(find_partners(silent.skeleton), find_partners(clip.skeleton))
+    np.testing.assert_array_equal(mirror(silent).rotations, mirror(clip).rotations)

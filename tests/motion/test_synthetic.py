@@ -10,7 +10,7 @@ import pytest
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions
-from study.motion.skeleton import ROLES
+from study.motion.joint_names import ROLES
 from study.motion.synthetic import NAMES, describe, synthesize
 
 SHORT_S = 6.0

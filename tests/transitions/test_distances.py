@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import moved
-from study.transitions.distances import check_same_rig, distance_matrix, frame_distance, joint_differences
+from study.transitions.distances import distance_matrix, frame_distance, joint_differences, on_joints_of
 from study.transitions.weights import joint_weights
 
 
@@ -56,7 +56,15 @@ def test_turning_and_moving_either_clip_changes_nothing(make_walk):
 
 def test_clips_of_different_rigs_or_rates_are_refused(make_walk):
     walk = make_walk(5)
-    with pytest.raises(TransitionError, match="LeftToe, RightToe"):
-        check_same_rig(walk, make_walk(5, toes=False))
+    other = replace(walk.skeleton, names=tuple(name.replace("LeftLeg", "Prop") for name in walk.skeleton.names))
+    with pytest.raises(TransitionError, match="'Prop', a joint of the body itself, in one of them only"):
+        on_joints_of(walk, replace(walk, skeleton=other))
     with pytest.raises(TransitionError, match="30 and 120 fps; resample"):
-        check_same_rig(walk, replace(walk, fps=120.0))
+        on_joints_of(walk, replace(walk, fps=120.0))
+
+
+def test_clips_that_differ_in_leaf_joints_alone_are_compared(make_walk):
+    walk, other = make_walk(5), make_walk(5, toes=False, phase=1.0)
+    weights = joint_weights(walk.skeleton)
+    expected = distance_matrix(walk, make_walk(5, phase=1.0), weights)
+    np.testing.assert_array_equal(distance_matrix(walk, other, weights), expected)

@@ -259,7 +259,7 @@ def check_clips(clips: Sequence[Clip]) -> None:
             odd = sorted(set(clip.skeleton.names) ^ set(first.skeleton.names))
             raise TransitionError(
                 f"Expected all clips to share one joint tree; {who} differs from clip 0 ({first.name or 'no name'}) in "
-                f"{', '.join(odd[:8]) or 'the order of its joints'}. Use clips of one rig."
+                f"{', '.join(odd[:3]) or 'the order of its joints'}. Retarget it, or use clips of one rig."
             )
         if not np.isclose(clip.fps, first.fps, rtol=1e-9):
             raise TransitionError(
