@@ -97,7 +97,6 @@ def _strip(source: Clip, destination: Clip, found: Advice, folder: Path) -> Path
     around = round(1.5 * source.fps)
     start = max(0, made.blend_start - around)
     clip = trim(made.clip, start, min(made.clip.frames, made.blend_stop + around))
-    folder.mkdir(parents=True, exist_ok=True)
     picture = folder / f"{found.source}-to-{found.destination}.png".replace("/", "_")
     draw_clip(clip, picture, poses=13, blended=(made.blend_start - start, made.blend_stop - start))
     return picture
@@ -109,10 +108,10 @@ def _write(out: Path, result: dict[str, Any]) -> None:
     import pandas as pd
 
     from study.analysis.estimates import plain
+    from study.files import write_whole
 
-    out.mkdir(parents=True, exist_ok=True)
-    pd.DataFrame(result["advice"]).to_csv(out / "advice.csv", index=False)
-    (out / "advice.json").write_text(json.dumps(plain(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(out / "advice.csv", pd.DataFrame(result["advice"]).to_csv(index=False))
+    write_whole(out / "advice.json", json.dumps(plain(result), indent=2, allow_nan=False) + "\n")
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from study.errors import StimulusError
 from study.experiment.plan import Pair, pair_from_json
 from study.experiment.stimulus_set import Stimulus, StimulusRecord, StimulusSet, record_from_json
+from study.files import make_folder, write_whole
 
 if TYPE_CHECKING:
     from renderer.jobs import Progress
@@ -189,12 +190,7 @@ def record(stimulus_set: StimulusSet, out: str | Path) -> dict[str, dict[str, An
         Where the folder belongs to another protocol or library, or can't be written.
     """
     folder = Path(out)
-    try:
-        (folder / STIMULI).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StimulusError(
-            f"{folder}: expected a folder to write to, found {error.strerror}; name another."
-        ) from error
+    make_folder(folder / STIMULI)
     _claim(folder, stimulus_set)
     videos = _finished(folder, stimulus_set)
     _write_manifest(folder, stimulus_set, videos)
@@ -244,7 +240,7 @@ def _claim(folder: Path, stimulus_set: StimulusSet) -> None:
                 "from other motion files); name another folder, or move this one away."
             )
     if not stored.exists():
-        write_whole(stored, protocol.text.encode())
+        write_whole(stored, protocol.text)
 
 
 def _finished(folder: Path, stimulus_set: StimulusSet) -> dict[str, dict[str, Any]]:
@@ -295,19 +291,7 @@ def _write_manifest(folder: Path, stimulus_set: StimulusSet, videos: Mapping[str
         "pairs": [asdict(pair) for pair in stimulus_set.pairs],
         "stimuli": [{**asdict(record), "video": videos.get(record.id)} for record in stimulus_set.records],
     }
-    write_whole(folder / MANIFEST, (json.dumps(data, indent=1) + "\n").encode())
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole, or not at all, at every moment."""
-    from renderer.errors import RendererError
-    from renderer.files import whole_file
-
-    try:
-        with whole_file(path) as unfinished:
-            unfinished.write_bytes(content)
-    except RendererError as error:
-        raise StimulusError(str(error)) from error
+    write_whole(folder / MANIFEST, json.dumps(data, indent=1) + "\n")
 
 
 def read_manifest(folder: str | Path) -> Manifest:

@@ -9,7 +9,6 @@ warned of; what can't be read is refused with file, line and column.
 from __future__ import annotations
 
 import difflib
-import os
 import re
 import warnings
 from dataclasses import dataclass, field
@@ -19,7 +18,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import MotionFileError, MotionWarning
+from study.errors import MotionWarning
+from study.files import write_whole
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.digits import parse_table
@@ -399,28 +399,16 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
 
     Raises
     ------
-    MotionFileError
+    FileError
         Where the file can't be written.
     """
-    path = Path(path)
     lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
     lines += ["MOTION", f"Frames: {clip.frames}", f"Frame Time: {1.0 / clip.fps!r}"]
     degrees = np.degrees(quat.to_euler("ZYX", clip.rotations)).reshape(clip.frames, -1)
     table = np.concatenate([clip.root_positions / metres_per_unit, degrees], axis=1)
     row = " ".join(["%.10g"] * table.shape[1])
     lines += [row % tuple(values) for values in table.tolist()]
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
-            file.write("\n".join(lines) + "\n")
-        temporary.replace(path)
-    except OSError as problem:
-        raise MotionFileError(
-            f"Expected to write a BVH file here, but can't ({problem.strerror}). Check the folder and the space on it.",
-            path,
-        ) from problem
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, "\n".join(lines) + "\n")
 
 
 def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:

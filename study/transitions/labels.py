@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from study.errors import TransitionError
+from study.files import write_whole
 
 LABELS = ("good", "bad", "skip")
 
@@ -118,10 +118,4 @@ def append_label(path: Path, label: Label) -> None:
     writer.writerow(asdict(label))
     if before and not before.endswith("\n"):
         before += "\n"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.part")
-    with unfinished.open("w", encoding="utf-8", newline="") as file:
-        file.write(before + text.getvalue())
-        file.flush()
-        os.fsync(file.fileno())
-    unfinished.replace(path)
+    write_whole(path, before + text.getvalue())

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from study.files import whole_file
 from study.transitions.one_hop.jobs import Found, Job, make_jobs, run_job
 from study.transitions.one_hop.problem import FORBIDDEN, IntArray, Problem
 from study.transitions.one_hop.search import Best
@@ -123,10 +123,8 @@ class _State:
         for number, best in self.best.items():
             arrays[f"best{number}"] = np.stack([getattr(best, field.name) for field in fields(Best)])
             arrays[f"direct{number}"] = self.direct[number]
-        temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
-        with temporary.open("wb") as file:
+        with whole_file(path) as unfinished, unfinished.open("wb") as file:
             np.savez(file, **arrays)
-        temporary.replace(path)
 
     def read(self, path: Path, key: str) -> None:
         """Goes on from a file that belongs to the same problem; one that does not is left aside."""
