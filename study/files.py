@@ -6,6 +6,7 @@ temporary file goes, and what stood under the name before stays.
 
 from __future__ import annotations
 
+import codecs
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -79,6 +80,40 @@ def whole_folder(target: str | Path) -> Iterator[Path]:
     finally:
         for folder in (unfinished, before):
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def read_text(path: str | Path, kind: str) -> str:
+    """A file's text in UTF-8, without the mark that some editors put before it.
+
+    Parameters
+    ----------
+    kind
+        What it should be, for messages: `"a CSV file of labels"`.
+
+    Raises
+    ------
+    FileError
+        Where it can't be read, or is not in UTF-8.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise FileError(f"{path}: expected {kind}, found none ({why}); check the path and its rights.") from error
+    # Without a mark, UTF-16 shows itself by the zero bytes beside its ASCII letters.
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in content[:100]:
+        raise FileError(
+            f"{path}: expected {kind} in UTF-8, found UTF-16 (some editors call it Unicode) or binary data; open it in "
+            "the editor and save it as UTF-8."
+        )
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line, byte = content.count(b"\n", 0, error.start) + 1, content[error.start]
+        raise FileError(
+            f"{path}:{line}: expected {kind} in UTF-8, found a letter in another encoding (byte 0x{byte:02x}); save "
+            "the file as UTF-8."
+        ) from error
 
 
 def make_folder(folder: str | Path) -> None:

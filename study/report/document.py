@@ -23,14 +23,22 @@ Result = Mapping[str, Any]
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def write_report(results_folder: str | Path, *, database: str | None = None, resamples: int = 1000) -> Path:
-    """Write `report.html`, `tables/` and `figures/` into a results folder.
+def write_report(
+    results_folder: str | Path,
+    *,
+    out: str | Path | None = None,
+    database: str | None = None,
+    resamples: int = 1000,
+) -> Path:
+    """Write `report.html`, `tables/` and `figures/` of a results folder.
 
     Parameters
     ----------
     results_folder
         With `protocol.toml`, `manifest.json` and `responses.sqlite`; what `segue power --json` printed, as
         `power*.json`, is shown too.
+    out
+        The folder to write into; the results folder unless given, which is then only read.
     database
         Where the answers are, if not in the folder: a file, or a URL.
     resamples
@@ -69,8 +77,9 @@ def write_report(results_folder: str | Path, *, database: str | None = None, res
             scale_points=material.protocol.scale_points,
         )
         page = replace(compose(material, analysis), pictures=pictures())
-    _write_files(folder, page, analysis)
-    path = folder / "report.html"
+    target = folder if out is None else Path(out)
+    _write_files(target, page, analysis)
+    path = target / "report.html"
     write_whole(path, to_html(page))
     return path
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import hashlib
 import json
 import time
+import zipfile
+import zlib
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import fields
@@ -127,14 +129,17 @@ class _State:
             np.savez(file, **arrays)
 
     def read(self, path: Path, key: str) -> None:
-        """Goes on from a file that belongs to the same problem; one that does not is left aside."""
-        with np.load(path) as arrays:
-            if str(arrays["key"]) != key:
-                return
-            self.done = arrays["done"].copy()
-            for number in self.best:
-                self.best[number] = Best(*(row.copy() for row in arrays[f"best{number}"]))
-                self.direct[number] = arrays[f"direct{number}"].copy()
+        """Goes on from a file that belongs to the same problem; one that does not, or is damaged, is left aside."""
+        try:
+            with np.load(path) as arrays:
+                if str(arrays["key"]) != key:
+                    return
+                best = {number: Best(*(row.copy() for row in arrays[f"best{number}"])) for number in self.best}
+                direct = {number: arrays[f"direct{number}"].copy() for number in self.best}
+                done = arrays["done"].copy()
+        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
+            return
+        self.done, self.best, self.direct = done, best, direct
 
 
 def _fingerprint(problem: Problem, jobs: tuple[Job, ...]) -> str:

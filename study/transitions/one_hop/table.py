@@ -10,6 +10,8 @@ game engine reads without us); `docs/one_hop.md` describes both.
 from __future__ import annotations
 
 import json
+import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -232,8 +234,17 @@ def read_table(path: Path) -> OneHopTable:
     Raises
     ------
     TransitionError
-        For a file that is not such a table, of another version, or cut short.
+        For a file that is not such a table, of another version, cut short or damaged.
     """
+    try:
+        return _read_table(path)
+    except (ValueError, KeyError, TypeError, EOFError, IndexError, zipfile.BadZipFile, zlib.error) as error:
+        raise TransitionError(
+            f"{path}: expected a {FORMAT}, found a damaged file ({error}). Build it again."
+        ) from error
+
+
+def _read_table(path: Path) -> OneHopTable:
     if path.suffix == ".npz":
         with np.load(path) as arrays:
             if "header" not in arrays:
