@@ -221,6 +221,27 @@ def is_unwritable(error: object) -> bool:
     return isinstance(error, sa.exc.DatabaseError) and _sqlite_code(error) in _UNWRITTEN
 
 
+def try_to_write(engine: sa.Engine, place: str) -> None:
+    """Write and commit, without changing anything that is stored, or say why it can't be done.
+
+    For a program that is about to take answers: what fails here would fail at the first of them.
+
+    Raises
+    ------
+    SessionError
+        For a database that is read-only, held by another program, or on a full disk.
+    """
+    try:
+        with alone(engine) as connection:
+            if engine.dialect.name == "sqlite":
+                kept = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
+                connection.exec_driver_sql(f"PRAGMA user_version = {kept}")
+            elif connection.exec_driver_sql("SHOW transaction_read_only").scalar_one() == "on":
+                raise SessionError(f"{place}: expected a database that can be written to, found it read-only.")
+    except sa.exc.DBAPIError as error:
+        raise unusable(place, error) from error
+
+
 def refuse_damaged(engine: sa.Engine, place: str) -> None:
     """Refuse a SQLite file whose pages do not fit together, before anything is read from it or written to it."""
     if engine.dialect.name == "sqlite":
