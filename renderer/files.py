@@ -28,6 +28,20 @@ def whole_file(target: Path) -> Iterator[Path]:
     DiskError
         Where the system refuses; nothing has then changed under the target's name.
     """
+    unfinished = begin(target)
+    try:
+        yield unfinished
+        flush(unfinished)
+        unfinished.replace(target)
+    except OSError as error:
+        raise cannot_write(target, error) from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+
+
+def begin(target: Path) -> Path:
+    """Make an empty file under a temporary name beside the target, or say why nothing can be written there."""
     unfinished = unfinished_name(target)
     try:
         if target.exists() and not target.is_file():
@@ -39,15 +53,7 @@ def whole_file(target: Path) -> Iterator[Path]:
         unfinished.touch()
     except OSError as error:
         raise cannot_write(target, error) from error
-    try:
-        yield unfinished
-        flush(unfinished)
-        unfinished.replace(target)
-    except OSError as error:
-        raise cannot_write(target, error) from error
-    finally:
-        with suppress(OSError):
-            unfinished.unlink(missing_ok=True)
+    return unfinished
 
 
 def unfinished_name(target: Path) -> Path:

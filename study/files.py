@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from renderer.errors import DiskError
-from renderer.files import REASONS, cannot_write, discard_unfinished, flush, unfinished_name
+from renderer.files import REASONS, begin, cannot_write, discard_unfinished, flush, unfinished_name
 from renderer.files import whole_file as whole_file_or_disk_error
 from study.errors import FileError
 
@@ -49,6 +49,20 @@ def write_whole(target: str | Path, content: bytes | str) -> None:
     """
     with whole_file(target) as unfinished:
         unfinished.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def check_place(target: str | Path) -> None:
+    """Before long work, refuse a file that could not be written at its end.
+
+    Raises
+    ------
+    FileError
+        Where the disk refuses.
+    """
+    try:
+        begin(Path(target)).unlink()
+    except DiskError as error:
+        raise FileError(str(error)) from error
 
 
 @contextmanager

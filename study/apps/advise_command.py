@@ -41,6 +41,7 @@ def advise(
     from dataclasses import asdict
 
     from study.errors import SegueError
+    from study.files import check_place
     from study.motion.clip import resample
     from study.motion.library import open_library
     from study.transitions.advice import is_cyclic
@@ -48,6 +49,8 @@ def advise(
     names = motions or (open_library(library or "synthetic").names() if library else ())
     if len(set(names)) < 2:
         raise click.UsageError(f"expected at least two clips, or --library with two or more, found {len(set(names))}.")
+    if out is not None:
+        check_place(out / "advice.csv")
     clips, cyclic = {}, {}
     for name in dict.fromkeys(names):
         own = load_clip(name, library, None)

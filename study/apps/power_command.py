@@ -196,9 +196,12 @@ def power(
     from study.analysis.estimates import plain
     from study.analysis.power import power_curve
     from study.apps.study_commands import load
+    from study.files import check_place
 
     checked, sizes = load(protocol), _sizes(participants)
     study = chosen_study(checked, name)
+    if out is not None:
+        check_place(out / f"power_{study.name}.json")
     plans = plans_of(checked, library, max(sizes))
     run, said = planned(checked, study, plans, options)
     slow = options["sessions"] or study.task == "same-different"

@@ -6,6 +6,7 @@ the server's or the file's own settings say, and a server that would lose commit
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import time
@@ -263,23 +264,28 @@ def readable_copy(file: Path) -> Iterator[Path]:
 
     Even to read, SQLite writes beside the file, which it can't where the place is read-only or full.
     """
-    log, index = (file.with_name(file.name + ending) for ending in ("-wal", "-shm"))
     with scratch_folder("segue-answers") as folder:
         copy = folder / file.name
         try:
-            if index.exists():  # in use, maybe by a program that writes: its own lock keeps the copy whole
-                only_read = f"{file.absolute().as_uri()}?mode=ro"
-                with closing(sqlite3.connect(only_read, uri=True)) as own, closing(sqlite3.connect(copy)) as other:
-                    own.backup(other)
-            else:
-                for part in (file, log):
+            if not (file.with_name(f"{file.name}-shm").exists() and _backed_up(file, copy)):
+                for part in (file, file.with_name(f"{file.name}-wal")):
                     if part.exists():
                         shutil.copyfile(part, folder / part.name)
         except OSError as error:
             raise refused(error, file) from error
-        except sqlite3.Error as error:
-            raise unusable(str(file), error) from error
         yield copy
+
+
+def _backed_up(file: Path, copy: Path) -> bool:
+    """Copy under SQLite's own locks, since a program that writes may be using the file; False where that fails."""
+    try:
+        only_read = f"{file.absolute().as_uri()}?mode=ro"
+        with closing(sqlite3.connect(only_read, uri=True)) as own, closing(sqlite3.connect(copy)) as other:
+            own.backup(other)
+    except sqlite3.Error:
+        copy.unlink(missing_ok=True)
+        return False
+    return True
 
 
 def unusable(place: str, error: BaseException) -> SessionError:
@@ -287,6 +293,8 @@ def unusable(place: str, error: BaseException) -> SessionError:
     code = _sqlite_code(error)
     if code == sqlite3.SQLITE_IOERR and _is_full(place):
         code = sqlite3.SQLITE_FULL
+    if code == sqlite3.SQLITE_CANTOPEN and not os.access(Path(place).parent, os.W_OK):
+        code = sqlite3.SQLITE_READONLY
     found, advice = _REFUSED.get(code or 0, ("", ""))
     if not found:
         found = f"one that can't be opened ({in_words(error)})"
@@ -331,7 +339,7 @@ _REFUSED = {
     sqlite3.SQLITE_READONLY: _UNWRITABLE,
     sqlite3.SQLITE_PERM: _UNWRITABLE,
     sqlite3.SQLITE_CANTOPEN: (
-        "one that can't be opened: it is a folder, or its rights or those of its folder do not allow it",
+        "one that can't be opened: it is a folder, or its rights do not allow it",
         "check the path, change the rights, or name another place (--out, --database)",
     ),
     sqlite3.SQLITE_FULL: (
@@ -340,6 +348,7 @@ _REFUSED = {
     ),
     sqlite3.SQLITE_IOERR: ("that its disk fails", "check the disk, or copy the file to another one"),
     sqlite3.SQLITE_CORRUPT: _DAMAGED,
+    sqlite3.SQLITE_ERROR: ("that its tables are not as Segue made them", _DAMAGED[1]),
     sqlite3.SQLITE_NOTADB: (
         "one that can't be opened: the file is something else, or its beginning is damaged",
         "check the path, or restore a copy of it",

@@ -329,7 +329,9 @@ def read_manifest(folder: str | Path) -> Manifest:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
-        raise StimulusError(f"{path}: {where}: expected what Segue wrote, found {first['msg']!r}; {_ANEW}.") from error
+        raise StimulusError(
+            f"{path}: expected what Segue wrote, found {where} damaged ({first['msg']}); {_ANEW}."
+        ) from error
     videos = {entry.id: asdict(entry.video) for entry in listed.stimuli if entry.video is not None}
     keys = {"records" if name == "stimuli" else name: value for name, value in vars(stored).items()}
     return Manifest(folder=folder, videos=videos, **keys)

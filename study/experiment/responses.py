@@ -148,6 +148,8 @@ def open_responses(url_or_path: str | Path) -> Responses:
         For a database that can't be opened or does not write to disk, was written by a newer Segue, or by another
         program.
     """
+    file = sqlite_file(url_or_path)
+    new = file is not None and not file.exists()
     engine = open_engine(url_or_path)
     place = shown(engine.url)
     try:
@@ -155,7 +157,12 @@ def open_responses(url_or_path: str | Path) -> Responses:
         migrate(engine, place)
     except sa.exc.DBAPIError as error:
         engine.dispose()
+        if new and file is not None and file.exists() and not file.stat().st_size:
+            file.unlink()  # nothing came to stand in it
         raise unusable(place, error) from error
+    except UnicodeDecodeError as error:  # of what SQLite says about a damaged table
+        engine.dispose()
+        raise damaged(place, str(error)) from error
     except BaseException:
         engine.dispose()
         raise
@@ -340,8 +347,10 @@ def _session_record(row: sa.RowMapping, place: str) -> SessionRecord:
     try:
         plan = plan_from_json(row["plan_json"])
         truth = None if row["truth_json"] is None else json.loads(row["truth_json"])
-    except (SessionError, ValueError) as error:
+    except SessionError as error:
         raise SessionError(f"{place}: session {row['id']}: {error}") from error
+    except ValueError as error:
+        raise damaged(place, f"session {row['id']}: {error}") from error
     return SessionRecord(row["id"], row["participant"], row["simulated"], plan, row["protocol_sha256"], truth)
 
 
