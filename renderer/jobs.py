@@ -29,7 +29,7 @@ from renderer.camera import Camera
 from renderer.capsules import Figure
 from renderer.context import os_environ_defaults
 from renderer.errors import RendererError
-from renderer.files import discard_unfinished, scratch_folder
+from renderer.files import cannot_write, discard_unfinished, scratch_folder
 from renderer.video import CRF, PRESET, VideoInfo, render_video
 
 
@@ -195,7 +195,10 @@ def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[Vi
 
 
 def _store(job: RenderJob, path: Path) -> str:
-    path.write_bytes(pickle.dumps(job))
+    try:
+        path.write_bytes(pickle.dumps(job))
+    except OSError as error:
+        raise cannot_write(path, error) from error
     return str(path)
 
 

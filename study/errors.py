@@ -13,6 +13,10 @@ class SegueError(Exception):
     """Input that can't be used; the message says what to do about it."""
 
 
+class FileError(SegueError):
+    """A file or folder that the disk refuses to read or write: no room, no rights, something in the way."""
+
+
 class MotionFileError(SegueError):
     """A motion file that can't be read.
 

@@ -44,6 +44,7 @@ def advise(
     one that suits the motion (Wang & Bodenheimer 2004): geodesic where one of the two is cyclic, else velocity.
     """
     from study.errors import SegueError
+    from study.files import check_place
     from study.motion.clip import resample
     from study.motion.library import open_library
     from study.transitions.advice import is_cyclic
@@ -51,6 +52,8 @@ def advise(
     names = motions or (open_library(library or "synthetic").names() if library else ())
     if len(set(names)) < 2:
         raise click.UsageError(f"expected at least two clips, or --library with two or more, found {len(set(names))}.")
+    if out is not None:
+        check_place(out / "advice.csv")
     clips, cyclic = {}, {}
     for name in dict.fromkeys(names):
         own = load_clip(name, library, None)
@@ -106,7 +109,6 @@ def _strip(source: Clip, destination: Clip, found: Advice, folder: Path) -> Path
     around = round(1.5 * source.fps)
     start = max(0, made.blend_start - around)
     clip = trim(made.clip, start, min(made.clip.frames, made.blend_stop + around))
-    folder.mkdir(parents=True, exist_ok=True)
     picture = folder / f"{found.source}-to-{found.destination}.png".replace("/", "_")
     draw_clip(clip, picture, poses=13, blended=(made.blend_start - start, made.blend_stop - start))
     return picture
@@ -118,11 +120,11 @@ def _write(out: Path, result: dict[str, Any]) -> None:
     import pandas as pd
 
     from study.analysis.estimates import plain
+    from study.files import write_whole
     from study.spreadsheets import safe_table
 
-    out.mkdir(parents=True, exist_ok=True)
-    safe_table(pd.DataFrame(result["advice"])).to_csv(out / "advice.csv", index=False)
-    (out / "advice.json").write_text(json.dumps(plain(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(out / "advice.csv", safe_table(pd.DataFrame(result["advice"])).to_csv(index=False))
+    write_whole(out / "advice.json", json.dumps(plain(result), indent=2, allow_nan=False) + "\n")
 
 
 def _table(rows: Sequence[dict[str, Any]], fps: float, library: str | None) -> Iterator[str]:

@@ -8,17 +8,22 @@ from __future__ import annotations
 
 import gc
 import importlib
-import os
 import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TextIO
 
 import click
 
+from renderer.errors import RendererError
+from renderer.files import REASONS
 from study import __version__
+from study.apps.console import say
+from study.apps.streams import hush, print_in_any_encoding
 from study.errors import SegueError
+from study.files import refused
 
 # Verb -> module and name of its click command, in the order of a study's life.
 VERBS = {
@@ -91,13 +96,11 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     del category, filename, lineno, file, line
-    click.echo(f"segue: warning: {message}", err=True)
+    say(f"segue: warning: {message}")
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line on arguments (default: the process's own) and return the exit status."""
-    from renderer.errors import RendererError
-
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
@@ -106,28 +109,37 @@ def run(arguments: Sequence[str] | None = None) -> int:
             status = segue.main(given, prog_name="segue", standalone_mode=False)
             return status if isinstance(status, int) else 0
     except click.ClickException as refusal:
-        click.echo(f"segue: {refusal.format_message()}", err=True)
-        return 2
+        return _refuse(refusal.format_message())
     except (SegueError, RendererError) as refusal:
-        click.echo(f"segue: {refusal}", err=True)
-        return 2
+        return _refuse(str(refusal))
     except (KeyboardInterrupt, click.Abort):
-        click.echo("segue: interrupted; what was finished is kept, and the same command goes on from there.", err=True)
+        say("segue: interrupted; what was finished is kept, and the same command goes on from there.")
         return 130
-    except BrokenPipeError:
-        # The reader of our output went away (`segue ... | head`): not a fault; keep Python from complaining at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (BrokenPipeError, SystemExit) as end:
+        # The reader of our output went away (`segue ... | head`), at which click may exit: not a fault.
+        if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
+            raise
+        hush()
         return 0
-    except Exception as fault:  # the one place where everything is caught: to say that it is our fault
+    except Exception as fault:  # the one place where everything is caught: to say whose fault it is
+        if isinstance(fault, OSError) and (fault.filename is not None or fault.errno in REASONS):
+            return _refuse(str(refused(fault)))
         traceback.print_exc()
-        click.echo(f"segue: a fault of Segue's own ({type(fault).__name__}); please report the lines above.", err=True)
+        say(f"segue: a fault of Segue's own ({type(fault).__name__}); please report the lines above.")
         return 1
+
+
+def _refuse(why: str) -> int:
+    with suppress(BrokenPipeError):
+        say(f"segue: {why}")
+    return 2
 
 
 def main() -> None:
     """Entry point of the `segue` script."""
     # Imports and tables are many objects that stay: looking through them for garbage takes a tenth of a report's time.
     gc.set_threshold(100_000, 20, 20)
+    print_in_any_encoding()
     sys.exit(run())
 
 

@@ -10,6 +10,8 @@ from typing import Any, TypeVar
 
 import click
 
+from study.apps.streams import show
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
@@ -44,12 +46,12 @@ def emit(result: Mapping[str, Any], as_json: bool, text: str) -> None:
     """Prints a verb's result: the mapping as JSON (numbers that are not finite become null), or the text."""
     from study.analysis.estimates import plain
 
-    click.echo(json.dumps(plain(result), indent=2, allow_nan=False) if as_json else text)
+    show(json.dumps(plain(result), indent=2, allow_nan=False) if as_json else text, sys.stdout)
 
 
 def say(message: str) -> None:
     """One line on standard error."""
-    click.echo(message, err=True)
+    show(message, sys.stderr)
 
 
 def columns(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:

@@ -89,27 +89,22 @@ def cost_matrix(
 
 
 def _write_matrix(blocks: Iterable[Block], shape: tuple[int, int], out: Path) -> Extremes:
-    """Write the matrix as float32, block by block, under another name until it is whole."""
+    """Write the matrix as float32, block by block: mapped into memory, a full disk would end the process."""
     import numpy as np
 
+    from study.files import whole_file
     from study.transitions.cost_matrix import extremes
 
-    out.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = out.with_name(f".{out.name}.part")
-    try:
-        whole = np.lib.format.open_memmap(unfinished, mode="w+", dtype=np.float32, shape=shape)
+    with whole_file(out) as unfinished, unfinished.open("wb") as file:
+        header = {"descr": np.lib.format.dtype_to_descr(np.dtype("<f4")), "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(file, header)
 
         def kept() -> Iterator[Block]:
             for rows, block in blocks:
-                whole[rows.start : rows.stop] = block
+                file.write(block.astype("<f4").tobytes())
                 yield rows, block
 
-        found = extremes(kept())
-        whole.flush()
-        unfinished.replace(out)
-    finally:
-        unfinished.unlink(missing_ok=True)
-    return found
+        return extremes(kept())
 
 
 def _draw(blocks: Iterable[Block], shape: tuple[int, int], out: Path, names: tuple[str, str], label: str) -> Extremes:

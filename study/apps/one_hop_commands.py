@@ -88,12 +88,13 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as
     """
     import numpy as np
 
+    from study.files import check_place
     from study.transitions.one_hop.table import write_table
 
     if out.suffix not in (".npz", ".bin", ".json"):
         raise click.UsageError(f"expected --out as a name that ends in .npz, .bin or .json, found {str(out)!r}.")
     loaded = load_clips(clips, library, fps)
-    out.parent.mkdir(parents=True, exist_ok=True)
+    check_place(out)
     table = build_adaptive_table(loaded, options) if options["adaptive"] else build_fixed_table(loaded, out, options)
     files = write_table(table, out)
     both = np.isfinite(table.costs) & np.isfinite(table.direct_costs)

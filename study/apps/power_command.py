@@ -197,9 +197,12 @@ def power(
     from study.analysis.estimates import plain
     from study.analysis.power import power_curve
     from study.apps.study_commands import load
+    from study.files import check_place
 
     checked, sizes = load(protocol), _sizes(participants)
     study = chosen_study(checked, name)
+    if out is not None:
+        check_place(out / f"power_{study.name}.json")
     plans = plans_of(checked, library, max(sizes))
     run, said = planned(checked, study, plans, options)
     slow = options["sessions"] or study.task == "same-different"
@@ -226,11 +229,10 @@ def power(
 
 def _write(folder: Path, result: Mapping[str, Any]) -> None:
     """The result as JSON, and its curve as CSV."""
-    from study.experiment.rendering import write_whole
+    from study.files import write_whole
 
     stem = folder / f"power_{result['study']}"
-    folder.mkdir(parents=True, exist_ok=True)
-    write_whole(stem.with_suffix(".json"), (json.dumps(result, indent=1, ensure_ascii=False) + "\n").encode())
+    write_whole(stem.with_suffix(".json"), json.dumps(result, indent=1, ensure_ascii=False) + "\n")
     rows = io.StringIO()
     table = csv.writer(rows)
     table.writerow(
@@ -240,7 +242,7 @@ def _write(folder: Path, result: Mapping[str, Any]) -> None:
         numbers = [point["participants"], point["power"], point["interval"]["low"], point["interval"]["high"]]
         known = [result["simulations"], result["icc"], result["test"], *result["effect"].values()]
         table.writerow([result["study"], *numbers, *known])
-    write_whole(stem.with_suffix(".csv"), rows.getvalue().encode())
+    write_whole(stem.with_suffix(".csv"), rows.getvalue())
 
 
 def _in_words(found: Power, aim: str, answers: int) -> str:

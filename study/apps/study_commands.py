@@ -239,12 +239,13 @@ def simulate(
 ) -> None:
     """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
     from study.experiment.rendering import MANIFEST, PROTOCOL, record
+    from study.files import read_text
 
     checked = load(protocol)
     folder, participants = results_folder(checked, out), participants or checked.participants
     if participants is None:
         raise click.UsageError("expected --participants, or participants in the protocol, found neither; give one.")
-    known = (folder / MANIFEST).exists() and (folder / PROTOCOL).read_text(encoding="utf-8") == checked.text
+    known = (folder / MANIFEST).exists() and read_text(folder / PROTOCOL, "a protocol file") == checked.text
     if library is not None or not known:
         stimuli = prepare_stimuli(checked, library)
         check_database(database, stimuli)
@@ -269,13 +270,18 @@ def analyse(results: Path, database: str | None, as_json: bool) -> None:
 
 @click.command()
 @click.argument("results", type=RESULTS)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the page, tables and figures; the results folder unless given.",
+)
 @database_option
 @json_option
-def report(results: Path, database: str | None, as_json: bool) -> None:
+def report(results: Path, out: Path | None, database: str | None, as_json: bool) -> None:
     """One self-contained HTML page, and its tables as CSV and JSON."""
     from study.report.document import write_report
 
-    page = write_report(results, database=database)
+    page = write_report(results, out=out, database=database)
     emit({"report": str(page)}, as_json, str(page))
 
 

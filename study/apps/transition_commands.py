@@ -343,5 +343,6 @@ def show_warped(found: WarpLength, fps: float, out: Path, words: str) -> None:
 def _write_csv(out: Path, columns: dict[str, Any]) -> None:
     import pandas as pd
 
-    out.parent.mkdir(parents=True, exist_ok=True)
-    pd.DataFrame(columns).to_csv(out, index=False)
+    from study.files import write_whole
+
+    write_whole(out, pd.DataFrame(columns).to_csv(index=False))

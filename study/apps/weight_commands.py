@@ -125,7 +125,6 @@ def _drawn(source: Clip, destination: Clip, candidate: Candidate, folder: Path, 
     frames = (candidate.source_frame, candidate.destination_frame)
     picture = folder / f"{source.name}-{frames[0]}-{destination.name}-{frames[1]}{ending}".replace("/", "_")
     if not picture.exists():
-        folder.mkdir(parents=True, exist_ok=True)
         made = cut(source, destination, *frames)
         around = round(3 * source.fps)
         start = max(0, made.blend_start - around)

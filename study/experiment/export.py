@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ import study
 from study.counting import counted
 from study.errors import SessionError
 from study.experiment.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, Variable
+from study.files import whole_folder
 from study.spreadsheets import safe_table
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
     import sqlalchemy as sa
 
     from study.experiment import response_tables as stored
-    from study.experiment.responses import answers_frame, session_table
+    from study.experiment.responses import answers_frame, rows_of, session_table
 
     answers = answers_frame(responses, all_attempts=True, roles=ROLES)
     if answers.empty:
@@ -92,9 +92,8 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
     sessions = session_table(responses)
     names = dict(zip(sessions["id"], sessions["participant"], strict=True))
     wanted = [stored.presentations.c[name] for name in PRESENTATIONS if name != "participant"]
-    with responses.engine.connect() as connection:
-        shown = connection.execute(sa.select(stored.presentations.c.session_id, *wanted)).mappings().all()
-        form = connection.execute(sa.select(stored.form_values)).mappings().all()
+    shown = rows_of(responses, sa.select(stored.presentations.c.session_id, *wanted))
+    form = rows_of(responses, sa.select(stored.form_values))
     presentations = pd.DataFrame(
         [{**row, "participant": names[row["session_id"]]} for row in shown], columns=list(PRESENTATIONS)
     )
@@ -127,25 +126,23 @@ def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) ->
             f"{folder}: expected a new or empty folder, or an earlier export of Segue, found other files; name another"
         )
     shared = gather(protocol, responses)
-    unfinished = folder.with_name(f".{folder.name}.part")
-    shutil.rmtree(unfinished, ignore_errors=True)
-    unfinished.mkdir(parents=True)
-    {"psych-ds": _write_psych_ds, "bids": _write_bids}[kind](shared, unfinished)
-    shutil.rmtree(folder, ignore_errors=True)
-    unfinished.rename(folder)
+    with whole_folder(folder) as unfinished:
+        {"psych-ds": _write_psych_ds, "bids": _write_bids}[kind](shared, unfinished)
     return folder
 
 
 def _replaceable(folder: Path) -> bool:
     """Whether there is nothing in it but what `export` wrote."""
+    if not folder.is_dir():
+        return False
     if not any(folder.iterdir()):
         return True
     try:
         description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        makers = [*description.get("GeneratedBy", []), description.get("sdPublisher", {})]
+        return any(maker.get("name", maker.get("Name")) == MADE_BY for maker in makers)
+    except (OSError, ValueError, TypeError, AttributeError):  # none, or another program's
         return False
-    makers = [*description.get("GeneratedBy", []), description.get("sdPublisher", {})]
-    return any(maker.get("name", maker.get("Name")) == MADE_BY for maker in makers)
 
 
 def label(name: str) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
@@ -287,8 +287,3 @@ def trial_table(plan: Plan) -> list[dict[str, Any]]:
 
 
 TRIAL_COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Trial))
-
-
-def pair_from_json(data: Mapping[str, Any]) -> Pair:
-    """A pair as a manifest stores it."""
-    return Pair(**{field.name: data[field.name] for field in fields(Pair)})

@@ -20,13 +20,14 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from study.counting import counted
-from study.errors import ProtocolError
+from study.errors import FileError, ProtocolError
 from study.experiment.languages import with_words
 from study.experiment.protocol_checks import check_whole
 from study.experiment.protocol_errors import explain, full_location, key_lines, key_path, line_of, telling
 from study.experiment.protocol_parts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
 from study.experiment.protocol_stimuli import Points, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec
+from study.files import read_text
 
 __all__ = [
     "OPTIMUM_CUTS",
@@ -177,19 +178,11 @@ def load_protocol(path: str | Path) -> Protocol:
         the nearest valid one), missing, of the wrong type or out of range (with its line and key path). All such
         problems are named at once, up to 50.
     """
-    path = Path(path)
     try:
-        with path.open("rb") as file:
-            text = file.read(LARGEST_TEXT + 1).decode("utf-8")
-    except OSError as error:
-        raise ProtocolError(
-            f"{path}: expected a protocol file, found none ({error.strerror}); check the path."
-        ) from error
-    except UnicodeDecodeError as error:
-        raise ProtocolError(
-            f"{path}: expected UTF-8 text, found byte {error.start} that is not; save it again."
-        ) from error
-    return parse_protocol(text, path)
+        text = read_text(path, "a protocol file", LARGEST_TEXT + 1)
+    except FileError as error:
+        raise ProtocolError(str(error)) from error
+    return parse_protocol(text, Path(path))
 
 
 def parse_protocol(text: str, path: Path | None = None) -> Protocol:

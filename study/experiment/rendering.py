@@ -12,11 +12,14 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from study.errors import StimulusError
-from study.experiment.plan import Pair, pair_from_json
-from study.experiment.stimulus_set import Stimulus, StimulusRecord, StimulusSet, record_from_json
+from study.experiment.plan import Pair
+from study.experiment.stimulus_set import Stimulus, StimulusRecord, StimulusSet
+from study.files import make_folder, read_text, refused, write_whole
 
 if TYPE_CHECKING:
     from renderer.jobs import Progress
@@ -189,12 +192,7 @@ def record(stimulus_set: StimulusSet, out: str | Path) -> dict[str, dict[str, An
         Where the folder belongs to another protocol or library, or can't be written.
     """
     folder = Path(out)
-    try:
-        (folder / STIMULI).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StimulusError(
-            f"{folder}: expected a folder to write to, found {error.strerror}; name another."
-        ) from error
+    make_folder(folder / STIMULI)
     _claim(folder, stimulus_set)
     videos = _finished(folder, stimulus_set)
     _write_manifest(folder, stimulus_set, videos)
@@ -220,7 +218,7 @@ def _claim(folder: Path, stimulus_set: StimulusSet) -> None:
     protocol = stimulus_set.protocol
     stored = folder / PROTOCOL
     if stored.exists():
-        found = hashlib.sha256(stored.read_bytes()).hexdigest()
+        found = hashlib.sha256(read_text(stored, "a protocol file").encode()).hexdigest()
         if found != protocol.sha256:
             raise StimulusError(
                 f"{folder}: expected the results of {protocol.name!r} with sha256 {protocol.sha256[:12]}, found a "
@@ -244,7 +242,7 @@ def _claim(folder: Path, stimulus_set: StimulusSet) -> None:
                 "from other motion files); name another folder, or move this one away."
             )
     if not stored.exists():
-        write_whole(stored, protocol.text.encode())
+        write_whole(stored, protocol.text)
 
 
 def _finished(folder: Path, stimulus_set: StimulusSet) -> dict[str, dict[str, Any]]:
@@ -295,19 +293,7 @@ def _write_manifest(folder: Path, stimulus_set: StimulusSet, videos: Mapping[str
         "pairs": [asdict(pair) for pair in stimulus_set.pairs],
         "stimuli": [{**asdict(record), "video": videos.get(record.id)} for record in stimulus_set.records],
     }
-    write_whole(folder / MANIFEST, (json.dumps(data, indent=1) + "\n").encode())
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole, or not at all, at every moment."""
-    from renderer.errors import RendererError
-    from renderer.files import whole_file
-
-    try:
-        with whole_file(path) as unfinished:
-            unfinished.write_bytes(content)
-    except RendererError as error:
-        raise StimulusError(str(error)) from error
+    write_whole(folder / MANIFEST, json.dumps(data, indent=1) + "\n")
 
 
 def read_manifest(folder: str | Path) -> Manifest:
@@ -316,37 +302,78 @@ def read_manifest(folder: str | Path) -> Manifest:
     Raises
     ------
     StimulusError
-        Where there is none, or it was written by a newer Segue.
+        Where there is none, it was written by a newer Segue, or a key is missing or damaged; says which.
     """
     folder = Path(folder)
     path = folder / MANIFEST
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        content = path.read_bytes()
     except FileNotFoundError as error:
         raise StimulusError(f"{path}: expected the manifest of a results folder, found none; render first.") from error
-    except ValueError as error:
+    except OSError as error:
+        raise refused(error, path) from error
+    try:
+        data = json.loads(content)
+        version = data["version"]
+    except (ValueError, KeyError, TypeError) as error:
+        found = f"no {error}" if isinstance(error, KeyError) else f"something else ({error})"
+        raise StimulusError(f"{path}: expected JSON of a manifest, found {found}; {_ANEW}.") from error
+    if version != MANIFEST_VERSION:
         raise StimulusError(
-            f"{path}: expected JSON, found something else ({error}); render into a new folder."
-        ) from error
-    if data.get("version") != MANIFEST_VERSION:
-        raise StimulusError(
-            f"{path}: expected a manifest of version {MANIFEST_VERSION}, found {data.get('version')!r}; "
+            f"{path}: expected a manifest of version {MANIFEST_VERSION}, found {version!r}; "
             "use the Segue that wrote it, or render into a new folder."
         )
-    videos = {entry["id"]: entry["video"] for entry in data["stimuli"] if entry["video"] is not None}
-    records = [{key: value for key, value in entry.items() if key != "video"} for entry in data["stimuli"]]
-    return Manifest(
-        folder=folder,
-        protocol=data["protocol"],
-        protocol_sha256=data["protocol_sha256"],
-        library=data["library"],
-        synthetic=data["synthetic"],
-        acknowledgement=data["acknowledgement"],
-        fps=data["fps"],
-        size=(data["size"][0], data["size"][1]),
-        records=tuple(record_from_json(record) for record in records),
-        pairs=tuple(pair_from_json(pair) for pair in data["pairs"]),
-        videos=videos,
-        versions=data["versions"],
-        made_from=data.get("made_from", ""),
-    )
+    try:
+        stored = TypeAdapter(_Stored).validate_json(content, strict=True)
+        listed = TypeAdapter(_Listed).validate_json(content, strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise StimulusError(
+            f"{path}: expected what Segue wrote, found {where} damaged ({first['msg']}); {_ANEW}."
+        ) from error
+    videos = {entry.id: asdict(entry.video) for entry in listed.stimuli if entry.video is not None}
+    keys = {"records" if name == "stimuli" else name: value for name, value in vars(stored).items()}
+    return Manifest(folder=folder, videos=videos, **keys)
+
+
+_ANEW = "restore a copy of it, or render into a new folder"
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """The keys of a manifest that are read, but for the videos."""
+
+    protocol: str
+    protocol_sha256: str
+    library: str
+    synthetic: bool
+    acknowledgement: str
+    fps: Annotated[float, Field(gt=0)]
+    size: tuple[int, int]
+    stimuli: tuple[StimulusRecord, ...]
+    pairs: tuple[Pair, ...]
+    versions: dict[str, str]
+    made_from: str = ""
+
+
+@dataclass(frozen=True)
+class _Video:
+    file: str
+    frames: int
+    frames_sha256: str
+    file_sha256: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class _Entry:
+    id: str
+    video: _Video | None
+
+
+@dataclass(frozen=True)
+class _Listed:
+    """Which stimulus has which video."""
+
+    stimuli: tuple[_Entry, ...]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,10 +20,21 @@ import sqlalchemy as sa
 from pydantic_core import to_json
 
 from study.errors import SessionError
-from study.experiment.databases import alone, cannot_open, open_engine, shown
+from study.experiment.databases import (
+    alone,
+    damaged,
+    is_unusable,
+    is_unwritable,
+    open_engine,
+    readable_copy,
+    refuse_damaged,
+    shown,
+    sqlite_file,
+    unusable,
+)
 from study.experiment.plan import Plan, Trial, plan_from_json
 from study.experiment.protocol import Protocol
-from study.experiment.rendering import ANSWERS, write_whole
+from study.experiment.rendering import ANSWERS
 from study.experiment.response_migrations import migrate
 from study.experiment.response_tables import (
     answers,
@@ -34,6 +45,7 @@ from study.experiment.response_tables import (
     withdrawals,
 )
 from study.experiment.session import Answer, right_answer
+from study.files import write_whole
 from study.spreadsheets import safe_table
 
 if TYPE_CHECKING:
@@ -103,18 +115,24 @@ class Presentation:
 class Responses:
     """An open database of sessions and answers; made by `open_responses`, closed by `close` or `with`."""
 
-    def __init__(self, engine: sa.Engine, place: str) -> None:
+    def __init__(self, engine: sa.Engine, place: str, kept: ExitStack | None = None) -> None:
         self.engine, self.place = engine, place
+        self._kept = kept or ExitStack()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, _: object, error: BaseException | None, trace: object) -> None:
+        """Close; where the database failed within the block, say how (`SessionError`)."""
         self.close()
+        if is_unusable(error):
+            assert error is not None, "it is an exception"
+            raise unusable(self.place, error) from error
 
     def close(self) -> None:
         """Close all connections; SQLite then folds its write-ahead log into the file."""
         self.engine.dispose()
+        self._kept.close()
 
 
 def open_responses(url_or_path: str | Path) -> Responses:
@@ -131,13 +149,21 @@ def open_responses(url_or_path: str | Path) -> Responses:
         For a database that can't be opened or does not write to disk, was written by a newer Segue, or by another
         program.
     """
+    file = sqlite_file(url_or_path)
+    new = file is not None and not file.exists()
     engine = open_engine(url_or_path)
     place = shown(engine.url)
     try:
+        refuse_damaged(engine, place)
         migrate(engine, place)
     except sa.exc.DBAPIError as error:
         engine.dispose()
-        raise cannot_open(place, error) from error
+        if new and file is not None and file.exists() and not file.stat().st_size:
+            file.unlink()  # nothing came to stand in it
+        raise unusable(place, error) from error
+    except UnicodeDecodeError as error:  # of what SQLite says about a damaged table
+        engine.dispose()
+        raise damaged(place, str(error)) from error
     except BaseException:
         engine.dispose()
         raise
@@ -147,17 +173,31 @@ def open_responses(url_or_path: str | Path) -> Responses:
 def open_answers(folder: Path, database: str | Path | None = None) -> Responses:
     """Open the answers that were given to the stimuli of a results folder: its own, or those in another database.
 
+    They are only read: a SQLite file in a place that can't be written to is read from a copy.
+
     Raises
     ------
     SessionError
         Where there are none, and for what `open_responses` refuses.
     """
-    if database is None and not (folder / ANSWERS).is_file():
+    place = folder / ANSWERS if database is None else database
+    file = sqlite_file(place)
+    if file is None:
+        return open_responses(place)
+    if not file.is_file() or file.stat().st_size == 0:
+        found = "an empty file" if file.is_file() else "no database"
         raise SessionError(
-            f"{folder / ANSWERS}: expected answers, found no database; collect or simulate sessions for this folder "
-            "first, or name the database that they went to (--database)."
+            f"{file}: expected answers, found {found}; collect or simulate sessions for this folder first, or name "
+            "the database that they went to (--database)."
         )
-    return open_responses(folder if database is None else database)
+    try:
+        return open_responses(file)
+    except SessionError as error:
+        if not is_unwritable(error.__cause__):
+            raise
+    with ExitStack() as kept:
+        copy = kept.enter_context(readable_copy(file))
+        return Responses(open_responses(copy).engine, str(file), kept.pop_all())
 
 
 def refuse_other_stimuli(responses: Responses, identifiers: Collection[str]) -> None:
@@ -204,7 +244,7 @@ def begin_session(
         _refuse_other_protocol(connection, responses.place, protocol)
         found = connection.execute(sa.select(sessions).where(sessions.c.participant == plan.participant)).one_or_none()
         if found is not None:
-            record = _session_record(found._mapping)
+            record = _session_record(found._mapping, responses.place)
             _refuse_other_plan(record, plan, simulated)
             connection.execute(sa.insert(events).values(session_id=record.id, kind="resumed", at=clock()))
             return record
@@ -277,7 +317,7 @@ def find_session(responses: Responses, participant: str) -> SessionRecord | None
     """A participant's session, or None; resuming starts from its stored plan."""
     with responses.engine.connect() as connection:
         found = connection.execute(sa.select(sessions).where(sessions.c.participant == participant)).one_or_none()
-    return None if found is None else _session_record(found._mapping)
+    return None if found is None else _session_record(found._mapping, responses.place)
 
 
 def session_by_id(responses: Responses, session_id: int) -> SessionRecord:
@@ -286,21 +326,33 @@ def session_by_id(responses: Responses, session_id: int) -> SessionRecord:
         found = connection.execute(sa.select(sessions).where(sessions.c.id == session_id)).one_or_none()
     if found is None:
         raise SessionError(f"{responses.place}: expected the number of a session, found {session_id}.")
-    return _session_record(found._mapping)
+    return _session_record(found._mapping, responses.place)
 
 
 def all_sessions(responses: Responses) -> tuple[SessionRecord, ...]:
     """Every session, in the order in which they were started."""
-    with responses.engine.connect() as connection:
-        rows = connection.execute(sa.select(sessions).order_by(sessions.c.id)).all()
-    return tuple(_session_record(row._mapping) for row in rows)
+    rows = rows_of(responses, sa.select(sessions).order_by(sessions.c.id))
+    return tuple(_session_record(row, responses.place) for row in rows)
 
 
-def _session_record(row: sa.RowMapping) -> SessionRecord:
-    truth = None if row["truth_json"] is None else json.loads(row["truth_json"])
-    return SessionRecord(
-        row["id"], row["participant"], row["simulated"], plan_from_json(row["plan_json"]), row["protocol_sha256"], truth
-    )
+def rows_of(responses: Responses, query: sa.Select[Any]) -> Sequence[sa.RowMapping]:
+    """What a query finds; refused where a cell of the database is damaged."""
+    try:
+        with responses.engine.connect() as connection:
+            return connection.execute(query).mappings().all()
+    except (ValueError, TypeError) as error:  # SQLite keeps times as text
+        raise damaged(responses.place, str(error)) from error
+
+
+def _session_record(row: sa.RowMapping, place: str) -> SessionRecord:
+    try:
+        plan = plan_from_json(row["plan_json"])
+        truth = None if row["truth_json"] is None else json.loads(row["truth_json"])
+    except SessionError as error:
+        raise SessionError(f"{place}: session {row['id']}: {error}") from error
+    except ValueError as error:
+        raise damaged(place, f"session {row['id']}: {error}") from error
+    return SessionRecord(row["id"], row["participant"], row["simulated"], plan, row["protocol_sha256"], truth)
 
 
 def session_table(responses: Responses) -> pd.DataFrame:
@@ -310,16 +362,14 @@ def session_table(responses: Responses) -> pd.DataFrame:
     count = sa.func.count(answers.c.id).label("answers")
     columns = [column for column in sessions.c if column.name not in ("protocol_text", "plan_json")]
     query = sa.select(*columns, count).outerjoin(answers, answers.c.session_id == sessions.c.id)
-    with responses.engine.connect() as connection:
-        rows = connection.execute(query.group_by(sessions.c.id).order_by(sessions.c.id)).mappings().all()
+    rows = rows_of(responses, query.group_by(sessions.c.id).order_by(sessions.c.id))
     return pd.DataFrame([dict(row) for row in rows], columns=[*(c.name for c in columns), "answers"])
 
 
 def stored_answers(responses: Responses, session_id: int) -> tuple[Answer, ...]:
     """A session's answers so far, for `session.open_session`."""
     query = sa.select(answers).where(answers.c.session_id == session_id).order_by(answers.c.id)
-    with responses.engine.connect() as connection:
-        rows = connection.execute(query).mappings().all()
+    rows = rows_of(responses, query)
     return tuple(
         Answer(row["trial"], row["item"], row["attempt"], row["answer"], row["response_s"], row["shown_well"])
         for row in rows
@@ -500,8 +550,7 @@ def answers_frame(
     if protocol_sha256 is not None:
         query = query.where(sessions.c.protocol_sha256 == protocol_sha256)
     query = query.where(answers.c.role.in_(roles))
-    with responses.engine.connect() as connection:
-        rows = connection.execute(query.order_by(answers.c.session_id, answers.c.id)).mappings().all()
+    rows = rows_of(responses, query.order_by(answers.c.session_id, answers.c.id))
     hashes = sorted({row["protocol_sha256"] for row in rows})
     if len(hashes) > 1:
         raise SessionError(
@@ -525,5 +574,5 @@ def answers_frame(
 def export_csv(responses: Responses, path: str | Path) -> Path:
     """Write all answers, every showing and every role, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
     table = answers_frame(responses, all_attempts=True, roles=("trial", "practice", "check"))
-    write_whole(Path(path), safe_table(table).to_csv(index=False).encode())
+    write_whole(path, safe_table(table).to_csv(index=False))
     return Path(path)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,9 +123,3 @@ class StimulusSet:
             if stimulus.id == identifier:
                 return stimulus
         raise StimulusError(f"Expected the id of a stimulus of {self.protocol.name!r}, found {identifier!r}.")
-
-
-def record_from_json(data: Mapping[str, Any]) -> StimulusRecord:
-    """A record as a manifest stores it."""
-    uses = {key: MotionUse(**{**data[key], "notes": tuple(data[key]["notes"])}) for key in ("source", "destination")}
-    return StimulusRecord(**{**data, **uses, "notes": tuple(data["notes"])})

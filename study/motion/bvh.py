@@ -9,7 +9,6 @@ warned of; what can't be read is refused with file, line and column.
 from __future__ import annotations
 
 import difflib
-import os
 import re
 import warnings
 from collections.abc import Mapping
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from study.counting import counted
 from study.errors import MotionFileError, MotionWarning
+from study.files import write_whole
 from study.motion import quaternions as quat
 from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip, refuse_large, with_roles
 from study.motion.digits import parse_table
@@ -440,9 +440,10 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
     Raises
     ------
     MotionFileError
-        Where the file can't be written, or holds numbers that no reader would take.
+        Where the file would hold numbers that no reader takes.
+    FileError
+        Where the file can't be written.
     """
-    path = Path(path)
     lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
     lines += ["MOTION", f"Frames: {clip.frames}", f"Frame Time: {1.0 / clip.fps!r}"]
     degrees = np.degrees(quat.to_euler("ZYX", clip.rotations)).reshape(clip.frames, -1)
@@ -451,18 +452,7 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
         raise MotionFileError(f"Expected to write no number above {LARGEST:.0e}, but the body moves further.", path)
     row = " ".join(["%.10g"] * table.shape[1])
     lines += [row % tuple(values) for values in table.tolist()]
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
-            file.write("\n".join(lines) + "\n")
-        temporary.replace(path)
-    except OSError as problem:
-        raise MotionFileError(
-            f"Expected to write a BVH file here, but can't ({problem.strerror}). Check the folder and the space on it.",
-            path,
-        ) from problem
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, "\n".join(lines) + "\n")
 
 
 def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:

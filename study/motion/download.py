@@ -1,8 +1,8 @@
 """Fetch trials of the CMU Graphics Lab database from its official site, into the site's own layout.
 
 In: a trial such as `16_35`, or a motion of the index such as `run`. Out: `subjects/16/16_35.amc` and
-`subjects/16/16.asf` below a folder. A file is written under another name until it is whole; what an interrupted
-download left is continued, and files that are there are not fetched again.
+`subjects/16/16.asf` below a folder. A file is written under another name until it is whole; what a broken connection
+left is continued by the next download, and files that are there are not fetched again.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from __future__ import annotations
 import http.client
 import urllib.error
 import urllib.request
+from contextlib import suppress
 from pathlib import Path
 
 from study.errors import MotionError
+from study.files import whole_file
 from study.motion.cmu import CMU_SITE, cmu_index, is_trial, trial_files
 
 _CHUNK_BYTES = 1 << 16
@@ -60,10 +62,22 @@ def download_trial(trial: str, folder: Path | str, *, site: str = CMU_SITE, time
 
 
 def _fetch(address: str, target: Path, timeout_s: float) -> None:
-    """Download one file under a temporary name, continuing what is there, then give it its name."""
-    partial = target.with_name(target.name + ".part")
+    """Download one file whole or not at all, continuing what an earlier attempt left as `NAME.part`."""
+    left = target.with_name(target.name + ".part")
+    with whole_file(target) as unfinished:
+        with suppress(FileNotFoundError):
+            left.replace(unfinished)  # of two downloads at once, one has it
+        try:
+            _receive_or_say_why(address, target, unfinished, timeout_s)
+        except (MotionError, KeyboardInterrupt):
+            if unfinished.stat().st_size:
+                unfinished.replace(left)
+            raise
+        _check_content(unfinished, address)
+
+
+def _receive_or_say_why(address: str, target: Path, partial: Path, timeout_s: float) -> None:
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
         _receive(address, partial, timeout_s)
     except urllib.error.HTTPError as error:
         why = "the site has no such trial" if error.code == http.client.NOT_FOUND else "the site refused"
@@ -74,10 +88,6 @@ def _fetch(address: str, target: Path, timeout_s: float) -> None:
             f"Could not download {address}: {reason}. Check the network and run it again (it "
             f"goes on where it stopped), or put the file at {target} yourself."
         ) from error
-    except OSError as error:
-        raise MotionError(f"Could not write {partial}: {error}. Choose a folder that can be written to.") from error
-    _check_content(partial, address)
-    partial.replace(target)
 
 
 def _receive(address: str, partial: Path, timeout_s: float) -> None:
@@ -89,7 +99,7 @@ def _receive(address: str, partial: Path, timeout_s: float) -> None:
     except urllib.error.HTTPError as error:
         if error.code != _RANGE_REFUSED:
             raise
-        partial.unlink()  # longer than the site's file: not the same file
+        partial.write_bytes(b"")  # longer than the site's file: not the same file
         answer = urllib.request.urlopen(address, timeout=timeout_s)
     with answer, partial.open("ab" if answer.status == _PARTIAL else "wb") as out:
         while chunk := answer.read(_CHUNK_BYTES):
@@ -101,10 +111,9 @@ def _receive(address: str, partial: Path, timeout_s: float) -> None:
 
 
 def _check_content(partial: Path, address: str) -> None:
-    """Refuse an error page that came with status 200, and keep no trace of it."""
+    """Refuse an error page that came with status 200."""
     start = partial.read_bytes()[:512].lstrip()
     if not start or start[:1] not in (b"#", b":") or b"\0" in start:
-        partial.unlink()
         raise MotionError(
             f"Expected Acclaim motion capture at {address}, found {start[:40]!r}. "
             "Something between here and the site answers in its place; try from another network."

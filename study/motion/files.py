@@ -10,6 +10,7 @@ from study.errors import MotionError, MotionFileError
 from study.motion.acclaim import CMU_FPS, read_amc
 from study.motion.bvh import read_bvh
 from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip
+from study.motion.other_formats import by_suffix
 from study.motion.upright import put_upright
 
 SUFFIXES = (".bvh", ".amc")
@@ -58,4 +59,5 @@ def read_clip(
         note = f"taken at {fps:g} fps, as told, and not at the file's {clip.fps:g}"
         return replace(clip, fps=fps, history=(*clip.history, note))
     hint = "; name the .amc file, and its .asf is found beside it" if suffix == ".asf" else ""
-    raise MotionFileError(f"Expected a motion file ({', '.join(SUFFIXES)}), found {suffix or 'no suffix'}{hint}.", path)
+    found = by_suffix(path) or f"found {suffix or 'no suffix'}{hint}."
+    raise MotionFileError(f"Expected a motion file ({', '.join(SUFFIXES)}), {found}", path)

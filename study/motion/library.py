@@ -202,8 +202,8 @@ class FolderLibrary(Library):
         self._files = files = _motion_files(folder)
         if not files:
             raise MotionError(
-                f"Expected .bvh or .amc files in {folder} or its subfolders, found none. Put motion files there, or "
-                "fill it with `segue motions download`."
+                f"Expected .bvh or .amc files in {folder} or its subfolders, {_only_others(folder)} Put motion files "
+                "there, or fill it with `segue motions download`."
             )
         trials, others = _sorted_out(files)
         indexed = {take.trial for motion in cmu_index().values() for take in motion.takes}
@@ -304,6 +304,14 @@ def _motion_files(folder: Path) -> list[Path]:
 
     found = (path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
     return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+
+
+def _only_others(folder: Path) -> str:
+    """What a folder without motion files holds instead, if it is motion in another format."""
+    from study.motion.other_formats import KNOWN, by_suffix
+
+    others = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KNOWN)
+    return str(by_suffix(others[0])) if others else "found none."
 
 
 def _sorted_out(files: Iterable[Path]) -> tuple[dict[str, Path], list[Path]]:

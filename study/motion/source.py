@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import MotionFileError
+from study.motion.other_formats import by_beginning
 
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 # A number as motion files write it; Python's own reading would also take `1_000`, `nan` and `inf`.
@@ -74,6 +75,8 @@ def read_source(path: Path | str, kind: str) -> Source:
         raw = raw[len(codecs.BOM_UTF8) :]
     if not raw.strip():
         raise MotionFileError(f"Expected {kind}, but the file is empty. Copy or download it again.", path)
+    if found := by_beginning(raw):
+        raise MotionFileError(f"Expected {kind}, {found}", path)
     if b"\0" in raw[:4096] or b"\0" in raw:
         raise MotionFileError(f"Expected {kind}, which is text, but found binary data. Check what the file is.", path)
     return Source(path, raw)

@@ -7,13 +7,12 @@ folder and version of Segue. What participants or protocols wrote is escaped by 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.errors import AnalysisError
+from study.files import write_whole
 from study.report import tables, words
 from study.report.material import gather
 
@@ -24,14 +23,22 @@ Result = Mapping[str, Any]
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def write_report(results_folder: str | Path, *, database: str | None = None, resamples: int = 1000) -> Path:
-    """Write `report.html`, `tables/` and `figures/` into a results folder.
+def write_report(
+    results_folder: str | Path,
+    *,
+    out: str | Path | None = None,
+    database: str | None = None,
+    resamples: int = 1000,
+) -> Path:
+    """Write `report.html`, `tables/` and `figures/` of a results folder.
 
     Parameters
     ----------
     results_folder
         With `protocol.toml`, `manifest.json` and `responses.sqlite`; what `segue power --json` printed, as
         `power*.json`, is shown too.
+    out
+        The folder to write into; the results folder unless given, which is then only read.
     database
         Where the answers are, if not in the folder: a file, or a URL.
     resamples
@@ -70,9 +77,10 @@ def write_report(results_folder: str | Path, *, database: str | None = None, res
             scale_points=material.protocol.scale_points,
         )
         page = replace(compose(material, analysis), pictures=pictures())
-    _write_files(folder, page, analysis)
-    path = folder / "report.html"
-    _write_whole(path, to_html(page))
+    target = folder if out is None else Path(out)
+    _write_files(target, page, analysis)
+    path = target / "report.html"
+    write_whole(path, to_html(page))
     return path
 
 
@@ -80,15 +88,13 @@ def _write_files(folder: Path, page: Page, analysis: Result) -> None:
     """Write every table as CSV and JSON, every figure as SVG, and the whole analysis as JSON."""
     from study.report.drawing import as_file
 
-    for name in ("tables", "figures"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
     for table in page.tables:
-        _write_whole(folder / "tables" / f"{table.name}.csv", tables.as_csv(table))
-        _write_whole(folder / "tables" / f"{table.name}.json", tables.as_json(table))
+        write_whole(folder / "tables" / f"{table.name}.csv", tables.as_csv(table))
+        write_whole(folder / "tables" / f"{table.name}.json", tables.as_json(table))
     for drawing in page.drawings:
-        _write_whole(folder / "figures" / f"{drawing.name}.svg", as_file(drawing.svg))
+        write_whole(folder / "figures" / f"{drawing.name}.svg", as_file(drawing.svg))
     whole = json.dumps(analysis, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    _write_whole(folder / "tables" / "analysis.json", whole)
+    write_whole(folder / "tables" / "analysis.json", whole)
 
 
 def to_html(page: Page) -> str:
@@ -107,15 +113,3 @@ def to_html(page: Page) -> str:
     markup: Callable[[str], Markup] = Markup
     styles = (TEMPLATES / "report.css").read_text(encoding="utf-8")
     return environment.get_template("report.html.jinja").render(page=page, styles=markup(styles), markup=markup)
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write a file under another name and rename it, so that it is there whole or not at all."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        unfinished.write_text(text, encoding="utf-8")
-        unfinished.replace(path)
-    except OSError as error:
-        raise AnalysisError(f"{path}: can't be written: {error.strerror}; free the place or name another") from error
-    finally:
-        unfinished.unlink(missing_ok=True)

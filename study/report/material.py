@@ -91,7 +91,8 @@ def _table(responses: Responses, table: sa.Table) -> pd.DataFrame:
     import pandas as pd
     import sqlalchemy as sa
 
+    from study.experiment.responses import rows_of
+
     columns = [column for column in table.c if column.name != "detail_json"]
-    with responses.engine.connect() as connection:
-        rows = connection.execute(sa.select(*columns).order_by(*table.primary_key)).mappings().all()
+    rows = rows_of(responses, sa.select(*columns).order_by(*table.primary_key))
     return pd.DataFrame([dict(row) for row in rows], columns=[column.name for column in columns])

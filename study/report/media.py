@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.counting import counted
+from study.errors import StimulusError
 
 if TYPE_CHECKING:
     from study.experiment.stimuli import Manifest
@@ -174,11 +175,17 @@ def strip_of_video(path: Path, blend_start: int, blend_stop: int) -> bytes:
     import av
     from PIL import Image
 
-    with av.open(str(path)) as container:
-        # Decoding is cheap; only what is shown is turned into RGB.
-        frames = list(container.decode(video=0))
+    try:
+        with av.open(str(path)) as container:
+            # Decoding is cheap; only what is shown is turned into RGB.
+            frames = list(container.decode(video=0))
         places = _moments(len(frames), blend_start, blend_stop)
         shown = [np.asarray(frames[place].to_ndarray(format="rgb24"), dtype=np.uint8) for place in places]
+    except (av.error.FFmpegError, IndexError) as error:  # no stream, or no frame in it
+        raise StimulusError(
+            f"{path}: expected a video, found a damaged file ({error}); render it again, or delete it for a report "
+            "without it."
+        ) from error
     cells = _cropped(shown)
     blended = [blend_start <= place < blend_stop for place in places]
     picture = np.concatenate([_underlined(cell, inside) for cell, inside in zip(cells, blended, strict=True)], axis=1)

@@ -29,10 +29,10 @@ def read_power(folder: Path) -> list[Result]:
     found = []
     for path in sorted(folder.glob("power*.json")):
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
+            content = json.loads(path.read_text(encoding="utf-8-sig"))
         except (OSError, ValueError) as error:
             raise AnalysisError(f"{path}: expected what `segue power --json` prints: {error}; make it anew") from error
-        missing = [key for key in NEEDED if not isinstance(content, dict) or key not in content]
+        missing = [key for key in NEEDED if not isinstance(content, dict) or key not in content] or _gaps(content)
         if missing:
             raise AnalysisError(
                 f"{path}: expected what `segue power --json` prints, found no {', '.join(missing)}; make it anew or "
@@ -41,6 +41,23 @@ def read_power(folder: Path) -> list[Result]:
             )
         found.append(content)
     return found
+
+
+def _gaps(content: dict[str, Any]) -> list[str]:
+    """What the points of a curve lack."""
+    points = content["points"]
+    if not isinstance(points, list) or not points or not all(isinstance(point, dict) for point in points):
+        return ["points"]
+    keys = ("participants", "studies", "power")
+    gaps = [f"points.{key}" for point in points for key in keys if not _is_number(point.get(key))]
+    intervals = [point.get("interval") for point in points]
+    ends = all(isinstance(one, dict) and {"low", "high"} <= one.keys() for one in intervals)
+    numbers = [key for key in ("target", "answers_per_participant") if not _is_number(content[key])]
+    return sorted({*gaps, *numbers}) + ([] if ends else ["points.interval"])
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def power_sentence(found: Result) -> str:

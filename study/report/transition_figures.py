@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.counting import counted
+from study.files import whole_file
 from study.report.drawing import BLUE, FAINT, INK, ORANGE, SOFT, TEAL, new_figure, quiet_grid, style
 
 if TYPE_CHECKING:
@@ -166,5 +167,5 @@ class Reducer:
 
 
 def _save(figure: Figure, out: Path) -> None:
-    out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(out, format="png", dpi=150, facecolor="white")
+    with whole_file(out) as unfinished:
+        figure.savefig(unfinished, format="png", dpi=150, facecolor="white")

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from study.errors import TransitionError
+from study.files import read_text, write_whole
 
 LABELS = ("good", "bad", "skip")
 
@@ -64,12 +64,7 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     TransitionError
         With file and line, for missing columns, frames that are no numbers, and unknown labels.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise TransitionError(
-            f"{path}: expected a CSV file of labelled transitions, found {error.strerror}."
-        ) from error
+    text = read_text(path, "a CSV file of labelled transitions")
     reader = csv.DictReader(io.StringIO(text))
     missing = [name for name in _REQUIRED if name not in (reader.fieldnames or ())]
     if missing:
@@ -100,14 +95,14 @@ def _label(row: dict[str, str], place: str) -> Label:
         fps = float(rate)
     except ValueError:
         raise TransitionError(f"{place}: expected a number as fps, found {rate!r}.") from None
-    source, destination = row["source"].strip(), row["destination"].strip()
+    source, destination = (row["source"] or "").strip(), (row["destination"] or "").strip()
     library, how = row.get("library") or "", row.get("found") or ""
     return Label(source, destination, frames[0], frames[1], said, fps, library, how)
 
 
 def append_label(path: Path, label: Label) -> None:
     """Write one more label; the file is whole before and after, whatever happens between."""
-    before = path.read_text(encoding="utf-8") if path.exists() else ""
+    before = read_text(path, "a CSV file of labelled transitions") if path.exists() else ""
     text = io.StringIO()
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     if before:
@@ -118,10 +113,4 @@ def append_label(path: Path, label: Label) -> None:
     writer.writerow(asdict(label))
     if before and not before.endswith("\n"):
         before += "\n"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.part")
-    with unfinished.open("w", encoding="utf-8", newline="") as file:
-        file.write(before + text.getvalue())
-        file.flush()
-        os.fsync(file.fileno())
-    unfinished.replace(path)
+    write_whole(path, before + text.getvalue())

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
-from study.errors import StimulusError
+from study.errors import FileError, StimulusError
 from study.experiment import rendering
 from study.experiment.protocol import load_protocol, parse_protocol
 from study.experiment.rendering import (
@@ -25,7 +25,6 @@ from study.experiment.rendering import (
     render,
     rendered_already,
     rendered_before,
-    write_whole,
 )
 from study.experiment.stimuli import prepare
 
@@ -274,16 +273,8 @@ def test_what_is_no_results_folder_is_refused(prepared, tmp_path):
     with pytest.raises(StimulusError, match="expected a manifest of version 1, found 99"):
         read_manifest(tmp_path)
     (tmp_path / "file").write_text("")
-    with pytest.raises(StimulusError, match="expected a folder to write to"):
+    with pytest.raises(FileError, match="expected a folder to write to"):
         render(prepared, tmp_path / "file")
-
-
-def test_whole_files_leave_nothing_behind(tmp_path):
-    write_whole(tmp_path / "a.txt", b"one")
-    write_whole(tmp_path / "a.txt", b"two")
-    assert files(tmp_path) == {"a.txt": b"two"}
-    with pytest.raises(StimulusError, match="can't be written"):
-        write_whole(tmp_path / "a.txt" / "b.txt", b"x")
 
 
 def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path):

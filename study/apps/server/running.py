@@ -15,6 +15,7 @@ from study.apps.server.hosting import Host
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
+from study.experiment.databases import try_to_write
 from study.experiment.protocol import Protocol
 from study.experiment.rendering import read_manifest
 from study.experiment.responses import open_responses
@@ -49,12 +50,13 @@ def run(
     Raises
     ------
     SessionError
-        Where the address can't be listened at, or the database can't be opened.
+        Where the address can't be listened at, or the database can't be opened or written to.
     """
     manifest = read_manifest(folder)
     listening = listen(host, port)
     name = f"[{host}]" if ":" in host else host
     with open_responses(database or folder) as responses:
+        try_to_write(responses.engine, responses.place)
         app = make_app(Host(protocol, manifest, responses, settings))
         if started:
             started(f"http://{name}:{listening.getsockname()[1]}", responses.place)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import TransitionError
+from study.files import read_text
 from study.motion.clip import Clip, joint_positions
 from study.transitions.one_hop.problem import Distance, OffsetArray
 
@@ -28,7 +29,7 @@ def read_beats(path: Path, clip: Clip) -> OffsetArray:
     so are times outside of the clip.
     """
     times = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, line in enumerate(read_text(path, "times of beats").splitlines(), start=1):
         words = line.split("#")[0].split()
         if not words:
             continue

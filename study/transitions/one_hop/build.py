@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
+import zipfile
+import zlib
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import fields
@@ -18,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from study.files import whole_file
 from study.transitions.one_hop.jobs import Found, Job, make_jobs, run_job
 from study.transitions.one_hop.problem import FORBIDDEN, IntArray, Problem
 from study.transitions.one_hop.search import Best
@@ -123,20 +125,21 @@ class _State:
         for number, best in self.best.items():
             arrays[f"best{number}"] = np.stack([getattr(best, field.name) for field in fields(Best)])
             arrays[f"direct{number}"] = self.direct[number]
-        temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
-        with temporary.open("wb") as file:
+        with whole_file(path) as unfinished, unfinished.open("wb") as file:
             np.savez(file, **arrays)
-        temporary.replace(path)
 
     def read(self, path: Path, key: str) -> None:
-        """Goes on from a file that belongs to the same problem; one that does not is left aside."""
-        with np.load(path) as arrays:
-            if str(arrays["key"]) != key:
-                return
-            self.done = arrays["done"].copy()
-            for number in self.best:
-                self.best[number] = Best(*(row.copy() for row in arrays[f"best{number}"]))
-                self.direct[number] = arrays[f"direct{number}"].copy()
+        """Goes on from a file that belongs to the same problem; one that does not, or is damaged, is left aside."""
+        try:
+            with np.load(path) as arrays:
+                if str(arrays["key"]) != key:
+                    return
+                best = {number: Best(*(row.copy() for row in arrays[f"best{number}"])) for number in self.best}
+                direct = {number: arrays[f"direct{number}"].copy() for number in self.best}
+                done = arrays["done"].copy()
+        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
+            return
+        self.done, self.best, self.direct = done, best, direct
 
 
 def _fingerprint(problem: Problem, jobs: tuple[Job, ...]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from study.files import whole_file
 from study.transitions.one_hop.robustness import Costs
 
 # After Okabe and Ito 2008: told apart by people with any colour vision.
@@ -56,7 +57,8 @@ def draw_distances(
     axes.set_xlabel(f"{names[1]}, seconds")
     axes.set_ylabel(f"{names[0]}, seconds")
     figure.colorbar(image, ax=axes, label=words)
-    figure.savefig(path)
+    with whole_file(path) as unfinished:
+        figure.savefig(unfinished, format="png")
 
 
 def draw_costs(costs: Sequence[Costs], path: Path, *, unit: str = "m²", names: Sequence[str] = ()) -> None:
@@ -95,4 +97,5 @@ def draw_costs(costs: Sequence[Costs], path: Path, *, unit: str = "m²", names: 
     axes.set_ylabel(f"cost, {unit}")
     axes.set_ylim(0.0, 1.28 * max(float(direct.max(initial=0.0)), float(below.max(initial=0.0)), 1e-9))
     axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper left")
-    figure.savefig(path)
+    with whole_file(path) as unfinished:
+        figure.savefig(unfinished, format="png")

@@ -10,7 +10,8 @@ game engine reads without us); `docs/one_hop.md` describes both.
 from __future__ import annotations
 
 import json
-import os
+import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import TransitionError
+from study.files import whole_file, write_whole
 from study.transitions.one_hop.problem import FORBIDDEN, Alignment, IntArray, Problem
 from study.transitions.one_hop.search import Best
 
@@ -215,18 +217,14 @@ def write_table(table: OneHopTable, path: Path) -> tuple[Path, ...]:
     text = json.dumps(header(table), indent=2)
     if path.suffix == ".npz":
         arrays: dict[str, Any] = {"entries": table.entries, "costs": table.costs, "direct_costs": table.direct_costs}
-        temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
-        with temporary.open("wb") as file:
+        with whole_file(path) as unfinished, unfinished.open("wb") as file:
             np.savez(file, header=np.array(text), **arrays)
-        temporary.replace(path)
         return (path,)
     if path.suffix not in (".bin", ".json"):
         raise TransitionError(f"Expected a file name that ends in .npz, .bin or .json, got {path.name!r}.")
     flat, words = path.with_suffix(".bin"), path.with_suffix(".json")
-    for file_path, content in ((flat, table.entries.astype("<i4").tobytes()), (words, text.encode())):
-        temporary = file_path.with_name(f"{file_path.name}.{os.getpid()}.part")
-        temporary.write_bytes(content)
-        temporary.replace(file_path)
+    write_whole(flat, table.entries.astype("<i4").tobytes())
+    write_whole(words, text)
     return flat, words
 
 
@@ -236,8 +234,17 @@ def read_table(path: Path) -> OneHopTable:
     Raises
     ------
     TransitionError
-        For a file that is not such a table, of another version, or cut short.
+        For a file that is not such a table, of another version, cut short or damaged.
     """
+    try:
+        return _read_table(path)
+    except (ValueError, KeyError, TypeError, EOFError, IndexError, zipfile.BadZipFile, zlib.error) as error:
+        raise TransitionError(
+            f"{path}: expected a {FORMAT}, found a damaged file ({error}). Build it again."
+        ) from error
+
+
+def _read_table(path: Path) -> OneHopTable:
     if path.suffix == ".npz":
         with np.load(path) as arrays:
             if "header" not in arrays:
