@@ -149,7 +149,7 @@ def open_session(
     Parameters
     ----------
     passed
-        Which of `consent` and `form` are behind the participant.
+        Which of `consent`, `form` and `debrief` are behind the participant.
     """
     if plan.protocol_sha256 != protocol.sha256:
         raise SessionError(
@@ -362,7 +362,7 @@ def _steps(protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Co
     breaks = _breaks(protocol, plan)
     for trials in studies.values():
         steps += _study_steps(protocol, trials, earlier, breaks)
-    if text := wording.debrief_text(protocol):
+    if "debrief" not in passed and (text := wording.debrief_text(protocol)):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
 
