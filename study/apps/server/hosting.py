@@ -50,8 +50,9 @@ from study.experiment.session import Answer, Session, Step
 TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
 
-GONE_SECONDS = 900.0
-"""A sitting that was not heard of for so long is kept in the database alone, and taken up from there."""
+GONE_SECONDS = 300.0
+"""A sitting that was not heard of for so long is kept in the database alone, and taken up from there; one whose page was
+closed, after the time of a tab."""
 
 MOST_EVENTS = 2000
 """So much of what a page tells, or causes by opening over and over, is stored of a session: it can't fill the disk."""
@@ -82,7 +83,8 @@ class Sitting:
     @property
     def is_under_way(self) -> bool:
         """Whether somebody is there who is not done yet."""
-        return time.monotonic() - self.page_seen < GONE_SECONDS and flow.current(self.state).kind != "done"
+        silent_s = time.monotonic() - self.page_seen
+        return silent_s < (GONE_SECONDS if self.page else TAB_SECONDS) and flow.current(self.state).kind != "done"
 
 
 class Host:

@@ -17,7 +17,7 @@ _SLOT = re.compile(
     r"""\{[^{}]*\} | \[\[.*\]\] | <<.*>> | <%.*%> | «.*» | \*\|.*\|\* | %[a-z_][\w .:-]*% | \ufffd""",
     re.VERBOSE | re.IGNORECASE,
 )
-"""A slot anywhere in a value, in the notation of survey tools, mail programs and shells; or what could not be decoded."""
+"""A slot anywhere in a value, in the notation of survey tools, mails and shells; or what could not be decoded."""
 
 _ALL_SLOT = re.compile(
     r"""\[[^\]]*\] | <[\w .:-]*> | \$\W?[a-z_].* | __[a-z][a-z_]*__ | ([@\#|*~^$%])[\w .:-]*\1 | :[a-z]\w* | n/a
