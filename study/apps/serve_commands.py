@@ -38,6 +38,13 @@ from study.apps.study_commands import (
     "--researcher-token", envvar="SEGUE_RESEARCHER_TOKEN", help="Made up unless given; 16 characters or more."
 )
 @click.option("--behind-proxy", is_flag=True, help="Believe the proxy on this machine about https and addresses.")
+@click.option(
+    "--public-url",
+    "public_urls",
+    multiple=True,
+    metavar="URL",
+    help="Address that participants open, where its name is not this machine's own, as behind a proxy.",
+)
 @click.option("--root-path", default="", metavar="PATH", help="Where the proxy shows this study, such as /study.")
 def serve(
     protocol: str,
@@ -54,12 +61,14 @@ def serve(
     completion_url: str,
     researcher_token: str | None,
     behind_proxy: bool,
+    public_urls: tuple[str, ...],
     root_path: str,
 ) -> None:
     """Sessions in the browser. What is not rendered yet is rendered first; ends with Ctrl-C, and goes on from there.
 
     A results folder that is rendered whole is served as it is, without --library, on any machine.
     """
+    from study.apps.server.names import own_names
     from study.apps.server.running import run
     from study.apps.server.settings import Settings
     from study.experiment.participants import new_token
@@ -71,6 +80,7 @@ def serve(
         raise click.UsageError(f"expected a completion URL that starts with https://, found {completion_url!r}.")
     if root_path and not re.fullmatch(r"(/[\w.~-]+)+", root_path, re.ASCII):
         raise click.UsageError(f"expected a path such as /study, without a slash at its end, found {root_path!r}.")
+    own_names(host, public_urls)  # refuses what is no address, before anything is rendered
     settings = Settings(
         researcher_token=new_token() if researcher_token is None else researcher_token,
         most_participants=participants,
@@ -93,6 +103,10 @@ def serve(
         token = f"#{settings.researcher_token}" if researcher_token is None else "  (asks for your token)"
         say(f"researcher    {address}/researcher{token}")
         say(f"answers       {place}")
+        if behind_proxy and not public_urls:
+            say(
+                "Only localhost, this machine's name and IP addresses are answered: give the proxy's with --public-url."
+            )
         say("Ctrl-C ends it; the same command goes on from there.")
 
     run(
@@ -104,5 +118,6 @@ def serve(
         behind_proxy=behind_proxy,
         root_path=root_path,
         database=database,
+        public_urls=public_urls,
         started=started,
     )

@@ -10,6 +10,7 @@ import hashlib
 import hmac
 import json
 import secrets
+import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -39,6 +40,15 @@ CODE_LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
 def _utc_now() -> datetime:
     return datetime.now(UTC)
+
+
+def steady_clock() -> Clock:
+    """A clock that is set now, by the machine's, and then runs by itself.
+
+    It tells who is still there: no place is given away, or held on to, because the machine's clock was set.
+    """
+    began, ticks = _utc_now(), time.monotonic()
+    return lambda: began + timedelta(seconds=time.monotonic() - ticks)
 
 
 def new_token() -> str:
@@ -105,6 +115,7 @@ def admit(
     library: str = "",
     library_synthetic: bool = False,
     clock: Clock = _utc_now,
+    heard_clock: Clock | None = None,
 ) -> Participant | Literal["full", "taken"]:
     """Begin a newcomer's session in the group that has the fewest, or say why not: no place left, or the name is known.
 
@@ -115,9 +126,12 @@ def admit(
     ----------
     draw
         The newcomer's plan in a group.
+    heard_clock
+        Where it is another than that of the record, the clock by which participants are `seen`.
     """
+    heard_at = (heard_clock or clock)()
     with alone(responses.engine) as connection:
-        filled = _filled(connection, places, clock())
+        filled = _filled(connection, places, heard_at)
         if places.most_participants is not None and sum(filled) >= places.most_participants:
             return "full"
         known = sa.select(sessions.c.id).where(sessions.c.participant == newcomer.name)
@@ -133,7 +147,7 @@ def admit(
             clock=clock,
             within=connection,
         )
-        return _enrol(connection, record.id, newcomer, group, clock())
+        return _enrol(connection, record.id, newcomer, group, began_at=clock(), seen_at=heard_at)
 
 
 def _has_parameters(connection: sa.Connection, identifying: Mapping[str, str]) -> bool:
@@ -141,7 +155,9 @@ def _has_parameters(connection: sa.Connection, identifying: Mapping[str, str]) -
     return bool(identifying) and connection.execute(sa.select(participants.c.session_id).where(key)).first() is not None
 
 
-def _enrol(connection: sa.Connection, session_id: int, newcomer: Newcomer, group: int, now: datetime) -> Participant:
+def _enrol(
+    connection: sa.Connection, session_id: int, newcomer: Newcomer, group: int, **times: datetime
+) -> Participant:
     """Store a participant's tokens (as hashes), group and parameters."""
     secret = secrets.token_hex(32)
     row = {
@@ -152,8 +168,7 @@ def _enrol(connection: sa.Connection, session_id: int, newcomer: Newcomer, group
         "group_number": group,
         "parameters_json": json.dumps(dict(newcomer.parameters), sort_keys=True),
         "parameters_sha256": _parameters_key(newcomer.identifying) if newcomer.identifying else None,
-        "began_at": now,
-        "seen_at": now,
+        **times,
     }
     connection.execute(sa.insert(participants).values(row))
     return Participant(session_id, secret, group, newcomer.parameters)

@@ -228,6 +228,14 @@ class Texts(Part):
         default="There is no such code. Please check it; there may be nothing left to delete.",
         description="For a wrong code on the withdrawal page.",
     )
+    slow_down: str = Field(
+        default="Those were many tries. Please wait a minute, then try again.",
+        description="On the withdrawal page, after many wrong codes.",
+    )
+    wrong_address: str = Field(
+        default="There is no study at this address. Please open the link that you were given.",
+        description="Where a page is asked for under a name that is not the server's (`--public-url`).",
+    )
     completion: str = Field(default="Your completion code:", description="Above the completion code.")
     back: str = Field(default="Finish", min_length=1, description="Button that leads back to the recruiting site.")
 

@@ -462,11 +462,16 @@ def stored_form(responses: Responses, session_id: int, connection: sa.Connection
         return {row.name: row.value for row in own.execute(query)}
 
 
-def steps_passed(responses: Responses, record: SessionRecord) -> tuple[str, ...]:
-    """Which of `consent` and `form` are behind a participant, for `session.open_session`; front ends record both."""
-    query = sa.select(events.c.kind).where(events.c.session_id == record.id, events.c.kind.in_(("consent", "form")))
+def event_counts(responses: Responses, record: SessionRecord) -> dict[str, int]:
+    """How often each kind of event happened in a session, such as `consent` and `form`, which front ends record."""
+    query = sa.select(events.c.kind, sa.func.count()).where(events.c.session_id == record.id).group_by(events.c.kind)
     with responses.engine.connect() as connection:
-        return tuple(sorted(set(connection.execute(query).scalars())))
+        return {row[0]: row[1] for row in connection.execute(query)}
+
+
+def has_event(responses: Responses, record: SessionRecord, kind: str) -> bool:
+    """Whether something happened in a session, such as `finished`."""
+    return kind in event_counts(responses, record)
 
 
 def record_event(
@@ -482,13 +487,6 @@ def event_row(record: SessionRecord, kind: str, detail: Mapping[str, Any] | None
     """The row of one event, for a transaction of the caller's."""
     text = None if detail is None else json.dumps(detail, sort_keys=True)
     return _INSERT_EVENT, {"session_id": record.id, "kind": kind, "at": at, "detail_json": text}
-
-
-def has_event(responses: Responses, record: SessionRecord, kind: str) -> bool:
-    """Whether something happened in a session, such as `finished`."""
-    query = sa.select(sa.func.count()).where(events.c.session_id == record.id, events.c.kind == kind)
-    with responses.engine.connect() as connection:
-        return bool(connection.execute(query).scalar_one())
 
 
 _TRIAL_COLUMNS = tuple(column.name for column in answers.c if column.name in Trial.__dataclass_fields__)

@@ -154,7 +154,7 @@ def open_session(
     Parameters
     ----------
     passed
-        Which of `consent` and `form` are behind the participant.
+        Which of `consent`, `form` and `debrief` are behind the participant.
     frames
         Frames of each stimulus, so that texts say how long the films really take; an estimate unless given.
     """
@@ -383,7 +383,7 @@ def _steps(
     breaks = _breaks(protocol, plan)
     for trials in studies.values():
         steps += _study_steps(protocol, trials, earlier, breaks, films)
-    if text := wording.debrief_text(protocol, films):
+    if "debrief" not in passed and (text := wording.debrief_text(protocol, films)):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
 

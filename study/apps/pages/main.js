@@ -70,7 +70,7 @@ async function enter(study, force = false) {
 async function run(study) {
   const state = { pauseOver: Promise.resolve(), films: null };
   let view = await enter(study);
-  keepAlive(() => window.location.reload());
+  const stop = keepAlive(() => window.location.reload());
   while (!LAST.includes(view.kind)) {
     top(view.label ?? "", WITH_PROGRESS.includes(view.kind) ? screens.progress(view, study) : "");
     try {
@@ -82,6 +82,7 @@ async function run(study) {
       view = await enter(study);
     }
   }
+  stop();
   end(view, study);
 }
 

@@ -94,6 +94,7 @@ export function tell(kind, detail = {}) {
   post("api/happened", { kind, detail }).catch(() => {});
 }
 
+// Until the function that it returns is called.
 export function keepAlive(whenTaken) {
   const every = setInterval(async () => {
     try {
@@ -106,6 +107,7 @@ export function keepAlive(whenTaken) {
     }
   }, 10000);
   window.addEventListener("pagehide", () => navigator.sendBeacon("api/leave", page));
+  return () => clearInterval(every);
 }
 
 export async function study() {

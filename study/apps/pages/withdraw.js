@@ -4,13 +4,15 @@ import { fromHex, surround } from "./colours.js";
 import { element, heading, show, status } from "./dom.js";
 import { page, study as getStudy } from "./server.js";
 
+// Why it could not be done; nothing where it was.
 async function withdraw(code) {
   const response = await fetch("api/withdraw", {
     method: "POST",
     headers: { "content-type": "application/json", "x-segue-page": page },
     body: JSON.stringify({ code }),
   });
-  return response.ok && (await response.json()).withdrawn;
+  if (response.ok && (await response.json()).withdrawn) return "";
+  return response.status === 429 ? study.texts.slow_down : study.texts.no_code;
 }
 
 const study = await getStudy();
@@ -24,8 +26,9 @@ const form = element(
       event.preventDefault();
       status("");
       try {
-        if (await withdraw(code.value)) show([heading(study.texts.withdrawn)]);
-        else status(study.texts.no_code, true);
+        const why = await withdraw(code.value);
+        if (why) status(why, true);
+        else show([heading(study.texts.withdrawn)]);
       } catch {
         status(study.texts.waiting, true);
       }

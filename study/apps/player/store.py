@@ -19,12 +19,11 @@ from study.experiment.responses import (
     Responses,
     SessionRecord,
     begin_session,
+    event_counts,
     find_session,
-    has_event,
     record_answer,
     record_event,
     record_form,
-    steps_passed,
     stored_answers,
 )
 from study.experiment.session import Answer
@@ -63,7 +62,8 @@ class ResponsesStore:
         if record is None:
             return (), (), False
         answers = stored_answers(self._responses, record.id)
-        return answers, steps_passed(self._responses, record), has_event(self._responses, record, "finished")
+        happened = event_counts(self._responses, record)
+        return answers, tuple(happened.keys() & {"consent", "form"}), "finished" in happened
 
     def begin(self) -> None:
         """Write the session down, or take up the one that there is, with the events that waited for it."""

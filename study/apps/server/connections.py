@@ -1,7 +1,8 @@
 """Connections: uvicorn's HTTP protocol with patience that ends. Bytes of one client come in, whole requests go on.
 
 A client that opens connections and sends nothing, or a request byte by byte, would hold them for ever; one that sends
-endless headers would fill the memory. uvicorn with httptools sets no bounds to either, so they are set here.
+endless headers, or many bodies by half, would fill the memory. uvicorn with httptools sets no bounds to any of this;
+they are set here.
 """
 
 from __future__ import annotations
@@ -20,6 +21,12 @@ keeps idle connections, and ends those that uvicorn closes but which never end, 
 
 LARGEST_HEAD = 32_768
 """Bytes of a request line and its headers."""
+
+MOST_BODIES = 32_000_000
+"""Bytes of all bodies whose requests have no reply yet; beyond it the oldest is let go, and its page sends again."""
+
+_bodies: dict[Connection, int] = {}
+"""Bytes of the bodies of this process that have no reply yet, the oldest first."""
 
 
 class _Joined:
@@ -50,13 +57,17 @@ class _Joined:
 
 
 class Connection(HttpToolsProtocol):
-    """One connection; ended where a request or the taking of its reply lasts too long, or its headers are endless."""
+    """One connection; ended where a request or the taking of its reply lasts too long, or a request is too large.
+
+    `_head` counts the bytes of the request line and of whole headers; `_beside` all bytes of a request that are not of
+    its body, as those of a header that never ends.
+    """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._deadline: asyncio.TimerHandle | None = None
-        self._head_bytes = 0
-        self._head_whole = False
+        self._head = self._beside = self._body = self._requests = 0
+        self._whole = True
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Somebody is there; a request has to follow."""
@@ -66,30 +77,72 @@ class Connection(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Nobody is there any more."""
         self._within(None)
+        _bodies.pop(self, None)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Bytes arrived; those of a head are counted until it is whole."""
+        """Bytes arrived."""
+        self._requests, before = (0, 0) if self._whole else (1, self._body)
         super().data_received(data)
-        self._head_bytes = 0 if self._head_whole else self._head_bytes + len(data)
-        if self._head_bytes > LARGEST_HEAD and not self.transport.is_closing():
-            self.send_400_response(f"Expected at most {LARGEST_HEAD} bytes of headers.")
+        # Bytes that belong to several requests are mostly of those that are whole, and taken.
+        if self._requests == 1:
+            self._beside += len(data) - (self._body - before)
+        # What frames the pieces of a chunked body counts as well, of which there may be as much as of the body.
+        if not self._whole and self._beside > LARGEST_HEAD + 8 * self._body and not self.transport.is_closing():
+            self.send_400_response("")
 
     def on_message_begin(self) -> None:
         """The first byte of a request."""
         super().on_message_begin()
-        self._head_whole = False
+        self._head = self._beside = self._body = 0
+        self._requests += 1
+        self._whole = False
         self._within(REQUEST_SECONDS)
 
-    def on_headers_complete(self) -> None:
-        """The head is whole."""
-        self._head_whole = True
-        super().on_headers_complete()
+    def on_url(self, url: bytes) -> None:
+        """A part of the address."""
+        self._count(len(url))
+        super().on_url(url)
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """A header; those after a body come here, too."""
+        self._count(len(name) + len(value) + len(": \r\n"))
+        super().on_header(name, value)
+
+    def _count(self, length: int) -> None:
+        self._head += length
+        if self._head > LARGEST_HEAD:
+            raise ValueError("too large")  # ends the parsing; uvicorn then calls `send_400_response`
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what is no request, or too large a one."""
+        large = max(self._head, self._beside) > LARGEST_HEAD
+        super().send_400_response(f"Expected at most {LARGEST_HEAD} bytes of headers." if large else msg)
+
+    def on_body(self, body: bytes) -> None:
+        """A part of a body; of one that has its reply already, as one that was refused, nothing is kept."""
+        self._body += len(body)
+        super().on_body(body)
+        if self.cycle.response_complete:
+            return
+        _bodies[self] = _bodies.get(self, 0) + len(body)
+        if sum(_bodies.values()) > MOST_BODIES:
+            oldest = next(iter(_bodies))
+            del _bodies[oldest]
+            oldest.transport.abort()
 
     def on_message_complete(self) -> None:
         """The request is whole; now the reply has to be made and taken. Idle connections uvicorn ends before that."""
+        self._whole = True
         super().on_message_complete()
         self._within(REPLY_SECONDS)
+
+    def on_response_complete(self) -> None:
+        """The reply is made; what was sent of a body is of no use any more."""
+        _bodies.pop(self, None)
+        if self.cycle.response_complete:
+            self.cycle.body.clear()
+        super().on_response_complete()
 
     def _within(self, seconds: float | None) -> None:
         if self._deadline is not None:

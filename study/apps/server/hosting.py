@@ -15,12 +15,14 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
 
 from study.apps.server import views
+from study.apps.server.films import Film, whole_bytes
+from study.apps.server.limits import Guesses
+from study.apps.server.links import VISIT, filled_in
 from study.apps.server.messages import Answered, Begin, Done, Happened, Shown
 from study.apps.server.settings import Settings
 from study.apps.server.writer import Writer
@@ -37,11 +39,10 @@ from study.experiment.responses import (
     Responses,
     SessionRecord,
     answer_rows,
+    event_counts,
     event_row,
-    has_event,
     record_form,
     session_by_id,
-    steps_passed,
     stored_answers,
 )
 from study.experiment.session import Answer, Session, Step
@@ -49,11 +50,12 @@ from study.experiment.session import Answer, Session, Step
 TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
 
-GONE_SECONDS = 3600.0
-"""A sitting that was not heard of for so long is kept in the database alone, and taken up from there."""
+GONE_SECONDS = 300.0
+"""A sitting that was not heard of for so long is kept in the database alone, and taken up from there; one whose page was
+closed, after the time of a tab."""
 
 MOST_EVENTS = 2000
-"""Events that are stored of one session; a page that goes wrong can't fill the disk."""
+"""So much of what a page tells, or causes by opening over and over, is stored of a session: it can't fill the disk."""
 
 TELL_EVERY_SECONDS = 10.0
 """How often it is logged that the database is away."""
@@ -75,7 +77,14 @@ class Sitting:
     page: str = ""
     page_seen: float = field(default_factory=time.monotonic)
     events: int = 0
+    finished: bool = False
     shown_trial: tuple[int, int] | None = None
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether somebody is there who is not done yet."""
+        silent_s = time.monotonic() - self.page_seen
+        return silent_s < (GONE_SECONDS if self.page else TAB_SECONDS) and flow.current(self.state).kind != "done"
 
 
 class Host:
@@ -86,12 +95,12 @@ class Host:
         self.writer = Writer(responses.engine)
         self.cookie = f"segue-{protocol.sha256[:8]}"
         """Its name: browsers keep one for all ports of a machine, where two studies may be served."""
-        self.films = {
-            record.id: {"frames": record.frames, "bytes": int(manifest.videos.get(record.id, {}).get("bytes", 0))}
-            for record in manifest.records
-        }
+        self.frames = {record.id: record.frames for record in manifest.records}
+        self.film_bytes = whole_bytes(int(video.get("bytes", 0)) for video in manifest.videos.values())
         groups = settings.groups or groups_of(protocol, manifest.pairs)
         self.places = people.Places(groups, settings.most_participants, settings.dropped_after)
+        self.clock = people.steady_clock()
+        self.guesses = Guesses()
         self.sittings: dict[str, Sitting] = {}
         self.recent: set[int] = set()
         self.questions: dict[int, int] = {}
@@ -116,19 +125,24 @@ class Host:
             self.sittings.setdefault(key, found)
         return self.sittings[key]
 
+    def live(self, token: str) -> Sitting | None:
+        """The sitting of a token, where it is in memory."""
+        return self.sittings.get(people.hashed(token))
+
     def _load(self, participant: Participant) -> Sitting:
         record = session_by_id(self.responses, participant.session_id)
         before = stored_answers(self.responses, record.id)
-        passed = steps_passed(self.responses, record)
+        happened = event_counts(self.responses, record)
         frames = {known.id: known.frames for known in self.manifest.records}
-        state = views.to_view(flow.open_session(self.protocol, record.plan, before, passed=passed, frames=frames))
-        return Sitting(record, participant, state, {(a.trial, a.item, a.attempt): a for a in before})
+        state = views.to_view(flow.open_session(self.protocol, record.plan, before, passed=happened, frames=frames))
+        answers = {(a.trial, a.item, a.attempt): a for a in before}
+        total, finished = sum(happened.values()), "finished" in happened
+        return Sitting(record, participant, state, answers, events=total, finished=finished)
 
     async def begin(self, token: str, message: Begin) -> tuple[dict[str, Any], str]:
         """A page was opened: the view that it shows, and the token that its cookie should hold."""
-        parameters = {
-            name: value for name, value in message.parameters.items() if name in self.settings.parameters and value
-        }
+        kept = {name: value for name, value in message.parameters.items() if name in self.settings.parameters}
+        parameters, unfilled = filled_in(kept, (*self.settings.identifying, VISIT))
         sitting = await self.sitting(token) if token else None
         if sitting is not None and self._is_another(sitting, parameters):
             sitting = None
@@ -138,13 +152,15 @@ class Host:
             if isinstance(found, dict):
                 return found, ""
             sitting = found
+            if unfilled:
+                await self._page_event(sitting, "fault", {"what": "link not filled in", **unfilled})
         async with sitting.lock:
             if not self._take_tab(sitting, message.page, message.previous, message.force):
                 return {"kind": "elsewhere"}, token
             if sitting.shown_trial is not None:
                 trial, attempt = sitting.shown_trial
-                await self.note(sitting, "interrupted", {"trial": trial, "attempt": attempt})
-            await self.note(sitting, "display", message.display.model_dump(mode="json"))
+                await self._page_event(sitting, "interrupted", {"trial": trial, "attempt": attempt})
+            await self._page_event(sitting, "display", message.display.model_dump(mode="json"))
             return {**await self._view(sitting), "session": views.session_name(sitting.participant)}, token
 
     def _is_another(self, sitting: Sitting, parameters: Mapping[str, str]) -> bool:
@@ -159,7 +175,7 @@ class Host:
         known = await asyncio.to_thread(people.find_by_parameters, self.responses, who) if who else None
         if known is not None:
             # An identifier alone may be guessed; the recruiting service's number of this visit may not.
-            if not parameters.get("SESSION_ID") or parameters != dict(known.parameters):
+            if not parameters.get(VISIT) or parameters != dict(known.parameters):
                 return {"kind": "taken"}, ""
             self._forget(known.session_id)
             await asyncio.to_thread(people.give_token, self.responses, known, token)
@@ -184,6 +200,7 @@ class Host:
             lambda group: draw_plan(self.protocol, self.manifest.pairs, newcomer.name, group=group),
             library=self.manifest.library,
             library_synthetic=self.manifest.synthetic,
+            heard_clock=self.clock,
         )
 
     def _forget(self, session_id: int) -> None:
@@ -233,8 +250,8 @@ class Host:
                 await asyncio.to_thread(record_form, self.responses, sitting.record, values)
             else:
                 state = flow.advanced(sitting.state)
-                if step.kind == "consent":
-                    await self.note(sitting, "consent")
+                if step.kind in ("consent", "debrief"):
+                    await self._note(sitting, step.kind)
             sitting.state = views.to_view(state)
             return await self._view(sitting)
 
@@ -293,7 +310,7 @@ class Host:
             place=shown.place,
             stimulus=stimulus,
             method=shown.method,
-            frames_expected=self.films.get(stimulus, {}).get("frames"),
+            frames_expected=self.frames.get(stimulus),
             frames_presented=shown.frames_presented,
             longest_gap_frames=shown.longest_gap_frames,
             shown_well=shown.shown_well,
@@ -302,12 +319,15 @@ class Host:
 
     async def happened(self, sitting: Sitting, message: Happened) -> None:
         """Something besides answers, told by the page."""
-        await self.note(sitting, message.kind, message.detail)
+        await self._page_event(sitting, message.kind, message.detail)
 
-    async def note(self, sitting: Sitting, kind: str, detail: Mapping[str, Any] | None = None) -> None:
+    async def _page_event(self, sitting: Sitting, kind: str, detail: Mapping[str, Any]) -> None:
+        """Store what a page told or caused, unless it was too much already."""
+        if sitting.events < MOST_EVENTS:
+            await self._note(sitting, kind, detail)
+
+    async def _note(self, sitting: Sitting, kind: str, detail: Mapping[str, Any] | None = None) -> None:
         """Store an event of a session."""
-        if sitting.events >= MOST_EVENTS:
-            return
         sitting.events += 1
         await self.writer.put([event_row(sitting.record, kind, detail, datetime.now(UTC))])
 
@@ -315,18 +335,22 @@ class Host:
 
     async def _view(self, sitting: Sitting) -> dict[str, Any]:
         step = flow.current(sitting.state)
-        view = views.view(sitting.state, sitting.participant, self.films)
+        view = views.view(sitting.state, sitting.participant, self.film_bytes)
         sitting.shown_trial = (step.trial, step.attempt) if step.kind == "first" else None
         if step.kind in ("debrief", "done"):
+            # All is answered: who closes the page over the debriefing has finished, too.
+            if not sitting.finished:
+                await self._note(sitting, "finished")
+                sitting.finished = True
             view["withdrawal_code"] = sitting.participant.withdrawal_code
         if step.kind == "done":
-            if not await asyncio.to_thread(has_event, self.responses, sitting.record, "finished"):
-                await self.note(sitting, "finished")
             view |= {"completion_code": self.settings.completion_code, "completion_url": self.settings.completion_url}
+            # Nothing more will change: the memory is for those who are in progress.
+            self._forget(sitting.record.id)
         return view
 
-    async def film(self, sitting: Sitting, name: str) -> Path | None:
-        """The file of a film that a participant may load now; a damaged one is a fault that is noted."""
+    async def film(self, sitting: Sitting, name: str) -> Film | None:
+        """A film that a participant may load now; a damaged one is a fault that is noted."""
         step = self._film_step(sitting, name)
         if step is None:
             return None
@@ -338,10 +362,10 @@ class Host:
             size = None
         if size is None or size != video["bytes"]:
             detail = {"what": "film damaged", "stimulus": step.stimulus, "bytes": size, "expected": video.get("bytes")}
-            await self.note(sitting, "fault", detail)
+            await self._page_event(sitting, "fault", detail)
             # Which one it is stands in the event: a page must not learn it.
             raise SessionError("Expected the film whole, found it damaged; the researcher has to render again.")
-        return path
+        return Film(path, name, size, self.frames[step.stimulus], self.film_bytes)
 
     def _film_step(self, sitting: Sitting, name: str) -> Step | None:
         for step in views.films_due(sitting.state):
@@ -357,15 +381,17 @@ class Host:
         return session_id is not None
 
     async def note_who_is_here(self) -> None:
-        """Store who was heard of, so that drop-outs can be told apart; let go of those who are long gone."""
-        gone = time.monotonic() - GONE_SECONDS
-        self.sittings = {k: one for k, one in self.sittings.items() if one.lock.locked() or one.page_seen > gone}
+        """Store who was heard of, so that drop-outs can be told apart; let go of those who are gone or done."""
+        self.sittings = {key: one for key, one in self.sittings.items() if one.lock.locked() or one.is_under_way}
         recent, self.recent = self.recent, set()
         try:
-            await asyncio.to_thread(people.seen, self.responses, recent)
+            await asyncio.to_thread(people.seen, self.responses, recent, clock=self.clock)
         except AWAY as error:
             self.recent |= recent
             self.database_away(error)
+        except BaseException:
+            self.recent |= recent
+            raise
 
     def database_away(self, error: Exception) -> None:
         """Log it, but not for each of the messages that meet it."""

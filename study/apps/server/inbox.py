@@ -4,11 +4,13 @@ Answers of many participants arrive at one instant, so this is ASGI without a fr
 up, a body read, a message checked, a reply sent. All else goes on to the application behind.
 
 A participant is known by a cookie that scripts can't read. A message needs a header that no form of another site can
-send, and comes from this site's pages.
+send, and comes from this site's pages. Who sends it is looked up before its body is read, and each kind of message may
+be as long as it needs.
 """
 
 from __future__ import annotations
 
+import ipaddress
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -23,6 +25,19 @@ from study.errors import SegueError
 from study.experiment.databases import AWAY
 
 COOKIE_SECONDS = 14 * 24 * 3600
+
+LARGEST_ANSWER = 1_000_000
+"""Bytes; the frame times of a pair of ten seconds at 240 frames a second are 60,000."""
+
+LARGEST_MESSAGE = 32_000
+"""Bytes of messages without frame times; what a form may hold is added to it."""
+
+LARGEST_FIELD = 6_200
+"""Bytes of one field of the form: a thousand characters, as JSON may write them."""
+
+SMALLEST_MESSAGE = 1_000
+"""Bytes of messages that say hardly anything."""
+
 DATABASE_AWAY = "The database can't be reached now; send this again."
 
 log = logging.getLogger("segue.serve")
@@ -38,11 +53,11 @@ class RefusedError(Exception):
 
 @dataclass(frozen=True)
 class Letter:
-    """A message as it arrived: the address that it was sent to, its headers, its body."""
+    """A message as it arrives: the address that it was sent to, its headers; its body is still to be read."""
 
     scope: Scope
     headers: dict[bytes, bytes]
-    body: bytes
+    receive: Receive
 
     @property
     def page(self) -> str:
@@ -52,6 +67,28 @@ class Letter:
     def cookie(self, name: str) -> str:
         """The cookie of a name, or nothing."""
         return cookie(self.headers.get(b"cookie", b""), name)
+
+    @property
+    def client(self) -> str:
+        """The address that it came from; of IPv6 the network, in which one machine has as many as it likes."""
+        host = (self.scope.get("client") or ("",))[0]
+        return str(ipaddress.ip_network((host, 64), strict=False)) if ":" in host else str(host)
+
+    async def body(self, largest: int) -> bytes:
+        """What it says; refused as soon as it is longer than that, at best before anything is read."""
+        length = self.headers.get(b"content-length", b"0")
+        if len(length) > 12 or not length.isdigit() or int(length) > largest:
+            raise RefusedError(413, f"Expected at most {largest} bytes.")
+        body, more = bytearray(), True
+        while more:
+            part = await self.receive()
+            if part["type"] == "http.disconnect":
+                raise RefusedError(400, "Expected the whole message; the connection ended before.")
+            body += part.get("body", b"")
+            more = part.get("more_body", False)
+            if len(body) > largest:
+                raise RefusedError(413, f"Expected at most {largest} bytes.")
+        return bytes(body)
 
 
 @dataclass(frozen=True)
@@ -68,54 +105,61 @@ Handler = Callable[[Host, Letter], Awaitable[Reply]]
 async def begin(host: Host, letter: Letter) -> Reply:
     """A page was opened."""
     _of_our_pages(letter)
-    message: Begin = read(Begin, letter.body)
+    message: Begin = read(Begin, await letter.body(LARGEST_MESSAGE))
     view, token = await host.begin(letter.cookie(host.cookie), message)
     return Reply(view, token or None)
 
 
 async def done(host: Host, letter: Letter) -> Reply:
     """A page was read."""
-    sitting = await _sitting(host, letter)
-    message: Done = read(Done, letter.body)
+    largest = LARGEST_MESSAGE + LARGEST_FIELD * len(host.protocol.form)
+    sitting, body = await _from_participant(host, letter, largest)
+    message: Done = read(Done, body)
     view = await host.done(sitting, message)
     return Reply(view, "" if view["kind"] == "declined" else None)
 
 
 async def answer(host: Host, letter: Letter) -> Reply:
     """A question was answered."""
-    sitting = await _sitting(host, letter)
-    message: Answered = read(Answered, letter.body)
+    sitting, body = await _from_participant(host, letter, LARGEST_ANSWER)
+    message: Answered = read(Answered, body)
     return Reply(await host.answer(sitting, message))
 
 
 async def happened(host: Host, letter: Letter) -> Reply:
     """Something besides answers."""
-    sitting = await _sitting(host, letter)
-    message: Happened = read(Happened, letter.body)
+    sitting, body = await _from_participant(host, letter, LARGEST_MESSAGE)
+    message: Happened = read(Happened, body)
     await host.happened(sitting, message)
     return Reply({})
 
 
 async def alive(host: Host, letter: Letter) -> Reply:
     """The page is still there."""
-    await _sitting(host, letter)
+    await _from_participant(host, letter, SMALLEST_MESSAGE)
     return Reply({})
 
 
 async def leave(host: Host, letter: Letter) -> Reply:
     """The page was closed. A beacon can't carry our header: the page's name is the body, and it can only let go."""
     _same_origin(letter)
-    sitting = await host.sitting(letter.cookie(host.cookie))
+    sitting = host.live(letter.cookie(host.cookie))
     if sitting is not None:
-        host.leave(sitting, letter.body[:64].decode("latin-1"))
+        host.leave(sitting, (await letter.body(SMALLEST_MESSAGE)).decode("latin-1"))
     return Reply({})
 
 
 async def withdraw(host: Host, letter: Letter) -> Reply:
     """A withdrawal code."""
     _of_our_pages(letter)
-    message: Withdrawal = read(Withdrawal, letter.body)
-    return Reply({"withdrawn": await host.withdraw(message.code)})
+    message: Withdrawal = read(Withdrawal, await letter.body(SMALLEST_MESSAGE))
+    # Counted before it is looked up: guesses that are sent together are as slow as others.
+    if not host.guesses.take(letter.client):
+        raise RefusedError(429, "Expected fewer tries; wait a minute.")
+    withdrawn = await host.withdraw(message.code)
+    if withdrawn:
+        host.guesses.give_back(letter.client)
+    return Reply({"withdrawn": withdrawn})
 
 
 HANDLERS: dict[str, Handler] = {
@@ -147,7 +191,7 @@ class Inbox:
         try:
             if scope["method"] != "POST":
                 raise RefusedError(405, "Expected a message sent by POST.")
-            return 200, await handler(self.host, Letter(scope, dict(scope["headers"]), await _body(receive)))
+            return 200, await handler(self.host, Letter(scope, dict(scope["headers"]), receive))
         except RefusedError as refusal:
             return refusal.status, Reply({"error": refusal.why})
         except SegueError as refusal:
@@ -156,17 +200,6 @@ class Inbox:
         except AWAY as error:
             self.host.database_away(error)
             return 503, Reply({"error": DATABASE_AWAY})
-
-
-async def _body(receive: Receive) -> bytes:
-    message = await receive()
-    body: bytes = message.get("body", b"")
-    while message.get("more_body"):
-        message = await receive()
-        body += message.get("body", b"")
-    if message["type"] == "http.disconnect":
-        raise RefusedError(400, "Expected the whole message; the connection ended before.")
-    return body
 
 
 def _same_origin(letter: Letter) -> None:
@@ -182,15 +215,16 @@ def _of_our_pages(letter: Letter) -> None:
         raise RefusedError(403, "Expected a message of this site's own pages.")
 
 
-async def _sitting(host: Host, letter: Letter) -> Sitting:
-    """The sitting of the participant whose page this is."""
+async def _from_participant(host: Host, letter: Letter, largest: int) -> tuple[Sitting, bytes]:
+    """The sitting of the participant whose page this is, and what the page says."""
     _of_our_pages(letter)
     sitting = await host.sitting(letter.cookie(host.cookie))
     if sitting is None:
         raise RefusedError(401, "Expected a participant of this study; open the link again.")
+    body = await letter.body(largest)
     if not host.has_tab(sitting, letter.page):
         raise RefusedError(409, "This session is open in another tab.")
-    return sitting
+    return sitting, body
 
 
 def cookie(header: bytes, name: str) -> str:

@@ -1,19 +1,22 @@
-"""Limits: what every request and every response goes through. Pure ASGI, so that it costs next to nothing.
+"""Limits: what every response carries, and how often somebody may guess. Pure ASGI, so that it costs next to nothing.
 
-Requests above a size are refused before they are read; every response carries a strict content security policy, and
-nothing is kept by caches. All scripts, styles and films come from this server; nothing is loaded from elsewhere.
+Every response carries a strict content security policy, and nothing is kept by caches. All scripts, styles and films
+come from this server; nothing is loaded from elsewhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 
-from starlette.exceptions import HTTPException
-from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-LARGEST_REQUEST = 1_000_000
-"""Bytes; the frame times of a pair of ten seconds at 240 frames a second are 60,000."""
+GUESSES_AT_ONCE = 10
+SECONDS_A_GUESS = 6.0
+"""Of codes that nobody has, an address may send so many at once, and then one in this time."""
+
+MOST_GUESSERS = 5000
+"""Addresses that are remembered; where more guess within a minute, further ones have to wait."""
 
 _POLICY = "; ".join(
     (
@@ -41,51 +44,21 @@ HEADERS: tuple[tuple[bytes, bytes], ...] = (
 )
 
 
-class RequestTooLargeError(HTTPException):
-    """A request that is longer than it says, or than is taken; inside the application it becomes status 413."""
-
-    def __init__(self, largest: int) -> None:
-        super().__init__(413, f"Expected at most {largest} bytes.")
-
-
 class Limits:
-    """Wraps an application: request size, security headers."""
+    """Wraps an application: every response gets the security headers."""
 
-    def __init__(self, app: ASGIApp, largest_request: int = LARGEST_REQUEST) -> None:
-        self.app, self.largest = app, largest_request
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        begun = False
 
         async def send_with_headers(message: Message) -> None:
-            nonlocal begun
             if message["type"] == "http.response.start":
-                begun = True
                 message = {**message, "headers": _joined(message["headers"])}
             await send(message)
 
-        taken = 0
-
-        async def receive_limited() -> Message:
-            nonlocal taken
-            message = await receive()
-            taken += len(message.get("body", b""))
-            if taken > self.largest:
-                raise RequestTooLargeError(self.largest)
-            return message
-
-        try:
-            if _length(scope["headers"]) > self.largest:
-                raise RequestTooLargeError(self.largest)
-            await self.app(scope, receive_limited, send_with_headers)
-        except RequestTooLargeError as refusal:
-            if not begun:
-                response = JSONResponse({"error": refusal.detail}, status_code=413)
-                await response(scope, receive, send_with_headers)
+        await self.app(scope, receive, send_with_headers)
 
 
 def _joined(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
@@ -94,8 +67,25 @@ def _joined(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]
     return own + [(name, value) for name, value in HEADERS if name not in there]
 
 
-def _length(headers: Iterable[tuple[bytes, bytes]]) -> int:
-    for name, value in headers:
-        if name == b"content-length":
-            return int(value) if value.isdigit() else LARGEST_REQUEST + 1
-    return 0
+class Guesses:
+    """Counts the guesses of each address: some at once, and then slowly."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._spent: dict[str, float] = {}  # when an address will have as many guesses as at first
+
+    def take(self, address: str) -> bool:
+        """Whether an address may guess now; it has then, until it is `given_back`."""
+        now = self._clock()
+        if len(self._spent) >= MOST_GUESSERS:
+            self._spent = {other: end for other, end in self._spent.items() if end > now}
+        end = max(now, self._spent.get(address, now)) + SECONDS_A_GUESS
+        known = address in self._spent or len(self._spent) < MOST_GUESSERS
+        if not known or end > now + GUESSES_AT_ONCE * SECONDS_A_GUESS:
+            return False
+        self._spent[address] = end
+        return True
+
+    def give_back(self, address: str) -> None:
+        """It was no guess: the code was right."""
+        self._spent[address] = self._spent.get(address, 0.0) - SECONDS_A_GUESS

@@ -8,7 +8,7 @@ import io
 import json
 import secrets
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
@@ -34,15 +34,19 @@ def researcher_routes(host: Host, guarded: Callable[[Handler], Handler]) -> list
 
     def behind_token(handler: Handler) -> Handler:
         async def run(request: Request) -> Response:
-            given = request.headers.get("authorization", "").removeprefix("Bearer ")
-            if not secrets.compare_digest(given.encode(), host.settings.researcher_token.encode()):
-                return JSONResponse({"error": "Expected the researcher's token."}, status_code=401)
+            scheme, _, given = request.headers.get("authorization", "").partition(" ")
+            right = secrets.compare_digest(given.encode(), host.settings.researcher_token.encode())
+            if not (right and scheme.lower() == "bearer"):
+                why = {"error": "Expected the researcher's token, as Authorization: Bearer TOKEN."}
+                return JSONResponse(why, status_code=401, headers={"www-authenticate": "Bearer"})
             return await handler(request)
 
         return guarded(run)
 
     async def overview(_: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(_overview, host))
+        # Taken here: in a thread, participants who arrive would change it while it is gone through.
+        live = {sitting.record.id: sitting for sitting in host.sittings.values()}
+        return JSONResponse(await asyncio.to_thread(_overview, host, live))
 
     async def table(request: Request) -> Response:
         name = request.path_params["name"]
@@ -58,10 +62,9 @@ def researcher_routes(host: Host, guarded: Callable[[Handler], Handler]) -> list
     ]
 
 
-def _overview(host: Host) -> dict[str, Any]:
-    now = datetime.now(UTC)
+def _overview(host: Host, live: Mapping[int, Sitting]) -> dict[str, Any]:
+    now = host.clock()
     rows = people.overview(host.responses)
-    live = {sitting.record.id: sitting for sitting in host.sittings.values()}
     listed = [_listed(host, row, live.get(row["id"]), now) for row in rows]
     states = [row["state"] for row in listed]
     with host.responses.engine.connect() as connection:
@@ -78,7 +81,7 @@ def _overview(host: Host) -> dict[str, Any]:
         "counts": {state: states.count(state) for state in ("at it", "finished", "dropped out", "declined")},
         "withdrawn": withdrawn,
         "most_participants": host.settings.most_participants,
-        "groups": people.filled_groups(host.responses, host.places),
+        "groups": people.filled_groups(host.responses, host.places, clock=host.clock),
         "sessions": listed,
         "faults": [{"at": row[0].isoformat(), "participant": row[1], "detail": row[2]} for row in found],
         "tables": list(TABLES),

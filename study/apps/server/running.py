@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import uvicorn
@@ -12,6 +12,7 @@ from starlette.types import ASGIApp
 
 from study.apps.server.connections import Connection
 from study.apps.server.hosting import Host
+from study.apps.server.names import Named, own_names
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
@@ -34,6 +35,7 @@ def run(
     behind_proxy: bool = False,
     root_path: str = "",
     database: str | None = None,
+    public_urls: Sequence[str] = (),
     started: Callable[[str, str], object] | None = None,
 ) -> None:
     """Serve a results folder until the process is told to end; answers under way are committed first.
@@ -44,22 +46,26 @@ def run(
         Where a proxy shows the study, such as `/study`; it hands requests on without it.
     database
         Where answers go, instead of the folder's own `responses.sqlite`.
+    public_urls
+        The addresses that participants open where they are not this machine's own, as behind a proxy.
     started
         Told the address and the place of the answers, without a password, once participants can come.
 
     Raises
     ------
     SessionError
-        Where the address can't be listened at, or the database can't be opened or written to.
+        Where the address can't be listened at, a public address is none, or the database can't be opened or written to.
     """
+    names = own_names(host, public_urls)
     manifest = read_manifest(folder)
     listening = listen(host, port)
     name = f"[{host}]" if ":" in host else host
     with open_responses(database or folder) as responses:
         try_to_write(responses.engine, responses.place)
-        app = make_app(Host(protocol, manifest, responses, settings))
+        app = Named(make_app(Host(protocol, manifest, responses, settings)), names, protocol)
         if started:
-            started(f"http://{name}:{listening.getsockname()[1]}", responses.place)
+            address = public_urls[0].rstrip("/") if public_urls else f"http://{name}:{listening.getsockname()[1]}"
+            started(address, responses.place)
         serve(app, listening, behind_proxy=behind_proxy, root_path=root_path)
 
 

@@ -1,13 +1,13 @@
 """Views: what a page may know of a step. A sitting's state comes in, JSON goes out.
 
 A page learns which films to play and what to ask, and nothing of what an answer means: films have an address of their
-own in every trial (a keyed hash), so that even two showings of one stimulus don't look alike.
+own in every trial (a keyed hash) and all one size, so that even two showings of one stimulus can't be told before they
+are loaded.
 """
 
 from __future__ import annotations
 
 import hmac
-from collections.abc import Mapping
 from typing import Any
 
 from study.experiment import session as sitting
@@ -17,7 +17,6 @@ from study.experiment.session import Session, Step
 
 FILMS = "films"
 """Relative to the page, which a proxy may show under any path."""
-Films = Mapping[str, Mapping[str, int]]
 
 
 def session_name(participant: Participant) -> str:
@@ -66,13 +65,13 @@ def to_view(session: Session) -> Session:
     return session
 
 
-def view(session: Session, participant: Participant, films: Films) -> dict[str, Any]:
-    """What the page shows now; `films` has the frames and bytes of every stimulus."""
+def view(session: Session, participant: Participant, film_bytes: int) -> dict[str, Any]:
+    """What the page shows now; `film_bytes` is the size at which all films are sent."""
     step, protocol = sitting.current(session), session.protocol
     done, total = sitting.progress(session)
     shown: dict[str, Any] = {"kind": step.kind, "text": step.text, "progress": [done, total]}
     if step.kind == "first":
-        return {**shown, **_trial(session, participant, films), "kind": "trial"}
+        return {**shown, **_trial(session, participant, film_bytes), "kind": "trial"}
     if step.kind == "answer":
         # The films of this trial were shown; further questions about them follow.
         return {**shown, **_asking(session, step), "films": [], "gap_s": 0, "ahead": [], "kind": "trial"}
@@ -84,12 +83,12 @@ def view(session: Session, participant: Participant, films: Films) -> dict[str, 
     if step.kind == "instructions":
         study = protocol.study(step.study) if step.study else None
         shown["fps"] = protocol.fps
-        shown["example"] = _film(step, participant, films) if step.stimulus else None
+        shown["example"] = _film(step, participant, film_bytes) if step.stimulus else None
         shown["keys"] = _options(protocol, sitting.legal_answers(study)) if study and study.task != "rating" else []
     return shown
 
 
-def _trial(session: Session, participant: Participant, films: Films) -> dict[str, Any]:
+def _trial(session: Session, participant: Participant, film_bytes: int) -> dict[str, Any]:
     step = sitting.current(session)
     near = _near(session)
     own: list[Step] = []
@@ -99,9 +98,9 @@ def _trial(session: Session, participant: Participant, films: Films) -> dict[str
     question = next(other for other in own if other.kind == "answer")
     return {
         **_asking(session, question),
-        "films": [_film(other, participant, films) for other in own if other.kind in ("first", "second")],
+        "films": [_film(other, participant, film_bytes) for other in own if other.kind in ("first", "second")],
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
-        "ahead": [_film(other, participant, films) for other in ahead if other.kind in ("first", "second")],
+        "ahead": [_film(other, participant, film_bytes) for other in ahead if other.kind in ("first", "second")],
     }
 
 
@@ -117,9 +116,9 @@ def _asking(session: Session, step: Step) -> dict[str, Any]:
     }
 
 
-def _film(step: Step, participant: Participant, films: Films) -> dict[str, Any]:
+def _film(step: Step, participant: Participant, film_bytes: int) -> dict[str, Any]:
     place = "first" if step.kind == "instructions" else step.kind
-    return {"place": place, "url": f"{FILMS}/{film_name(participant, step)}.mp4", **films[step.stimulus]}
+    return {"place": place, "url": f"{FILMS}/{film_name(participant, step)}.mp4", "bytes": film_bytes}
 
 
 def _question(protocol: Protocol, step: Step) -> dict[str, Any]:

@@ -20,7 +20,6 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from study.apps.server.films import Film
 from study.apps.server.hosting import Host
 from study.apps.server.inbox import DATABASE_AWAY, Inbox, RefusedError, cookie
 from study.apps.server.limits import Limits
@@ -51,10 +50,10 @@ def make_app(host: Host) -> Limits:
 
     async def film(request: Request) -> Response:
         sitting = await host.sitting(cookie(request.headers.get("cookie", "").encode("latin-1"), host.cookie))
-        path = None if sitting is None else await host.film(sitting, request.path_params["name"])
-        if path is None:
+        found = None if sitting is None else await host.film(sitting, request.path_params["name"])
+        if found is None:
             raise RefusedError(404, "Expected a film of the trial that is shown now.")
-        return Film(path, request.path_params["name"])
+        return found
 
     guarded = partial(_guarded, host)
     routes = [
@@ -91,7 +90,10 @@ def _lifespan(host: Host) -> Callable[[Starlette], contextlib.AbstractAsyncConte
     async def note_for_ever() -> None:
         while True:
             await asyncio.sleep(HERE_EVERY_SECONDS)
-            await host.note_who_is_here()
+            try:
+                await host.note_who_is_here()
+            except Exception:
+                log.exception("Noting who is here failed; it is tried again in %g s.", HERE_EVERY_SECONDS)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
