@@ -133,7 +133,7 @@ DECIDED = "every answer went to the same place in the order of presentation: not
 def _why_no_order(design: FloatArray, yes: FloatArray, total: FloatArray) -> str:
     """Why the effect of the order, the last column, can't be estimated beside strengths; empty where it can."""
     if np.linalg.matrix_rank(design[total > 0]) < design.shape[1] - 1:
-        return "no two methods were shown in both orders: an effect of the order can't be told, and is left out"
+        return "the orders shown do not tell an effect of the order from the strengths: it is left out"
     if yes.sum() in (0.0, total.sum()):
         return DECIDED
     if not _finite(design, yes, total, np.eye(design.shape[1])[-1:])[0]:

@@ -143,6 +143,7 @@ def _by_motion(
                 "answers": int(counts.shown.sum()),
                 "percent_where_different": 100 * different / shown if shown else None,
                 "percent_where_same": _share(counts, ~moved),
+                "note": "" if moved.any() and not moved.all() else "pairs with a difference only, or without one",
                 "published": crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng),
                 "model": fitted if isinstance(fitted, ModelFit) else None,
                 "model_note": fitted.note if isinstance(fitted, ModelFit) else fitted,

@@ -158,11 +158,22 @@ def percent_different(answers: pd.DataFrame, confidence: float = 0.95) -> pd.Dat
                 "different": int(different),
                 "percent": 100 * float(share.mean()),
                 "standard_error": 100 * float(share.std(ddof=1)) / math.sqrt(len(share)) if len(share) > 1 else None,
+                "note": "" if len(share) > 1 else "one participant: no spread to judge by",
                 "low": 100 * interval.low if interval.low is not None else None,
                 "high": 100 * interval.high if interval.high is not None else None,
             }
         )
-    names = ["difference_frames", "participants", "answers", "different", "percent", "standard_error", "low", "high"]
+    names = [
+        "difference_frames",
+        "participants",
+        "answers",
+        "different",
+        "percent",
+        "standard_error",
+        "low",
+        "high",
+        "note",
+    ]
     return pd.DataFrame(rows, columns=names)
 
 

@@ -104,8 +104,7 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
         participants[column] = sessions["id"].map(said)
     asked = {column: Variable(f"Asked in the form: {label}") for column, label in labels.items()}
     tables = {"answers": ANSWERS, "presentations": PRESENTATIONS, "participants": {**PARTICIPANTS, **asked}}
-    safe = (safe_table(table) for table in (answers, presentations, participants))
-    return Shared(protocol, *safe, tables)
+    return Shared(protocol, safe_table(answers), safe_table(presentations), safe_table(participants), tables)
 
 
 def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) -> Path:

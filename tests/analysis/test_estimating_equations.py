@@ -51,6 +51,17 @@ def test_answers_all_alike_are_refused(answer: float) -> None:
         estimating_equations(design, np.full_like(yes, answer), who)
 
 
+def test_answers_less_alike_than_a_working_correlation_can_be() -> None:
+    """Each of four answers twice, once each way: the correlation is -1, which would divide by zero."""
+    who, yes = np.repeat(np.arange(4), 2), np.array([0.0, 1, 1, 0, 0, 1, 1, 1])
+    found = estimating_equations(np.ones((8, 1)), yes, who)
+    assert -1 < found.correlation < 0
+    assert found.values[0] == pytest.approx(np.log(5 / 3))
+    plain = estimating_equations(np.ones((4, 1)), np.array([1.0, 1, 1, 0]), np.arange(4))
+    assert plain.correlation == 0.0
+    assert np.isfinite(found.errors).all()
+
+
 def test_participants_who_never_waver_count_as_one_answer_each() -> None:
     """Every participant gives one answer throughout: six times as many answers say no more."""
     who = np.repeat(np.arange(8), 6)

@@ -49,6 +49,71 @@ def test_methods_that_never_lose_have_no_finite_strength() -> None:
     assert "a" in always.note
 
 
+def separated(rng: np.random.Generator) -> tuple[list[str], list[str], np.ndarray]:
+    """Few answers to pairs of four methods, mostly one-sided."""
+    names, count = "abcd", int(rng.integers(6, 14))
+    pairs = [rng.choice(4, 2, replace=False) for _ in range(count)]
+    favoured = np.array([float((one < other) if rng.random() < 0.8 else rng.integers(2)) for one, other in pairs])
+    return [names[one] for one, _ in pairs], [names[other] for _, other in pairs], favoured
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_strengths_are_finite_where_chains_of_answers_lead_both_ways(seed: int) -> None:
+    """Ford 1957: two strengths are finitely apart exactly where each method was favoured along a chain to the other."""
+    first, second, favoured = separated(np.random.default_rng([seed, 7]))
+    reach = {(name, name) for name in {*first, *second}}
+    reach |= {(a, b) if won else (b, a) for a, b, won in zip(first, second, favoured, strict=True)}
+    for middle in "abcd":
+        reach |= {(a, c) for a, b in reach for other, c in reach if b == other == middle}
+    for reference in {*first, *second}:
+        found = fit_bradley_terry(first, second, favoured, np.ones(len(first)), with_order=False, reference=reference)
+        if isinstance(found, str):
+            assert "not linked" in found
+            continue
+        for row in found.strengths:
+            both = (row.method, reference) in reach and (reference, row.method) in reach
+            assert (row.value is not None) == both, (reference, row.method)
+
+
+def test_the_finite_strengths_are_those_of_the_others_alone() -> None:
+    """Beside a method that never loses the others have the strengths that they have without it, by statsmodels too."""
+    import statsmodels.api as sm
+
+    rng = np.random.default_rng(8)
+    rows = [(a, b, float(rng.random() < chance)) for a, b, chance in (("b", "c", 0.6), ("c", "d", 0.6), ("d", "b", 0.4))
+            for _ in range(30)]  # fmt: skip
+    alone = [list(part) for part in zip(*rows, strict=True)]
+    every = [list(part) for part in zip(*rows, *(("a", other, 1.0) for other in "bcd" for _ in range(9)), strict=True)]
+    found, expected = (
+        fit_bradley_terry(first, second, favoured, np.ones(len(first)), with_order=False)
+        for first, second, favoured in (every, alone)
+    )
+    assert isinstance(found, BradleyTerry)
+    assert isinstance(expected, BradleyTerry)
+    assert found.reference == expected.reference == "b"
+    design = np.array([[(a == name) - (b == name) for name in "cd"] for a, b, _ in rows], dtype=float)
+    theirs = sm.Logit(np.array(alone[2]), design).fit(disp=0)
+    for name, value, error in zip("cd", theirs.params, theirs.bse, strict=True):
+        for fit in (found, expected):
+            one = next(row for row in fit.strengths if row.method == name)
+            assert one.value == pytest.approx(value, abs=1e-4)
+            assert one.standard_error == pytest.approx(error, rel=1e-3)
+    assert found.strengths[0].method == "a"
+    assert found.strengths[0].value is None
+    assert (
+        found.note == "a: the answers for or against it all go one way, so its distance from b has no finite estimate"
+    )
+
+
+def test_an_order_that_can_not_be_told_is_left_out() -> None:
+    never = fit_bradley_terry(list("ab"), list("bc"), [6, 7], [10] * 2)
+    assert isinstance(never, BradleyTerry)
+    assert never.order is None
+    assert "the orders shown do not tell" in never.note
+    decided = fit_bradley_terry(list("abacbc"), list("bacacb"), [10] * 6, [10] * 6)
+    assert "every answer went to the same place in the order of presentation" in str(decided)
+
+
 def test_unlinked_methods_are_said() -> None:
     assert "not linked" in str(fit_bradley_terry(list("ac"), list("bd"), [5, 5], [10, 10], with_order=False))
     assert "fewer than two" in str(fit_bradley_terry([], [], [], []))
