@@ -304,7 +304,8 @@ def demo(out: Path | None, workers: int | None, participants: int, as_json: bool
     lines = [
         f"{counted(rendered['videos'], 'stimulus video')} ({counted(rendered['frames'], 'frame')}) in "
         f"{folder / 'stimuli'}",
-        f"{simulated['answers'] + simulated['found']} answers of {counted(participants, 'simulated participant')} "
+        f"{counted(simulated['answers'] + simulated['found'], 'answer')} of "
+        f"{counted(participants, 'simulated participant')} "
         f"in {folder / 'responses.sqlite'}",
         *headlines(analysis),
         f"The report: {page.resolve()}",

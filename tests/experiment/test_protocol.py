@@ -30,6 +30,40 @@ def test_the_exact_text_and_its_hash_are_kept(tmp_path):
     assert protocol.path == path
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('task = "preference"', 'task = "preferance"', r"studies\[1\].task: expected .* did you mean 'preference'\?"),
+        ('category = "walking"', 'categroy = "walking"', r"transitions\[0\].categroy: unknown key; did you mean 'cat"),
+        ("seed = 7", "sed = 7", r"sed: unknown key; did you mean 'seed'\?"),
+        ("fps = 30", 'fps = 30\nlanguage = 3\nform = [{ name = "age" }]', r"language: expected text in quotes"),
+        ("fps = 30", 'fps = 30\nlanguage = "english"', r"language: expected a language such as en, de or pt-BR, found"),
+        ("[points]", '[keys]\nsame = "ss"\n[points]', r"keys.same: expected one small letter or digit, found 'ss'"),
+        ("[points]", "[points]\nsource_within = [0.1]", r"points.source_within: expected more than 1 entry; add one"),
+        (
+            "[points]",
+            "[points]\nsource_within = [0.1, 0.2, 1]",
+            r"points.source_within: expected at most 2 entries, fou",
+        ),
+    ],
+)
+def test_one_bad_key_is_the_only_thing_that_is_said(old, new, said):
+    found = refused(old, new)
+    assert len(found.splitlines()) == 1, found
+    assert re.search(said, found), found
+
+
+def test_a_mistake_in_the_only_study_does_not_make_it_missing():
+    head, _, _ = GOOD.partition("[[studies]]")
+    one = head + '[[studies]]\nname = "x"\ntask = "preferance"\n'
+    with pytest.raises(ProtocolError) as caught:
+        parse_protocol(one)
+    assert str(caught.value).count("\n") == 0
+    assert "did you mean 'preference'?" in str(caught.value)
+    with pytest.raises(ProtocolError, match="studies: expected at least 1 entry, found 0"):
+        parse_protocol("studies = []\n" + head)
+
+
 def test_nothing_can_be_changed_afterwards():
     protocol = parse_protocol(GOOD)
     with pytest.raises(Exception, match="frozen"):

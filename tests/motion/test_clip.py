@@ -11,7 +11,17 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from study.errors import MotionError
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, global_rotations, joint_positions, moved, resample, retarget, sample, trim
+from study.motion.clip import (
+    Clip,
+    file_frame,
+    global_rotations,
+    joint_positions,
+    moved,
+    resample,
+    retarget,
+    sample,
+    trim,
+)
 from study.motion.skeleton import Skeleton
 
 NAMES = ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightUpLeg", "RightLeg", "RightFoot", "Spine")
@@ -168,3 +178,14 @@ def test_retargeting_scales_the_path_by_leg_length(clip: Clip) -> None:
         MotionError, match=r"Expected walk on the rig of the other clip.*'LeftLeg', a joint of the body"
     ):
         retarget(clip, renamed)
+
+
+def test_a_frame_is_found_in_the_clips_own_file():
+    """Frame 10 at 30 fps, of a clip cut at frame 8 of a file of 120 fps, is frame 8 + 40 of the file."""
+    rotations = np.tile(quat.IDENTITY, (200, 1, 1))
+    skeleton = Skeleton(("Hips",), np.array([-1]), np.zeros((1, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+    whole = Clip(skeleton, np.zeros((200, 3)), rotations, 120.0)
+    assert file_frame(whole, 17) == 17
+    part = trim(resample(trim(whole, 8, 200), 30.0), 3, 40)
+    assert file_frame(part, 7) == pytest.approx(8 + 4 * 10)
+    assert part.start_s == pytest.approx(8 / 120 + 3 / 30)

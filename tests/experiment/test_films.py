@@ -1,0 +1,139 @@
+"""Which films a study shows: never one film for two methods, within the lengths that the protocol allows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from toys import ToyLibrary
+
+from study.errors import StimulusError
+from study.experiment.films import alike
+from study.experiment.one_hop_stimuli import Hops
+from study.experiment.points import settle
+from study.experiment.protocol import Protocol, find_protocol, load_protocol, parse_protocol
+from study.experiment.stimuli import check, prepare
+from study.motion.library import open_library
+
+TEXT = """
+name = "pairs"
+title = "Pairs"
+seed = 52
+
+[stimuli]
+entry_s = 1.0
+exit_s = 1.0
+
+[[transitions]]
+name = "walk_run"
+category = "walking"
+source = "walk"
+destination = "run"
+
+[[studies]]
+name = "natural"
+task = "preference"
+reference = "geodesic"
+comparison = "fixed"
+"""
+
+
+def chosen(protocol: Protocol, library: object, again: bool) -> object:
+    """The points of the first transition, with or without a look at whether the films differ."""
+    hops = Hops(protocol, library)  # type: ignore[arg-type]
+    look = (lambda study, settled: alike(study, settled, hops)) if again else None
+    return settle(protocol, protocol.studies[0], protocol.transitions[0], library, look)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", ["preference", "rating"])
+def test_points_at_which_both_methods_make_one_film_are_drawn_again(kind: str) -> None:
+    """Seed 52 draws points of walk and run whose geodesic blend takes ten frames, as the fixed one does."""
+    text = TEXT
+    if kind == "rating":
+        text = TEXT.replace('"preference"', '"rating"') + '[[studies.items]]\nname = "good"\nquestion = "How good?"\n'
+    protocol, library = parse_protocol(text), open_library("synthetic")
+    first = chosen(protocol, library, again=False)
+    assert {length.blend_frames for length in first.lengths.values()} == {10}  # type: ignore[attr-defined]
+    second = chosen(protocol, library, again=True)
+    assert second.tried > first.tried  # type: ignore[attr-defined]
+    assert len({length.blend_frames for length in second.lengths.values()}) == 2  # type: ignore[attr-defined]
+    pairs = prepare(protocol, library).pairs
+    assert len({name for pair in pairs for name in (pair.a, pair.b) if name}) == 2
+
+
+def test_given_points_at_which_both_methods_make_one_film_are_refused() -> None:
+    library = open_library("synthetic")
+    first = chosen(parse_protocol(TEXT), library, again=False)
+    given = (
+        f'points = {{ choose = "given", source_frame = {first.start_frame}, '  # type: ignore[attr-defined]
+        f"destination_frame = {first.end_frame} }}"  # type: ignore[attr-defined]
+    )
+    protocol = parse_protocol(TEXT.replace('destination = "run"', f'destination = "run"\n{given}'))
+    (problem,) = check(protocol, library)
+    assert "expected two films by the methods 'geodesic' and 'fixed' of the study 'natural', found one" in problem
+    with pytest.raises(StimulusError, match="both make the same blend; give other points"):
+        prepare(protocol, library)
+
+
+def test_a_time_warped_blend_without_a_warp_is_the_geodesic_one(toy_library: ToyLibrary) -> None:
+    """Without `least_warp_frames`, too, the two films of a pair differ."""
+    text = TEXT.replace('"walk"', '"slow"').replace('"run"', '"quick"').replace('"fixed"', '"timewarp"')
+    for seed in range(6):
+        made = prepare(parse_protocol(text.replace("seed = 52", f"seed = {seed}")), toy_library)
+        assert all(pair.a != pair.b for pair in made.pairs)
+
+
+def test_methods_that_always_make_one_film_are_refused(toy_library: ToyLibrary) -> None:
+    text = (
+        TEXT.replace('"walk"', '"still"')
+        .replace('"run"', '"still"')
+        .replace("[[studies]]", "[points]\nlongest_frames = 1\n\n[[studies]]")
+    )
+    text = text.replace('comparison = "fixed"', 'comparison = "fixed"\nfixed_frames = 1')
+    (problem,) = check(parse_protocol(text), toy_library)
+    assert "with one film for both methods" in problem
+
+
+@pytest.mark.parametrize(("reference", "comparison"), [("cut", "geodesic"), ("fixed", "geodesic"), ("cut", "velocity")])
+def test_the_limits_hold_for_the_method_whose_length_follows_from_the_points(
+    toy_library: ToyLibrary, reference: str, comparison: str
+) -> None:
+    text = TEXT.replace('"walk"', '"slow"').replace('"run"', '"quick"')
+    text = text.replace('"geodesic"', f'"{reference}"').replace('comparison = "fixed"', f'comparison = "{comparison}"')
+    limits = "[points]\nshortest_frames = 14\nlongest_frames = 22\navoid_frames = 17\navoid_within_frames = 1\n"
+    for seed in range(5):
+        seeded = text.replace("seed = 52", f"seed = {seed}").replace("[[transitions]]", f"{limits}\n[[transitions]]")
+        made = prepare(parse_protocol(seeded), toy_library)
+        (length,) = [record.blend_frames for record in made.records if record.method == comparison]
+        assert 14 <= length <= 22
+        assert not 16 <= length <= 18
+    nothing = text.replace(
+        "[[transitions]]", "[points]\nshortest_frames = 59\nlongest_frames = 59\navoid_frames = 59\n\n[[transitions]]"
+    )
+    (problem,) = check(parse_protocol(nothing), toy_library)
+    assert f"whose {comparison} blend meets the conditions" in problem
+
+
+@pytest.mark.parametrize(("fps", "frames"), [(24, 8), (30, 10), (60, 20), (120, 40)])
+def test_the_fixed_blend_takes_a_third_of_a_second_at_any_rate(toy_library: ToyLibrary, fps: int, frames: int) -> None:
+    text = TEXT.replace('"walk"', '"slow"').replace('"run"', '"quick"').replace("seed", f"fps = {fps}\nseed", 1)
+    made = prepare(parse_protocol(text), toy_library)
+    (fixed,) = [record for record in made.records if record.method == "fixed"]
+    assert fixed.blend_frames == frames
+    own = parse_protocol(text + "fixed_frames = 7\n")
+    assert own.fixed_frames_of(own.studies[0]) == 7
+
+
+@pytest.mark.mocap
+@pytest.mark.slow
+def test_no_captured_one_hop_transition_stands_beside_itself(mocap: Path) -> None:
+    """The first points of tai chi and dance have no better hop than none."""
+    protocol = load_protocol(find_protocol("one_hop_vs_direct"))
+    library = open_library(mocap / "cmu")
+    transition = protocol.transition("tai_chi_dance")
+    study, hops = protocol.study("optimal"), Hops(protocol, library)
+    first = settle(protocol, study, transition, library)
+    assert hops.find(study, first).at_once
+    second = settle(protocol, study, transition, library, lambda one, points: alike(one, points, hops))
+    assert second.tried > first.tried
+    assert not hops.find(study, second).at_once
