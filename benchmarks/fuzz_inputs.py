@@ -25,10 +25,11 @@ NUMBERS = (
     "3", "4", "7", "0.25", "0.9", "0.99", "1.5", "12.0", "20", "45", "60", "-2", "240", "600", "0.001", "1e-3", "90",
 )  # fmt: skip
 _PLAUSIBLE = (
-    "0", "1", "2", "3", "5", "12", "24", "60", "0.0", "0.1", "0.5", "0.95", "1.0", "1.5", "30.0", "1e-9", "true", "false",
-    '"random"', '"balanced"', '"both"', '"by-group"', '"as-listed"', '"walk"', '"jog"', '"stand"', '"geodesic"', '"cut"',
-    '"fixed"', '"velocity"', '"timewarp"', '"cut-wang2003"', '"one-hop"', '"front"', '"clearest"', '"de"', '"ja"', '"xx"',
-    '"text"', '"choice"', '"{standard}"', '"pair"', '"rating"', '"preference"', '"walk_run"', '"jnd"', '"liking"', '"x"',
+    "0", "1", "2", "3", "5", "12", "24", "60", "0.0", "0.1", "0.5", "0.95", "1.0", "1.5", "30.0", "1e-9", "true",
+    "false", '"random"', '"balanced"', '"both"', '"by-group"', '"as-listed"', '"walk"', '"jog"', '"stand"',
+    '"geodesic"', '"cut"', '"fixed"', '"velocity"', '"timewarp"', '"cut-wang2003"', '"one-hop"', '"front"',
+    '"clearest"', '"de"', '"ja"', '"xx"', '"text"', '"choice"', '"{standard}"', '"pair"', '"rating"',
+    '"preference"', '"walk_run"', '"jnd"', '"liking"', '"x"',
 )  # fmt: skip
 WORDS = (
     "", " ", "a", "A" * 300, "word" * 2500, "=1+1", "@x", "-", "_", ".", "..", "../x", "con", "é", "日本語",

@@ -1,4 +1,4 @@
-"""Reads what pip-audit found: exit status 0 for nothing known, 1 for vulnerabilities, 2 where packages weren't looked up.
+"""Reads what pip-audit found; exit status 0: nothing is known, 1: vulnerabilities, 2: packages weren't looked up.
 
     python scripts/audited.py SERVICE FILE.json
 

@@ -1,0 +1,73 @@
+"""2,000 cases of `benchmarks/fuzz.py` each time: damaged files and messages end in an answer or a refusal."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+CASES, SEED, CHUNKS = 2000, 1, 16
+PATH = Path(__file__).parents[1] / "benchmarks" / "fuzz.py"
+
+
+@pytest.fixture(scope="module")
+def fuzz() -> ModuleType:
+    if "benchmarks_fuzz" not in sys.modules:
+        spec = importlib.util.spec_from_file_location("benchmarks_fuzz", PATH)
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules["benchmarks_fuzz"] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return sys.modules["benchmarks_fuzz"]
+
+
+@pytest.mark.parametrize("chunk", range(CHUNKS))
+def test_damaged_input_ends_in_an_answer_or_a_refusal(fuzz, chunk):
+    chosen = fuzz.cases(CASES, list(fuzz.KINDS))[chunk::CHUNKS]
+    outcomes = [fuzz.run_case(kind, SEED, number) for kind, number in chosen]
+    finds = [f"{o.name}: {o.fault}\n{o.details[-1500:]}" for o in outcomes if o.result == "fault"]
+    assert not finds, "\n\n".join(finds)
+    assert {o.result for o in outcomes} == {"accepted", "refused"}
+
+
+def test_a_case_is_the_same_each_time(fuzz, tmp_path):
+    for kind in ("bvh", "acclaim", "library", "protocol", "table"):
+        contents = []
+        for name in ("one", "two"):
+            folder = tmp_path / f"{kind}-{name}"
+            folder.mkdir()
+            fuzz.KINDS[kind][0](fuzz.np.random.default_rng([7, 3]), folder)
+            contents.append([file.read_bytes() for file in sorted(folder.iterdir())])
+        assert contents[0] == contents[1], kind
+
+
+def test_what_a_verb_may_not_do_is_found(fuzz, monkeypatch):
+    """A traceback, silence, endless work, too much memory and a missing number: each is a find, and says where."""
+    from study.apps import motion_commands
+
+    def ends(fault):
+        def inspect(*_: object, **__: object) -> None:
+            fault()
+
+        monkeypatch.setattr(motion_commands.inspect, "callback", inspect)
+        return fuzz.run_case("bvh", 1, 0)
+
+    monkeypatch.setattr(fuzz, "SECONDS", 0.3)
+    assert "ZeroDivisionError" in ends(lambda: 1 // 0).fault
+    assert "over 0.3 s of processor time" in ends(lambda: [None for _ in iter(int, 1)]).fault
+    assert "MemoryError" in ends(lambda: fuzz.np.ones(2**40)).fault
+    assert "Warning" in ends(lambda: fuzz.warnings.warn("overflow encountered in exp", stacklevel=1)).fault
+    with pytest.raises(fuzz.FaultError, match=r"\.low says 'from nan to 3'"):
+        fuzz._look_for_missing_numbers({"low": "from nan to 3"})
+    with pytest.raises(fuzz.FaultError, match="percent is null, and nothing says why"):
+        fuzz._look_for_missing_numbers({"of": [{"percent": None, "note": ""}]})
+    fuzz._look_for_missing_numbers({"percent": None, "note": "nobody answered that question"})
+
+
+def test_the_disk_of_a_case_can_be_full(fuzz, tmp_path):
+    with fuzz.disk_full_after(1000), pytest.raises(OSError, match="File too large"):
+        (tmp_path / "large").write_bytes(b"x" * 2000)
+    (tmp_path / "large").write_bytes(b"x" * 2000)
