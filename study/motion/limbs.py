@@ -160,18 +160,17 @@ class Pair:
 
 def find_pairs(tree: Tree) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Like chains that branch off one joint, the longest first."""
-    shortest = _SHORTEST_SHARE * float(tree.reach[0])
-    found = []
-    for children in tree.children:
-        if len(children) < 2:
-            continue
-        branches = sorted(
-            (c for c in children if tree.bodily[c] and tree.length(c) >= shortest), key=tree.length, reverse=True
-        )
+    found: list[tuple[int, int]] = []
+    longest = 0.0
+    forks = [joint for joint, children in enumerate(tree.children) if len(children) > 1]
+    for joint in sorted(forks, key=lambda joint: -tree.reach[joint]):
+        shortest = _SHORTEST_SHARE * longest
+        branches = [c for c in tree.children[joint] if tree.bodily[c] and tree.length(c) >= shortest]
         for a, b in combinations(branches[:_MOST_BRANCHES], 2):
             sides = {tree.named[a].side, tree.named[b].side}
             if unlikeness(tree.length(a), tree.length(b)) <= _UNLIKE or sides == {"L", "R"} or _begin_alike(tree, a, b):
                 found.append((a, b))
+                longest = max(longest, min(tree.length(a), tree.length(b)))
     found.sort(key=lambda pair: tree.length(pair[0]) + tree.length(pair[1]), reverse=True)
     return [(_chain(tree, a), _chain(tree, b)) for a, b in found[:_MOST_PAIRS]]
 
@@ -200,9 +199,8 @@ def read_pair(tree: Tree, chains: tuple[tuple[int, ...], tuple[int, ...]], parts
     if any(not len(combos) for combos, _, _ in tables):
         return None
     at = int(tree.parents[chains[0][0]])
-    crowd = [
-        c for c in tree.children[at] if c not in (chains[0][0], chains[1][0]) and _begin_alike(tree, c, chains[0][0])
-    ]
+    others = [c for c in tree.children[at][:_MOST_BRANCHES] if c not in (chains[0][0], chains[1][0])]
+    crowd = any(_begin_alike(tree, other, chains[0][0]) for other in others)
     tips = (tree.ends.get(chains[0][-1], chains[0][-1:])[0], tree.ends.get(chains[1][-1], chains[1][-1:])[0])
     readings = []
     for best in _choices(tables):
@@ -211,7 +209,7 @@ def read_pair(tree: Tree, chains: tuple[tuple[int, ...], tuple[int, ...]], parts
             [np.diff(_places(tree, chain)[list(pick)]) for chain, pick in zip(chains, picks, strict=True)]
         )
         score = float(tables[0][1][best[0]] + tables[1][1][best[1]]) / 2.0
-        score -= float(np.sum(unlikeness(lengths[0], lengths[1]))) + _CROWD_COST * bool(crowd)
+        score -= float(np.sum(unlikeness(lengths[0], lengths[1]))) + _CROWD_COST * crowd
         spoken = float(tables[0][2][best[0]] + tables[1][2][best[1]]) / 6.0
         readings.append(Pair(parts, at, chains, picks, tips, score, spoken, lengths))
     return max(readings, key=lambda pair: pair.score)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -766,3 +767,27 @@ def test_words_that_all_joints_share_say_nothing() -> None:
 )
 def test_names_beside_the_body(name: str) -> None:
     assert read_names([name])[0].beside
+
+
+def test_what_lies_far_away_does_not_hide_the_limbs() -> None:
+    for word in ("camera", "thing"):
+        rig = human("aside")
+        rig.add(word, "pelvis", 0.0, 0.0, 30.0)
+        assert found(rig.skeleton(style("unreal"))) == {role: style("unreal")[role] for role in ROLES}
+
+
+@pytest.mark.parametrize("shape", ["deep", "wide", "twins"])
+def test_trees_of_thousands_of_joints_take_no_time(shape: str) -> None:
+    count = 6000
+    parents = {
+        "deep": np.arange(count) - 1,
+        "wide": np.where(np.arange(count) == 0, -1, 0),
+        "twins": (np.arange(count) - 1) // 2,
+    }[shape]
+    parents[0] = -1
+    offsets = np.tile([0.01, 0.02, 0.0], (count, 1))
+    names = tuple(f"j{k}" for k in range(count))
+    start = time.perf_counter()
+    roles = Skeleton(names, parents, offsets, np.zeros(0, dtype=np.int64), np.zeros((0, 3))).roles
+    assert not roles
+    assert time.perf_counter() - start < 5.0
