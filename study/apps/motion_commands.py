@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from study.apps.clips import clips_options, load_clip
 from study.apps.console import emit, json_option, library_option, say
+
+if TYPE_CHECKING:
+    from study.motion.library import FolderLibrary
 
 EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -18,21 +24,61 @@ def motions() -> None:
 
 @motions.command("list")
 @library_option
+@click.option("--write", is_flag=True, help="Write a first library.toml into the folder, to be completed by hand.")
 @json_option
-def list_motions(library: str | None, as_json: bool) -> None:
+def list_motions(library: str | None, write: bool, as_json: bool) -> None:
     """The motions that a library offers, by name."""
-    from study.motion.library import open_library
+    from study.motion.library import FolderLibrary, open_library
+    from study.motion.library_file import NAME, write_library_file
 
     opened = open_library(library or "synthetic")
-    rows = [opened.entry(name) for name in opened.names()]
-    lines = [f"{row.name:20} {row.kind:10} {row.words}" for row in rows]
-    result = {
+    result: dict[str, Any] = {
         "library": opened.name,
         "synthetic": opened.synthetic,
         "acknowledgement": opened.acknowledgement,
-        "motions": [{"name": row.name, "kind": row.kind, "words": row.words} for row in rows],
     }
-    emit(result, as_json, "\n".join(lines))
+    if write:
+        if not isinstance(opened, FolderLibrary):
+            raise click.UsageError("expected --library FOLDER with --write, found the synthetic library.")
+        result["written"] = str(write_library_file(opened.folder, first_tables(opened)))
+    rows = [opened.entry(name) for name in opened.names()]
+    skipped = opened.skipped if isinstance(opened, FolderLibrary) else []
+    for line in skipped:
+        say(f"not listed: {line}")
+    widths = [max(map(len, column)) for column in ([row.name for row in rows], [row.kind for row in rows])]
+    lines = [f"{row.name:{widths[0]}}  {row.kind:{widths[1]}}  {row.words}" for row in rows]
+    lines += [f"{result['written']}: a first {NAME}; see docs/libraries.md for its keys"] if write else []
+    motions = [
+        {"name": row.name, "kind": row.kind, "words": row.words, "file": opened.where(row) or None, "genre": row.genre}
+        for row in rows
+    ]
+    emit({**result, "motions": motions, "skipped": skipped}, as_json, "\n".join(lines))
+
+
+def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
+    """Name, file, category and a comment for each file of a folder, for a first `library.toml`."""
+    import warnings
+
+    from study.errors import MotionWarning, SegueError
+    from study.motion.files import read_clip
+
+    tables: list[tuple[str, str, str, str]] = []
+    for name in library.names():
+        entry = library.entry(name)
+        if entry.own and entry.file is not None and library.where(entry) not in [table[1] for table in tables]:
+            try:
+                with warnings.catch_warnings(record=True) as said:
+                    warnings.simplefilter("always", MotionWarning)
+                    clip = read_clip(entry.file)
+            except SegueError as error:
+                comment = f"can't be read: {error}"
+            else:
+                seconds = f"{clip.frames} frames at {clip.fps:g} fps, {clip.seconds:.2f} s"
+                comment = "; ".join(
+                    [seconds, f"a unit is {clip.metres_per_unit:.6g} m", *(str(w.message) for w in said)]
+                )
+            tables.append((name, library.where(entry), entry.kind, comment))
+    return tables
 
 
 @motions.command()
@@ -43,11 +89,15 @@ def list_motions(library: str | None, as_json: bool) -> None:
 @click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, where the file does not say it.")
 @json_option
 def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
-    """What a motion file holds, and what is wrong with it."""
-    from study.motion.defects import find_defects
-    from study.motion.files import read_clip
+    """What a motion file holds, and what is wrong with it.
 
-    clip = read_clip(file, metres_per_unit=metres_per_unit, fps=fps)
+    The options, else the file's library.toml, say what the file itself leaves open.
+    """
+    from study.motion.defects import find_defects
+    from study.motion.entries import entry_of_file, read_entry
+
+    entry = entry_of_file(file)
+    clip = read_entry(replace(entry, metres_per_unit=metres_per_unit or entry.metres_per_unit, fps=fps or entry.fps))
     defects = find_defects(clip)
     roles = {role: clip.skeleton.names[joint] for role, joint in clip.skeleton.roles.items()}
     result = {
@@ -55,21 +105,11 @@ def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_jso
         "frames": clip.frames,
         "fps": clip.fps,
         "seconds": clip.seconds,
+        "metres_per_unit": clip.metres_per_unit,
         "joints": list(clip.skeleton.names),
         "roles": roles,
         "history": list(clip.history),
-        "defects": [
-            {
-                "kind": defect.kind,
-                "frame_start": defect.frame_start,
-                "frame_stop": defect.frame_stop,
-                "joint": defect.joint,
-                "size": defect.size,
-                "unit": defect.unit,
-                "message": defect.message,
-            }
-            for defect in defects
-        ],
+        "defects": [asdict(defect) for defect in defects],
     }
     lines = [
         f"{file.name}: {clip.frames} frames at {clip.fps:g} fps, {clip.seconds:.2f} s, {clip.skeleton.joints} joints",
@@ -100,7 +140,7 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 
 @click.command()
 @click.argument("clip", metavar="FILE|NAME")
-@library_option
+@clips_options
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.mp4, or X.png: a strip.")
 @click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video; the clip's own unless given.")
 @click.option(
@@ -126,7 +166,6 @@ def preview(
     as_json: bool,
 ) -> None:
     """One clip as a video, or as a strip of poses in one picture."""
-    from study.apps.clips import load_clip
     from study.experiment.drawing import draw_clip
 
     width, _, height = size.partition("x")

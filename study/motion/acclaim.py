@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -65,6 +65,7 @@ def read_amc(
     asf: Path | str | None = None,
     fps: float = CMU_FPS,
     metres_per_unit: float | None = None,
+    mapping: Mapping[str, str] | None = None,
 ) -> Clip:
     """Read an AMC motion with its ASF skeleton.
 
@@ -79,6 +80,8 @@ def read_amc(
     metres_per_unit
         Metres in a unit of the file. By default the ASF's `:units length` (0.45 for CMU) divides an inch, unless the
         body comes out of no human size: then the unit is found from its size.
+    mapping
+        Joint names by role, where they are known; `study.motion.skeleton.find_roles` finds the others.
 
     Raises
     ------
@@ -93,7 +96,7 @@ def read_amc(
     source = read_source(path, "an AMC file")
     body = _read_asf(read_source(asf if asf is not None else _find_asf(Path(path)), "an ASF file"))
     values, degrees = _read_frames(source, body)
-    return _assemble(source, body, values, degrees, fps, metres_per_unit)
+    return _assemble(source, body, values, degrees, fps, metres_per_unit, mapping)
 
 
 def _find_asf(path: Path) -> Path:
@@ -436,6 +439,7 @@ def _assemble(
     degrees: bool,
     fps: float,
     metres_per_unit: float | None,
+    mapping: Mapping[str, str] | None,
 ) -> Clip:
     bones, parents = body.bones, body.parents
     tips = np.array([bone.direction * bone.length for bone in bones])
@@ -449,19 +453,19 @@ def _assemble(
             _warn(
                 f"{source.path}: bone {bone.name!r} shifts or stretches by up to {stretch:.4g} units, which is left out"
             )
-    scale, note = _scale(body, names, offsets, metres_per_unit)
+    scale, note = _scale(body, names, offsets, metres_per_unit, mapping)
     leaves = np.array(sorted(set(range(len(bones))) - {int(p) for p in parents}), dtype=np.int64)
     path = np.tile(body.root_position, (frames, 1))
     for k, dof in enumerate(bones[0].dofs):
         if dof[0] == "t":
             path[:, "xyz".index(dof[1])] += values[_ROOT][:, k]
-    skeleton = Skeleton(names, parents, offsets * scale, leaves, tips[leaves] * scale)
+    skeleton = Skeleton(names, parents, offsets * scale, leaves, tips[leaves] * scale, mapping or {})
     history = (
         f"read from {source.path.name} and {body.path.name}",
         note,
         f"taken at {fps:g} fps, which AMC files don't say",
     )
-    return Clip(skeleton, path * scale, rotations, fps, name=source.path.stem, history=history)
+    return Clip(skeleton, path * scale, rotations, fps, name=source.path.stem, history=history, metres_per_unit=scale)
 
 
 def _rotation(bone: _Bone, values: FloatArray | None, frames: int, degrees: bool) -> FloatArray:
@@ -478,11 +482,17 @@ def _stretch(bone: _Bone, values: FloatArray) -> float:
     return float(np.max(np.abs(values[:, columns]))) if columns else 0.0
 
 
-def _scale(body: _Body, names: tuple[str, ...], offsets: FloatArray, told: float | None) -> tuple[float, str]:
+def _scale(
+    body: _Body,
+    names: tuple[str, ...],
+    offsets: FloatArray,
+    told: float | None,
+    mapping: Mapping[str, str] | None,
+) -> tuple[float, str]:
     if told is not None:
         return told, f"lengths x {told:.6g} m, as told"
     stated = INCH / body.length_unit
-    found = find_scale(names, body.parents, offsets)
+    found = find_scale(names, body.parents, offsets, mapping)
     if np.isclose(stated, found.metres_per_unit, rtol=0.3):
         return stated, f"lengths in 1/{body.length_unit:g} inch (x {stated:.6g} m), as {body.path.name} says"
     return found.metres_per_unit, found.note

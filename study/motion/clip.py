@@ -42,6 +42,12 @@ class Clip:
         What was done to it, in order, in words; manifests and reports print it.
     synthetic
         Whether a program made the motion up, rather than a person moved.
+    start_s
+        Seconds from the first frame of the file to frame 0, for clips that are a part of their file.
+    file_fps
+        Frames per second of the file, where the clip is at another rate.
+    metres_per_unit
+        Metres in a length unit of the file that the clip was read from; it is written in that unit again.
 
     Raises
     ------
@@ -57,6 +63,9 @@ class Clip:
     name: str = ""
     history: tuple[str, ...] = field(default=())
     synthetic: bool = False
+    start_s: float = 0.0
+    file_fps: float | None = None
+    metres_per_unit: float = 0.01
 
     def __post_init__(self) -> None:
         positions = np.array(self.root_positions, dtype=np.float64)
@@ -170,7 +179,17 @@ def resample(clip: Clip, fps: float) -> Clip:
     nearest = np.round(times)
     times = np.where(np.abs(times - nearest) < 1e-6, nearest, times)
     resampled = sample(clip, times)
-    return replace(resampled, fps=float(fps), history=(*clip.history, f"resampled from {clip.fps:g} to {fps:g} fps"))
+    return replace(
+        resampled,
+        fps=float(fps),
+        file_fps=clip.file_fps or clip.fps,
+        history=(*clip.history, f"resampled from {clip.fps:g} to {fps:g} fps"),
+    )
+
+
+def file_frame(clip: Clip, frame: int) -> float:
+    """The frame of the clip's own file, at the file's rate, that a frame of the clip shows; a fraction between two."""
+    return (clip.start_s + frame / clip.fps) * (clip.file_fps or clip.fps)
 
 
 def sample(clip: Clip, frames: FloatArray | Sequence[float]) -> Clip:
@@ -205,6 +224,7 @@ def trim(clip: Clip, start: int, stop: int) -> Clip:
         clip,
         root_positions=clip.root_positions[start:stop],
         rotations=clip.rotations[start:stop],
+        start_s=clip.start_s + start / clip.fps,
         history=(*clip.history, f"trimmed to frames {start} to {stop - 1} of {clip.frames}"),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,13 @@ from study.motion.upright import put_upright
 SUFFIXES = (".bvh", ".amc")
 
 
-def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: float | None = None) -> Clip:
+def read_clip(
+    path: Path | str,
+    *,
+    metres_per_unit: float | None = None,
+    fps: float | None = None,
+    mapping: Mapping[str, str] | None = None,
+) -> Clip:
     """Read a motion file; where another axis than Y is up, the clip is put upright and its history says so.
 
     Parameters
@@ -27,6 +33,8 @@ def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: fl
         Metres in a unit of the file; by default found from the body, and said in the clip's history.
     fps
         Frames per second in place of what the file says (AMC files don't say; 120 is assumed).
+    mapping
+        Joint names by role, where they are known; `study.motion.skeleton.find_roles` finds the others.
 
     Raises
     ------
@@ -39,12 +47,9 @@ def read_clip(path: Path | str, *, metres_per_unit: float | None = None, fps: fl
             raise MotionError(f"Expected {label} above 0 for {path}, got {value}.")
     suffix = path.suffix.lower()
     if suffix == ".amc":
-        return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=CMU_FPS if fps is None else fps))
+        rate = CMU_FPS if fps is None else fps
+        return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=rate, mapping=mapping))
     if suffix == ".bvh":
-        clip = put_upright(read_bvh(path, metres_per_unit=metres_per_unit))
-        if fps is None or fps == clip.fps:
-            return clip
-        note = f"taken at {fps:g} fps, as told, and not at the file's {clip.fps:g}"
-        return replace(clip, fps=fps, history=(*clip.history, note))
+        return put_upright(read_bvh(path, metres_per_unit=metres_per_unit, fps=fps, mapping=mapping))
     hint = "; name the .amc file, and its .asf is found beside it" if suffix == ".asf" else ""
     raise MotionFileError(f"Expected a motion file ({', '.join(SUFFIXES)}), found {suffix or 'no suffix'}{hint}.", path)

@@ -6,9 +6,10 @@ Roles are the same on every rig: `pelvis`, `spine`, `chest`, `neck`, `head`, and
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
@@ -55,6 +56,8 @@ class Skeleton:
         The joints that carry an end site (a bone's tip that has no rotation of its own).
     end_offsets : (ends, 3)
         Each end site in its joint's frame, metres.
+    mapping
+        Joint names by role, where somebody said which joint plays it; see `find_roles`.
     """
 
     names: tuple[str, ...]
@@ -62,20 +65,21 @@ class Skeleton:
     offsets: FloatArray
     end_parents: IntArray
     end_offsets: FloatArray
+    mapping: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         joints = len(self.names)
-        for field, kind, shape in (
+        for label, kind, shape in (
             ("parents", np.int64, (joints,)),
             ("offsets", np.float64, (joints, 3)),
             ("end_parents", np.int64, (len(self.end_parents),)),
             ("end_offsets", np.float64, (len(self.end_parents), 3)),
         ):
-            array = np.array(getattr(self, field), dtype=kind)
+            array = np.array(getattr(self, label), dtype=kind)
             if array.shape != shape:
-                raise MotionError(f"Expected skeleton {field} of shape {shape}, got {array.shape}.")
+                raise MotionError(f"Expected skeleton {label} of shape {shape}, got {array.shape}.")
             array.setflags(write=False)
-            object.__setattr__(self, field, array)
+            object.__setattr__(self, label, array)
         if len(set(self.names)) != joints:
             twice = sorted({name for name in self.names if self.names.count(name) > 1})
             raise MotionError(f"Expected unique joint names, found {', '.join(twice)} more than once.")
@@ -103,7 +107,7 @@ class Skeleton:
     @cached_property
     def roles(self) -> Mapping[str, int]:
         """Joint index by role, for the roles that this rig has; see `find_roles`."""
-        return MappingProxyType(find_roles(self.names, self.parents))
+        return MappingProxyType(find_roles(self.names, self.parents, self.mapping))
 
     def role(self, name: str) -> int:
         """The joint that plays a role; `MotionError` where the rig has none."""
@@ -177,8 +181,8 @@ def _plain(name: str) -> str:
     return re.sub(r"[ _.\-]", "", name).lower()
 
 
-def find_roles(names: Sequence[str], parents: IntArray) -> dict[str, int]:
-    """Joint index by role, from the names and the tree.
+def find_roles(names: Sequence[str], parents: IntArray, mapping: Mapping[str, str] | None = None) -> dict[str, int]:
+    """Joint index by role, from the names and the tree; `mapping` (role -> joint name) has the last word.
 
     The traps: `LeftShoulder` is the collar when an arm joint hangs below it; `LHipJoint` is not the hip; the
     pelvis is the nearest common ancestor of both hips, whatever it is called; `Leg` is the knee below `UpLeg`.
@@ -191,7 +195,19 @@ def find_roles(names: Sequence[str], parents: IntArray) -> dict[str, int]:
     if "hip.L" in roles and "hip.R" in roles:
         roles["pelvis"] = _common_ancestor(roles["hip.L"], roles["hip.R"], parents)
     roles |= _trunk(roles, [rest for _, rest in sided], parents)
+    roles |= _mapped(names, mapping or {})
     return {role: roles[role] for role in ROLES if role in roles}
+
+
+def _mapped(names: Sequence[str], mapping: Mapping[str, str]) -> dict[str, int]:
+    for role, name in mapping.items():
+        if name not in names:
+            near = difflib.get_close_matches(name, names, n=1)
+            raise MotionError(
+                f"Expected a joint of the rig for the role {role!r}, found {name!r}."
+                + (f" Did you mean {near[0]!r}?" if near else f" The rig has {', '.join(names)}.")
+            )
+    return {role: names.index(name) for role, name in mapping.items()}
 
 
 def _limb(

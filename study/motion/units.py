@@ -7,7 +7,7 @@ CMU database's 1/0.45 inch, inches, centimetres, millimetres) lie at least a fac
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +58,12 @@ class Scale:
     note: str
 
 
-def find_scale(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatArray) -> Scale:
+def find_scale(
+    names: Sequence[str],
+    parents: NDArray[np.int64],
+    offsets: FloatArray,
+    mapping: Mapping[str, str] | None = None,
+) -> Scale:
     """The unit in which a rig's legs, or else its whole body, come out nearest to an adult's.
 
     Parameters
@@ -67,8 +72,10 @@ def find_scale(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatA
         The joints, parents before children.
     offsets : (joints, 3)
         Each joint in its parent's frame, in the file's unit.
+    mapping
+        Joint names by role, as `find_roles` takes them.
     """
-    leg = _leg_length(names, parents, offsets)
+    leg = _leg_length(find_roles(names, parents, mapping), offsets)
     if leg > 0.0:
         size, usual, plausible, what = leg, _LEG_M, _PLAUSIBLE_LEG_M, "leg"
     else:
@@ -85,8 +92,7 @@ def find_scale(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatA
     )
 
 
-def _leg_length(names: Sequence[str], parents: NDArray[np.int64], offsets: FloatArray) -> float:
-    roles = find_roles(names, parents)
+def _leg_length(roles: Mapping[str, int], offsets: FloatArray) -> float:
     sides = [side for side in "LR" if f"knee.{side}" in roles and f"ankle.{side}" in roles]
     lengths = np.linalg.norm(offsets, axis=1)
     return float(np.mean([lengths[roles[f"knee.{s}"]] + lengths[roles[f"ankle.{s}"]] for s in sides])) if sides else 0.0
