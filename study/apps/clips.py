@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -39,12 +38,12 @@ def clips_options(command: Command) -> Command:
 
 def find_entry(spec: str, library: str | Library | None) -> tuple[Library, Entry]:
     """The library and the motion that a person names: a file by its path, else a motion by its name."""
-    from study.motion.entries import entry_of_file
+    from study.motion.entries import entry_of_file, motion_file
     from study.motion.library import open_library
 
     opened = open_library(library or "synthetic") if library is None or isinstance(library, str) else library
-    if library is None and Path(spec).is_file():
-        return opened, entry_of_file(Path(spec))
+    if library is None and (file := motion_file(spec)) is not None:
+        return opened, entry_of_file(file)
     return opened, opened.find(spec)
 
 
@@ -61,7 +60,7 @@ def load_clip(spec: str, library: str | Library | None, fps: float | None, *, te
     clip = opened.clip(entry, fps=fps, as_is=as_is)
     for line in clip.history:
         if tell and line.startswith(TOLD):
-            say(f"{spec}: {line}" + ("" if as_is else " (--as-is keeps them)"))
+            say(f"{spec}: {line}" + (" (--as-is keeps them)" if line.startswith(f"{TOLD}dropped") else ""))
     return clip
 
 

@@ -65,7 +65,9 @@ def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
     tables: list[tuple[str, str, str, str]] = []
     for name in library.names():
         entry = library.entry(name)
-        if entry.own and entry.file is not None and library.where(entry) not in [table[1] for table in tables]:
+        place = library.where(entry)
+        # Names that are no text, as some archives leave them, have no place in a text file.
+        if entry.own and entry.file and place.isprintable() and place not in [table[1] for table in tables]:
             try:
                 with warnings.catch_warnings(record=True) as said:
                     warnings.simplefilter("always", MotionWarning)
@@ -77,7 +79,7 @@ def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
                 comment = "; ".join(
                     [seconds, f"a unit is {clip.metres_per_unit:.6g} m", *(str(w.message) for w in said)]
                 )
-            tables.append((name, library.where(entry), entry.kind, comment))
+            tables.append((name, place, entry.kind, comment))
     return tables
 
 

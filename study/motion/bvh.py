@@ -286,7 +286,7 @@ _COMMON_WITHIN = Fraction(2, 100)
 # A second or more between frames is no motion capture, but frames per second or milliseconds. Milliseconds are often
 # printed without decimals, which puts them off by as much as this; some numbers can be either.
 _SLOWEST_S, _ROUNDED_MS = 1.0, Fraction(5, 100)
-_SURELY_FPS, _EITHER = range(48, 1001), (10, 12, 15, 20, 40)
+_SURELY_FPS, _EITHER = range(48, 501), (10, 12, 15, 20, 40)
 
 
 def _stated_rate(source: Source, frame_time: _FrameTime) -> float:

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.errors import MotionError
+from study.errors import MotionError, MotionFileError
 from study.motion.clip import Clip, trim
 from study.motion.cmu import Boundary, IndexedMotion, Take, cmu_index
 from study.motion.files import read_clip
@@ -87,6 +87,15 @@ class Entry:
 
 
 # -- From files to entries ------------------------------------------------------------------------------------------
+
+
+def motion_file(spec: str) -> Path | None:
+    """The file at a path, accents composed or not; None where there is none."""
+    path = Path(spec)
+    if path.is_file():
+        return path
+    beside = path.parent.iterdir() if path.parent.is_dir() else ()
+    return next((file for file in beside if composed(file.name) == composed(path.name) and file.is_file()), None)
 
 
 def entry_of_file(file: Path) -> Entry:
@@ -269,9 +278,13 @@ def read_entry(entry: Entry) -> Clip:
     """An entry's whole file as it is, in the unit, at the frame rate and with the joints that `library.toml` says."""
     if entry.file is None:
         raise MotionError(f"Expected a file behind {entry.name!r}, found none.")
-    return read_clip(
-        entry.file, metres_per_unit=entry.metres_per_unit, fps=entry.fps, mapping=dict(entry.joints) or None
-    )
+    mapping = dict(entry.joints) or None
+    try:
+        return read_clip(entry.file, metres_per_unit=entry.metres_per_unit, fps=entry.fps, mapping=mapping)
+    except MotionError as refusal:
+        if mapping and (described := find_library_file(entry.file.parent)):
+            raise MotionFileError(f"joints of {entry.file.name}: {refusal}", described.path) from refusal
+        raise
 
 
 def _added_pose(clip: Clip, entry: Entry) -> tuple[Defect, ...]:

@@ -26,6 +26,7 @@ from study.motion.entries import (
     entry_of_file,
     indexed_entries,
     is_indexed,
+    motion_file,
     named_entries,
     own_entry,
     own_names,
@@ -87,11 +88,10 @@ class Library(ABC):
         try:
             return self.entry(spec)
         except MotionError as refusal:
-            file = Path(spec)
-            if file.is_file():
+            if (file := motion_file(spec)) is not None:
                 return entry_of_file(file)
-            if file.suffix.lower() in SUFFIXES:
-                raise MotionFileError(_no_such_file(file), file) from refusal
+            if Path(spec).suffix.lower() in SUFFIXES:
+                raise MotionFileError(_no_such_file(Path(spec)), spec) from refusal
             raise
 
     def clip(
