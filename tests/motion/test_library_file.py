@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.errors import MotionFileError
+from study.errors import MotionError, MotionFileError
 from study.motion.bvh import write_bvh
 from study.motion.clip import Clip
 from study.motion.entries import entry_of_file
@@ -168,7 +168,7 @@ def test_joints_that_a_file_lacks_are_refused_where_they_are_written(folder: Pat
 
 def test_frames_that_a_file_lacks_are_refused(folder: Path) -> None:
     says(folder, '[clips.walk]\nfile = "walk.bvh"\nlast_frame = 500\n')
-    with pytest.raises(MotionFileError, match=r"frames 0 to 500 for 'walk'.*found 120 frames. Mend them in library"):
+    with pytest.raises(MotionError, match=r"frames 0 to 500 for 'walk'.*found 120 frames. Mend them in library"):
         open_library(folder).clip("walk")
 
 
