@@ -61,6 +61,10 @@ def advise(
             problems.append(f"{name}: {error}")
         else:
             clips[name], cyclic[name] = resample(own, fps), is_cyclic(own) if said is None else said
+    if len(clips) < 2:
+        raise click.UsageError(
+            f"expected at least two clips that can be read, found {len(clips)}. {'; '.join(problems)}"
+        )
     rows: list[dict[str, Any]] = []
     pairs = list(permutations(clips, 2))
     with progress("advise") as advance:

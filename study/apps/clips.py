@@ -42,8 +42,8 @@ def find_entry(spec: str, library: str | Library | None) -> tuple[Library, Entry
     from study.motion.library import open_library
 
     opened = open_library(library or "synthetic") if library is None or isinstance(library, str) else library
-    if library is None and (file := motion_file(spec)) is not None:
-        return opened, entry_of_file(file)
+    if library is None and motion_file(spec) is not None:
+        return opened, entry_of_file(spec)
     return opened, opened.find(spec)
 
 

@@ -14,8 +14,6 @@ from study.apps.console import emit, json_option, library_option, say
 if TYPE_CHECKING:
     from study.motion.library import FolderLibrary
 
-EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
-
 
 @click.group()
 def motions() -> None:
@@ -84,13 +82,13 @@ def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
 
 
 @motions.command()
-@click.argument("file", type=EXISTING)
+@click.argument("file")
 @click.option(
     "--metres-per-unit", type=click.FloatRange(min=0, min_open=True), help="The file's length unit, in metres."
 )
 @click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, where the file does not say it.")
 @json_option
-def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
+def inspect(file: str, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
     """What a motion file holds, and what is wrong with it.
 
     The options, else the file's library.toml, say what the file itself leaves open.
@@ -103,7 +101,7 @@ def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_jso
     defects = find_defects(clip)
     roles = {role: clip.skeleton.names[joint] for role, joint in clip.skeleton.roles.items()}
     result = {
-        "file": str(file),
+        "file": file,
         "frames": clip.frames,
         "fps": clip.fps,
         "seconds": clip.seconds,
@@ -114,7 +112,8 @@ def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_jso
         "defects": [asdict(defect) for defect in defects],
     }
     lines = [
-        f"{file.name}: {clip.frames} frames at {clip.fps:g} fps, {clip.seconds:.2f} s, {clip.skeleton.joints} joints",
+        f"{Path(file).name}: {clip.frames} frames at {clip.fps:g} fps, {clip.seconds:.2f} s, "
+        f"{clip.skeleton.joints} joints",
         *clip.history,
         "roles: " + ", ".join(f"{role} {name}" for role, name in roles.items()),
         *(f"defect: {defect.message}" for defect in defects),

@@ -6,6 +6,7 @@ each further name that the index or the `library.toml` gives. A clip is the same
 
 from __future__ import annotations
 
+import difflib
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -90,25 +91,44 @@ class Entry:
 
 
 def motion_file(spec: str) -> Path | None:
-    """The file at a path, accents composed or not; None where there is none."""
+    """The file at a path, accents composed or not; None where there is none.
+
+    Raises
+    ------
+    MotionFileError
+        Where the disk does not let us look.
+    """
     path = Path(spec)
-    if path.is_file():
-        return path
-    beside = path.parent.iterdir() if path.parent.is_dir() else ()
-    return next((file for file in beside if composed(file.name) == composed(path.name) and file.is_file()), None)
+    try:
+        if path.is_file():
+            return path
+        beside = path.parent.iterdir() if path.parent.is_dir() else ()
+        return next((file for file in beside if composed(file.name) == composed(path.name) and file.is_file()), None)
+    except PermissionError as problem:
+        raise MotionFileError(f"Expected a motion file, but it can't be read ({problem.strerror}).", path) from problem
+    except OSError:
+        return None  # no name that a file can have
 
 
-def entry_of_file(file: Path) -> Entry:
+def entry_of_file(spec: str | Path) -> Entry:
     """The entry of a file by itself, as the library of its folder has it; `library.toml` is looked for there and above.
 
     Raises
     ------
     MotionFileError
-        Where that `library.toml` can't be used.
+        Where there is no such file, or its `library.toml` can't be used.
     """
-    file = absolute(file)
-    described = find_library_file(file.parent)
-    return own_entry(file, composed(file.stem), file.name, described)
+    found = motion_file(str(spec))
+    if found is None:
+        wanted = Path(spec)
+        beside = [path.name for path in wanted.parent.iterdir()] if wanted.parent.is_dir() else []
+        near = difflib.get_close_matches(wanted.name, beside, n=1, cutoff=0.75)
+        hint = f"Did you mean {near[0]!r}?" if near else "Check the path."
+        if wanted.is_dir():
+            raise MotionFileError("Expected a motion file, found a folder. Name one of its files.", wanted)
+        raise MotionFileError(f"Expected a motion file, found nothing there. {hint}", wanted)
+    file = absolute(found)
+    return own_entry(file, composed(file.stem), file.name, find_library_file(file.parent))
 
 
 def own_entry(file: Path, name: str, words: str, described: LibraryFile | None) -> Entry:

@@ -87,12 +87,10 @@ class Library(ABC):
         """
         try:
             return self.entry(spec)
-        except MotionError as refusal:
-            if (file := motion_file(spec)) is not None:
-                return entry_of_file(file)
-            if Path(spec).suffix.lower() in SUFFIXES:
-                raise MotionFileError(_no_such_file(Path(spec)), spec) from refusal
-            raise
+        except MotionError:
+            if motion_file(spec) is None and Path(spec).suffix.lower() not in SUFFIXES:
+                raise
+            return entry_of_file(spec)
 
     def clip(
         self, motion: str | Entry, fps: float | None = None, min_seconds: float | None = None, *, as_is: bool = False
@@ -157,9 +155,15 @@ def open_library(spec: str | Path) -> Library:
     if str(spec) == SYNTHETIC:
         return SyntheticLibrary()
     folder = Path(spec).expanduser()
-    if folder.is_file():
+    try:
+        is_file, is_folder = folder.is_file(), folder.is_dir()
+    except OSError as problem:
+        raise MotionError(
+            f"Expected a folder as library, but {folder} can't be read ({problem.strerror})."
+        ) from problem
+    if is_file:
         raise MotionError(f"Expected 'synthetic' or a folder as library, found the file {folder}. Name its folder.")
-    if not folder.is_dir():
+    if not is_folder:
         raise MotionError(
             f"Expected 'synthetic' or a folder of motion files as library, found nothing at {folder}. "
             "Check the path; `segue motions download` fills a folder with CMU trials."
@@ -327,17 +331,17 @@ def _motion_files(folder: Path, skipped: list[str]) -> Iterator[Path]:
         seen.add(real)
         try:
             found = sorted(path for path in at.iterdir() if not path.name.startswith("."))
+            kinds = [(path, path.is_dir(), path.is_file()) for path in found]
         except OSError as problem:
             skipped.append(f"{at.relative_to(folder)}: can't be listed ({problem.strerror})")
             continue
-        for path in found:
-            if path.is_dir():
+        for path, is_folder, is_file in kinds:
+            if is_folder:
                 (links if path.is_symlink() else folders).append(path)
+            elif path.suffix.lower() in SUFFIXES and is_file:
+                yield path
             elif path.suffix.lower() in SUFFIXES:
-                if path.is_file():
-                    yield path
-                else:
-                    skipped.append(f"{path.relative_to(folder)}: is a link to nothing")
+                skipped.append(f"{path.relative_to(folder)}: is a link to nothing")
 
 
 def _also(skipped: list[str]) -> str:
@@ -370,10 +374,3 @@ def _unknown(name: str, known: Iterable[str], where: str) -> str:
     hint = f" Did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(names[:40]) + (", ..." if len(names) > 40 else "")
     return f"Expected a motion of {where}, found {name!r}.{hint} It has {listed}."
-
-
-def _no_such_file(file: Path) -> str:
-    beside = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
-    near = difflib.get_close_matches(file.name, beside, n=1)
-    hint = f"Did you mean {near[0]!r}?" if near else "Check the path."
-    return f"Expected a motion file, found nothing there. {hint}"
