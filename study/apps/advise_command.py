@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.clips import load_clip
-from study.apps.console import columns, emit, json_option, library_option, progress, say
+from study.apps.clips import clips_options, find_entry, load_clip
+from study.apps.console import columns, emit, json_option, progress, say
 from study.apps.moments import moment
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ POINT = (("_frame", "d"), ("_s", ".2f"), ("_file_frame", ".5g"))
 
 @click.command()
 @click.argument("motions", nargs=-1, metavar="CLIPS...")
-@library_option
+@clips_options
 @click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate.")
 @click.option(
     "--out",
@@ -49,17 +49,29 @@ def advise(
     from study.motion.library import open_library
     from study.transitions.advice import is_cyclic
 
-    names = motions or (open_library(library or "synthetic").names() if library else ())
+    opened = open_library(library) if library else None
+    names = motions or (opened.distinct() if opened else ())
     if len(set(names)) < 2:
         raise click.UsageError(f"expected at least two clips, or --library with two or more, found {len(set(names))}.")
     if out is not None:
         check_place(out / "advice.csv")
     clips, cyclic = {}, {}
-    for name in dict.fromkeys(names):
-        own = load_clip(name, library, None)
-        clips[name], cyclic[name] = resample(own, fps), is_cyclic(own)
-    rows: list[dict[str, Any]] = []
     problems: list[str] = []
+    for name in dict.fromkeys(names):
+        try:
+            own, said = load_clip(name, opened, None), find_entry(name, opened)[1].cyclic
+        except SegueError as error:
+            if motions:
+                raise
+            # A file of a whole folder that can't be read is named, and the others are advised on.
+            problems.append(f"{name}: {error}")
+        else:
+            clips[name], cyclic[name] = resample(own, fps), is_cyclic(own) if said is None else said
+    if len(clips) < 2:
+        raise click.UsageError(
+            f"expected at least two clips that can be read, found {len(clips)}. {'; '.join(problems)}"
+        )
+    rows: list[dict[str, Any]] = []
     pairs = list(permutations(clips, 2))
     with progress("advise") as advance:
         for done, (source, destination) in enumerate(pairs, start=1):

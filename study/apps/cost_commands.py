@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study.apps.clips import clip_pair
-from study.apps.console import emit, json_option, library_option
+from study.apps.clips import clip_pair, clips_options
+from study.apps.console import emit, json_option
 from study.apps.moments import in_words, moment
 from study.counting import counted
 
@@ -22,7 +22,7 @@ LABELS = {"joint": "cost, squared half angles and metres", "pointcloud": "mean s
 @click.command("cost-matrix")
 @click.argument("source", metavar="SRC")
 @click.argument("destination", metavar="DST")
-@library_option
+@clips_options
 @click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate.")
 @click.option("--metric", type=click.Choice(list(LABELS)), default="joint", show_default=True)
 @click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from study.apps.clips import clips_options, load_clip
 from study.apps.console import emit, json_option, library_option, say
 from study.counting import counted
 
 if TYPE_CHECKING:
     from study.motion.skeleton import Skeleton
 
-EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
+if TYPE_CHECKING:
+    from study.motion.library import FolderLibrary
 
 
 @click.group()
@@ -24,64 +27,100 @@ def motions() -> None:
 
 @motions.command("list")
 @library_option
+@click.option("--write", is_flag=True, help="Write a first library.toml into the folder, to be completed by hand.")
 @json_option
-def list_motions(library: str | None, as_json: bool) -> None:
+def list_motions(library: str | None, write: bool, as_json: bool) -> None:
     """The motions that a library offers, by name."""
-    from study.motion.library import open_library
+    from study.motion.library import FolderLibrary, open_library
+    from study.motion.library_file import NAME, write_library_file
 
     opened = open_library(library or "synthetic")
-    rows = [opened.entry(name) for name in opened.names()]
-    lines = [f"{row.name:20} {row.kind:10} {row.words}" for row in rows]
-    result = {
+    result: dict[str, Any] = {
         "library": opened.name,
         "synthetic": opened.synthetic,
         "acknowledgement": opened.acknowledgement,
-        "motions": [{"name": row.name, "kind": row.kind, "words": row.words} for row in rows],
     }
-    emit(result, as_json, "\n".join(lines))
+    if write:
+        if not isinstance(opened, FolderLibrary):
+            raise click.UsageError("expected --library FOLDER with --write, found the synthetic library.")
+        result["written"] = str(write_library_file(opened.folder, first_tables(opened)))
+    rows = [opened.entry(name) for name in opened.names()]
+    skipped = opened.skipped if isinstance(opened, FolderLibrary) else []
+    for line in skipped:
+        say(f"not listed: {line}")
+    widths = [max(map(len, column)) for column in ([row.name for row in rows], [row.kind for row in rows])]
+    lines = [f"{row.name:{widths[0]}}  {row.kind:{widths[1]}}  {row.words}" for row in rows]
+    lines += [f"{result['written']}: a first {NAME}; see docs/libraries.md for its keys"] if write else []
+    motions = [
+        {"name": row.name, "kind": row.kind, "words": row.words, "file": opened.where(row) or None, "genre": row.genre}
+        for row in rows
+    ]
+    emit({**result, "motions": motions, "skipped": skipped}, as_json, "\n".join(lines))
+
+
+def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
+    """Name, file, category and a comment for each file of a folder, for a first `library.toml`."""
+    import warnings
+
+    from study.errors import MotionWarning, SegueError
+    from study.motion.files import read_clip
+
+    tables: list[tuple[str, str, str, str]] = []
+    for name in library.names():
+        entry = library.entry(name)
+        place = library.where(entry)
+        # Names that are no text, as some archives leave them, have no place in a text file.
+        if entry.own and entry.file and place.isprintable() and place not in [table[1] for table in tables]:
+            try:
+                with warnings.catch_warnings(record=True) as said:
+                    warnings.simplefilter("always", MotionWarning)
+                    clip = read_clip(entry.file)
+            except SegueError as error:
+                comment = f"can't be read: {error}"
+            else:
+                seconds = f"{clip.frames} frames at {clip.fps:g} fps, {clip.seconds:.2f} s"
+                comment = "; ".join(
+                    [seconds, f"a unit is {clip.metres_per_unit:.6g} m", *(str(w.message) for w in said)]
+                )
+            tables.append((name, place, entry.kind, comment))
+    return tables
 
 
 @motions.command()
-@click.argument("file", type=EXISTING)
+@click.argument("file")
 @click.option(
     "--metres-per-unit", type=click.FloatRange(min=0, min_open=True), help="The file's length unit, in metres."
 )
 @click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, where the file does not say it.")
 @json_option
-def inspect(file: Path, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
-    """What a motion file holds, and what is wrong with it."""
-    from study.motion.defects import find_defects
-    from study.motion.files import read_clip
+def inspect(file: str, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
+    """What a motion file holds, and what is wrong with it.
 
-    clip = read_clip(file, metres_per_unit=metres_per_unit, fps=fps)
+    The options, else the file's library.toml, say what the file itself leaves open.
+    """
+    from study.motion.defects import find_defects
+    from study.motion.entries import entry_of_file, read_entry
+
+    entry = entry_of_file(file)
+    clip = read_entry(replace(entry, metres_per_unit=metres_per_unit or entry.metres_per_unit, fps=fps or entry.fps))
     defects = find_defects(clip)
     roles = {role: clip.skeleton.names[joint] for role, joint in clip.skeleton.roles.items()}
     result = {
-        "file": str(file),
+        "file": file,
         "frames": clip.frames,
         "fps": clip.fps,
         "seconds": clip.seconds,
+        "metres_per_unit": clip.metres_per_unit,
         "joints": list(clip.skeleton.names),
         "roles": roles,
         "human": clip.skeleton.body.human,
         "missing_roles": dict(clip.skeleton.body.missing),
         "role_notes": list(clip.skeleton.body.notes),
         "history": list(clip.history),
-        "defects": [
-            {
-                "kind": defect.kind,
-                "frame_start": defect.frame_start,
-                "frame_stop": defect.frame_stop,
-                "joint": defect.joint,
-                "size": defect.size,
-                "unit": defect.unit,
-                "message": defect.message,
-            }
-            for defect in defects
-        ],
+        "defects": [asdict(defect) for defect in defects],
     }
     lines = [
-        f"{file.name}: {counted(clip.frames, 'frame')} at {clip.fps:g} fps, {clip.seconds:.2f} s, "
+        f"{Path(file).name}: {counted(clip.frames, 'frame')} at {clip.fps:g} fps, {clip.seconds:.2f} s, "
         f"{counted(clip.skeleton.joints, 'joint')}",
         *clip.history,
         *_role_lines(clip.skeleton),
@@ -128,7 +167,7 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 
 @click.command()
 @click.argument("clip", metavar="FILE|NAME")
-@library_option
+@clips_options
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.mp4, or X.png: a strip.")
 @click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video; the clip's own unless given.")
 @click.option(
@@ -154,7 +193,6 @@ def preview(
     as_json: bool,
 ) -> None:
     """One clip as a video, or as a strip of poses in one picture."""
-    from study.apps.clips import load_clip
     from study.experiment.drawing import draw_clip
 
     width, _, height = size.partition("x")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.console import emit, json_option, library_option, progress, say
+from study.apps.clips import clips_options, find_entry, load_clip
+from study.apps.console import emit, json_option, progress, say
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def load_clips(specs: tuple[str, ...], library: str | None, fps: float) -> tuple
     """Clips as `load_clip` takes them, on the body of the first, named by file or motion."""
     from dataclasses import replace
 
-    from study.apps.clips import load_clip, on_body_of
+    from study.apps.clips import on_body_of
 
     names = [Path(spec).stem if Path(spec).is_file() else spec for spec in specs]
     if len(set(names)) < len(names):
@@ -50,7 +51,7 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
 
 @one_hop.command()
 @click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
-@library_option
+@clips_options
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.npz, or X.bin and X.json."
 )
@@ -95,6 +96,7 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as
         raise click.UsageError(f"expected --out as a name that ends in .npz, .bin or .json, found {str(out)!r}.")
     loaded = load_clips(clips, library, fps)
     check_place(out)
+    options["known_beats"] = known_beats(clips, library, loaded)
     table = build_adaptive_table(loaded, options) if options["adaptive"] else build_fixed_table(loaded, out, options)
     files = write_table(table, out)
     both = np.isfinite(table.costs) & np.isfinite(table.direct_costs)
@@ -195,6 +197,14 @@ def build_adaptive_table(clips: tuple[Clip, ...], options: dict[str, Any]) -> On
     return build_adaptive(clips, switches_of(clips, options), weight, settings=Settings(1, stay, stay))
 
 
+def known_beats(specs: tuple[str, ...], library: str | None, clips: tuple[Clip, ...]) -> list[OffsetArray]:
+    """The frames of each clip's beats as `library.toml` says them; empty where it says none."""
+    from study.transitions.one_hop.beats import beats_at
+
+    times = [find_entry(spec, library)[1].beats for spec in specs]
+    return [beats_at([t - clip.start_s for t in said], clip) for said, clip in zip(times, clips, strict=True)]
+
+
 def beat_offsets(
     clips: tuple[Clip, ...], switches: tuple[Switch, ...], options: dict[str, Any]
 ) -> dict[tuple[int, int], OffsetArray]:
@@ -207,8 +217,11 @@ def beat_offsets(
         raise click.UsageError(f"expected --beats for clips that are given ({', '.join(names)}), found {unknown[0]!r}.")
     if not given and not options["on_beat"]:
         return {}
+    known = options["known_beats"]
     beats = {
-        number: read_beats(given[clip.name], clip) if clip.name in given else find_beats(clip)
+        number: read_beats(given[clip.name], clip)
+        if clip.name in given
+        else (known[number] if len(known[number]) else find_beats(clip))
         for number, clip in enumerate(clips)
     }
     return all_beat_offsets(beats, [switch.source for switch in switches], range(len(clips)))
@@ -255,7 +268,7 @@ def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -
 @one_hop.command()
 @click.argument("table", type=TABLE)
 @click.argument("clips", metavar="[CLIP...]", nargs=-1)
-@library_option
+@clips_options
 @click.option("--first", metavar="CLIP", help="The state to start in; the first clip unless given.")
 @click.option("--trigger", "triggers", type=(int, str), multiple=True, metavar="FRAME DST", help="Go to DST then.")
 @click.option("--method", type=click.Choice(["one-hop", "direct"]), default="one-hop", show_default=True)

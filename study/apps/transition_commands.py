@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
-from study.apps.clips import clip_pair
-from study.apps.console import emit, json_option, library_option
+from study.apps.clips import clip_pair, clips_options
+from study.apps.console import emit, json_option
 from study.apps.moments import in_words, moment
 from study.counting import counted
 
@@ -28,7 +29,7 @@ def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate."),
         click.option("--end", type=click.IntRange(min=0), required=True, help="Last blended frame, in DST."),
         click.option("--start", type=click.IntRange(min=0), required=True, help="First blended frame, in SRC."),
-        library_option,
+        clips_options,
         click.argument("destination", metavar="DST"),
         click.argument("source", metavar="SRC"),
     ):
@@ -148,6 +149,11 @@ def _check_timewarp(specification: str) -> None:
 )
 @click.option("--keep-slide", is_flag=True, help="Leave the feet as blending leaves them, sliding or not.")
 @click.option(
+    "--unit",
+    type=click.Choice(["m", "cm", "mm", "in"]),
+    help="Length unit of X.bvh; SRC's own unless given. Its frame rate is SRC's own, too, unless --fps is given.",
+)
+@click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
 )
 @json_option
@@ -164,37 +170,49 @@ def transition(
     specification: str,
     joints: tuple[str, ...],
     keep_slide: bool,
+    unit: str | None,
     out: Path,
     as_json: bool,
 ) -> None:
-    """Blend from frame --start of SRC to frame --end of DST and write the result."""
+    """Blend from frame --start of SRC to frame --end of DST and write the result.
+
+    --start, --end and --frames are frames at --fps.
+    """
     from study.experiment.drawing import draw_clip
     from study.motion.bvh import write_bvh
+    from study.motion.library_file import UNITS
     from study.transitions.footskate import plant_feet
+    from study.transitions.rates import remade
 
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
     first, second = clip_pair(source, destination, library, fps)
     joined, found = join(first, second, (start, end), method, frames, weight, specification, joint_frames(joints))
+    points = {**moment(first, start, "start"), **moment(second, end, "end")}
+    where = f"from {in_words(first, start, source)} to {in_words(second, end, destination)}"
     slide = {}
+    told = click.get_current_context().get_parameter_source("fps") is not ParameterSource.DEFAULT
+    if out.suffix.lower() == ".bvh" and not told and first.file_fps:
+        first, second = clip_pair(source, destination, library, first.file_fps, tell=False)
+        joined = remade(joined, first, second, weight=weight, joint_frames=joint_frames(joints))
     if not keep_slide:
         joined, planted = plant_feet(joined, first, second)
         slide = {"slide_before_m": planted.slide_before_m, "slide_after_m": planted.slide_after_m}
     if out.suffix.lower() == ".bvh":
-        write_bvh(joined.clip, out)
+        write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
     else:
         draw_clip(joined.clip, out, blended=(joined.blend_start, joined.blend_stop))
+    rate = joined.clip.fps
     result = {
         "file": str(out),
         "frames": joined.clip.frames,
         "blend_frames": joined.blend_frames,
         "blend_start": joined.blend_start,
         "blend_stop": joined.blend_stop,
-        "blend_s": joined.blend_frames / fps,
+        "blend_s": joined.blend_frames / rate,
         "seconds": joined.clip.seconds,
-        "fps": fps,
-        **moment(first, start, "start"),
-        **moment(second, end, "end"),
+        "fps": rate,
+        **points,
         "method": method,
         "cost": None if found is None else found.cost,
         "unclipped_s": getattr(found, "unclipped_s", None),
@@ -203,9 +221,8 @@ def transition(
         **slide,
     }
     text = (
-        f"{out}: {counted(joined.clip.frames, 'frame')} ({joined.clip.seconds:.3f} s at {fps:g} fps), "
-        f"{joined.blend_frames} of them blended ({joined.blend_frames / fps:.3f} s), "
-        f"from {in_words(first, start, source)} to {in_words(second, end, destination)}; {result['note']}"
+        f"{out}: {counted(joined.clip.frames, 'frame')} ({joined.clip.seconds:.3f} s at {rate:g} fps), "
+        f"{joined.blend_frames} of them blended ({joined.blend_frames / rate:.3f} s), {where}; {result['note']}"
     )
     emit(result, as_json, text)
 

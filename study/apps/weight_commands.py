@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.clips import clip_pair, load_clip
-from study.apps.console import emit, json_option, library_option, progress, say
+from study.apps.clips import as_is_option, clip_pair, clips_options, load_clip
+from study.apps.console import emit, json_option, progress, say
 from study.counting import counted, noun
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ ANSWERS = {"g": "good", "b": "bad", "s": "skip", "q": "quit"}
 
 @click.command()
 @click.argument("motions", nargs=-1, required=True, metavar="SRC DST [SRC DST]...")
-@library_option
+@clips_options
 @click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate.")
 @click.option("--best", type=click.IntRange(min=0), default=2, show_default=True, help="Best cuts by each metric.")
 @click.option("--worst", type=click.IntRange(min=0), default=1, show_default=True, help="Worst cuts by each metric.")
@@ -137,6 +137,7 @@ def _drawn(source: Clip, destination: Clip, candidate: Candidate, folder: Path, 
 @click.command("fit-weights")
 @click.argument("table", metavar="TRANSITIONS.csv", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--library", metavar="NAME|FOLDER", help="Where the motions come from; as the table says unless given.")
+@as_is_option
 @click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of the velocities.")
 @click.option("--transfer", nargs=2, metavar="SRC DST", help="A pair of motions that no label is about, to test with.")
 @click.option("--no-cross-validation", is_flag=True, help="Only fit.")

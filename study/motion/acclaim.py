@@ -479,7 +479,7 @@ def _assemble(
         note,
         f"taken at {fps:g} fps, which AMC files don't say",
     )
-    return Clip(skeleton, path * scale, rotations, fps, name=source.path.stem, history=history)
+    return Clip(skeleton, path * scale, rotations, fps, name=source.path.stem, history=history, metres_per_unit=scale)
 
 
 def _rotation(bone: _Bone, values: FloatArray | None, frames: int, degrees: bool) -> FloatArray:

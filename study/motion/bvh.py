@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,11 @@ class _Hierarchy:
 
 
 def read_bvh(
-    path: Path | str, *, metres_per_unit: float | None = None, mapping: Mapping[str, str] | None = None
+    path: Path | str,
+    *,
+    metres_per_unit: float | None = None,
+    fps: float | None = None,
+    mapping: Mapping[str, str] | None = None,
 ) -> Clip:
     """Read a BVH file.
 
@@ -92,6 +97,8 @@ def read_bvh(
     metres_per_unit
         Metres in a unit of the file; by default found from the size of the body (`study.motion.units`), and said
         in the clip's history.
+    fps
+        Frames per second in place of what the file says; said in the clip's history where they differ.
     mapping
         Joint names by role, as `study.motion.rigs.find_roles` takes them.
 
@@ -103,8 +110,9 @@ def read_bvh(
     Warns
     -----
     MotionWarning
-        Where `Frames:` disagrees with the rows (the rows are trusted), a joint's position varies (its median is
-        taken), or a body has no plausible size.
+        Where `Frames:` disagrees with the rows (the rows are trusted), `Frame Time:` is no time between frames but
+        frames per second or milliseconds, a joint's position varies (its median is taken), or a body has no plausible
+        size.
     """
     source = read_source(path, "a BVH file")
     hierarchy, offset = _read_hierarchy(source)
@@ -112,11 +120,16 @@ def read_bvh(
         _warn(f"{source.path}: two joints are called {name!r}; the second is read as {unique!r}")
     if more := len(hierarchy.renamed[_NAMED:]):
         _warn(f"{source.path}: {more} more joints have the name of another, and are numbered likewise")
-    fps, stated, offset = _read_motion_header(source, offset)
+    frame_time, stated, offset = _read_motion_header(source, offset)
     values = parse_table(source, offset, hierarchy.columns)
     if stated is not None and stated != len(values):
         _warn(f"{source.path}: says Frames: {stated}, but holds {counted(len(values), 'row')}; the rows are trusted")
-    return _assemble(source, hierarchy, values, fps, metres_per_unit, mapping)
+    notes = [f"read from {source.path.name}"]
+    if fps is None:
+        fps = _stated_rate(source, frame_time)
+    elif fps != (stated_fps := frame_rate(frame_time.text)):
+        notes.append(f"taken at {fps:g} fps, as told, and not at the file's {stated_fps:g}")
+    return _assemble(source, hierarchy, values, fps, metres_per_unit, mapping, notes)
 
 
 class _Tokens:
@@ -251,8 +264,15 @@ def _channel(source: Source, token: bytes, offset: int, what: str) -> str:
     return name
 
 
-def _read_motion_header(source: Source, offset: int) -> tuple[float, int | None, int]:
-    """Frames per second, the stated number of frames (None where it is missing), and where the rows start."""
+class _FrameTime(NamedTuple):
+    """The seconds between frames as the file prints them, and where."""
+
+    text: str
+    offset: int
+
+
+def _read_motion_header(source: Source, offset: int) -> tuple[_FrameTime, int | None, int]:
+    """The frame time, the stated number of frames (None where it is missing), and where the rows start."""
     stated: int | None = None
     line = re.compile(rb"[ \t]*([^\r\n]*)(\r\n|\r|\n|$)")
     while True:
@@ -281,13 +301,43 @@ def _read_motion_header(source: Source, offset: int) -> tuple[float, int | None,
                 f"found {shown(value)}. Write 1 / fps, such as 0.0083333 for 120 fps.",
             )
         # Digits beyond those of a double say no more.
-        return frame_rate(value.decode() if len(value) <= 40 else repr(seconds)), stated, offset
+        return _FrameTime(value.decode() if len(value) <= 40 else repr(seconds), at), stated, offset
 
 
 # Frame rates that cameras and tools run at; tried first where few digits are printed.
 _COMMON_FPS = tuple(Fraction(f) for f in (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 200, 240))
 _NTSC_FPS = tuple(Fraction(f * 1000, 1001) for f in (24, 30, 48, 60, 120, 240))
 _COMMON_WITHIN = Fraction(2, 100)
+# A second or more between frames is no motion capture, but frames per second or milliseconds. Milliseconds are often
+# printed without decimals, which puts them off by as much as this; some numbers can be either.
+_SLOWEST_S, _ROUNDED_MS = 1.0, Fraction(5, 100)
+_SURELY_FPS, _EITHER = range(48, 501), (10, 12, 15, 20, 40)
+
+
+def _stated_rate(source: Source, frame_time: _FrameTime) -> float:
+    """Frames per second of the file's frame time; where it holds frames per second or milliseconds, with a warning."""
+    value = Fraction(frame_time.text)
+    if value < _SLOWEST_S:
+        return frame_rate(frame_time.text)
+    rates = [float(r) for r in (*_COMMON_FPS, *_NTSC_FPS) if abs(r / value - 1) < Fraction(1, 2000)]
+    rates += [float(value)] if value in _SURELY_FPS else []
+    words = f"{frame_time.text} frames a second"
+    if not rates and value not in _EITHER:
+        per_second = 1000 / value
+        near = [r for r in _COMMON_FPS if abs(per_second / r - 1) < _ROUNDED_MS]
+        rates = [float(r) for r in sorted(near, key=lambda r: abs(r - per_second))]
+        words = f"{frame_time.text} milliseconds"
+    if not rates:
+        raise source.error(
+            frame_time.offset,
+            f"Expected the seconds between frames after 'Frame Time:', found {frame_time.text}. Write 1 / fps, such as "
+            "0.0083333 for 120 fps; or say `fps` in library.toml.",
+        )
+    _warn(
+        f"{source.path}: expected the seconds between frames after 'Frame Time:', found {frame_time.text}; read as "
+        f"{words}, so at {rates[0]:g} fps"
+    )
+    return rates[0]
 
 
 def frame_rate(printed: str) -> float:
@@ -330,6 +380,7 @@ def _assemble(
     fps: float,
     metres_per_unit: float | None,
     mapping: Mapping[str, str] | None,
+    history: list[str],
 ) -> Clip:
     names = tuple(joint.name for joint in hierarchy.joints)
     parents = np.array([joint.parent for joint in hierarchy.joints])
@@ -343,15 +394,14 @@ def _assemble(
     for j, path in paths.items():
         if j > 0:
             offsets[j] = np.median(path, axis=0)
-    history = [f"read from {source.path.name}"]
     whole = Skeleton(names, parents, offsets, end_parents, end_offsets)
     body = with_roles(Clip(whole, paths[0], rotations, fps), mapping).skeleton
-    scale = find_scale(body)
     if metres_per_unit is None:
+        scale = find_scale(body)
         metres_per_unit = scale.metres_per_unit
         history.append(scale.note)
         if not scale.plausible and scale.by_legs:
-            _warn(f"{source.path}: {scale.note}; a person has another size: give metres_per_unit")
+            _warn(f"{source.path}: {scale.note}; a person has another size: say `unit` in library.toml")
     else:
         history.append(f"lengths x {metres_per_unit:.6g} m, as told")
     root = 0
@@ -379,6 +429,7 @@ def _assemble(
         fps,
         name=source.path.stem,
         history=tuple(history),
+        metres_per_unit=metres_per_unit,
     )
 
 
@@ -425,7 +476,7 @@ def _check_rigid(source: Source, name: str, path: FloatArray, offset: FloatArray
         )
 
 
-def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) -> None:
+def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float | None = None) -> None:
     """Write a clip as a BVH file, whole or not at all; reading it back gives the same motion.
 
     Parameters
@@ -435,7 +486,8 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
     path
         The file; one that is there is replaced.
     metres_per_unit
-        The length unit to write; centimetres, which most tools expect, by default.
+        The length unit to write; by default that of the file which the clip was read from, and centimetres for clips
+        that were read from none.
 
     Raises
     ------
@@ -444,6 +496,8 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float = 0.01) ->
     FileError
         Where the file can't be written.
     """
+    path = Path(path)
+    metres_per_unit = clip.metres_per_unit if metres_per_unit is None else metres_per_unit
     lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
     lines += ["MOTION", f"Frames: {clip.frames}", f"Frame Time: {1.0 / clip.fps!r}"]
     degrees = np.degrees(quat.to_euler("ZYX", clip.rotations)).reshape(clip.frames, -1)

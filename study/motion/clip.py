@@ -56,6 +56,8 @@ class Clip:
         Seconds from the first frame of the file to frame 0, for clips that are a part of their file.
     file_fps
         Frames per second of the file, where the clip is at another rate.
+    metres_per_unit
+        Metres in a length unit of the file that the clip was read from; it is written in that unit again.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class Clip:
     synthetic: bool = False
     start_s: float = 0.0
     file_fps: float | None = None
+    metres_per_unit: float = 0.01
 
     def __post_init__(self) -> None:
         positions = np.array(self.root_positions, dtype=np.float64)

@@ -2,12 +2,14 @@
 
 In: a `Clip`. Out: `Defect`s, or a clip without them. Found are the pose that converters add as the first frame, other
 frames at the ends that belong to no motion, jumps of the root, legs that flip (`study.motion.flips`), other joints that
-jump, and a floor that is not at height 0. A jump is a step between two frames that is large, larger than people move,
-and several times those around it: fast motion is fast over several frames, a fault is not.
+jump, a floor that is not at height 0, and a motion several times too slow or too quick (`study.motion.tempo`). A jump
+is a step between two frames that is large, larger than people move, and several times those around it: fast motion is
+fast over several frames, a fault is not.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
@@ -20,12 +22,23 @@ from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
 from study.motion.flips import FLIP_RAD, LegFlips, leg_flips, turn_back
+from study.motion.tempo import wrong_tempo
 from study.motion.upright import lying_axis
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-Kind = Literal["t-pose", "end-jump", "root-jump", "joint-flip", "joint-jump", "below-floor", "floating", "not-upright"]
+Kind = Literal[
+    "t-pose",
+    "end-jump",
+    "root-jump",
+    "joint-flip",
+    "joint-jump",
+    "below-floor",
+    "floating",
+    "not-upright",
+    "frame-time",
+]
 Policy = Literal["mend", "drop", "refuse", "keep"]
 
 # Faults show in single frames, so an angle or a length decides at capture rates; at low rates one frame of fast motion
@@ -61,13 +74,14 @@ class Defect:
     kind
         `"t-pose"` (an added pose at the start), `"end-jump"` (frames at an end that don't continue into the motion),
         `"root-jump"`, `"joint-flip"` (a leg turned to its wrong side), `"joint-jump"`, `"below-floor"`, `"floating"`,
-        `"not-upright"` (a body that lies, or a file with another axis up; not mended).
+        `"not-upright"` (a body that lies, or a file with another axis up; not mended), `"frame-time"` (the motion is
+        several times too slow or too quick; not mended).
     frame_start, frame_stop
         The frames concerned, as a slice counts them; a jump concerns the frames before and after it.
     joint
         The joint's name; empty where the whole body is meant.
     size, unit
-        How large, in `"rad"` or `"m"`.
+        How large, in `"rad"` or `"m"`; of a frame time, `"times"` too long.
     message
         The same in words.
     severity
@@ -88,7 +102,7 @@ def find_defects(clip: Clip) -> tuple[Defect, ...]:
     """All that is wrong with a clip, in the order of frames."""
     found = _Findings(clip)
     defects = [*_end_defects(found), *_root_defects(found), *_flip_defects(found), *_jump_defects(found)]
-    defects += _floor_defects(found)
+    defects += [*_floor_defects(found), *_tempo_defects(clip)]
     return tuple(sorted(defects, key=lambda d: (d.frame_start, d.frame_stop, d.kind, d.joint)))
 
 
@@ -132,6 +146,41 @@ def mend(clip: Clip, defects: Sequence[Defect] | None = None, *, policy: Policy 
     if any(d.kind == "joint-flip" for d in defects):
         left = [d for d in find_defects(mended) if d.kind == "joint-jump" and d.severity == "major"]
     return _mend_all(mended, left) if left else mended
+
+
+# What the line in a clip's history about its defects begins with.
+TOLD = "defects "
+_MENDABLE = {
+    "t-pose": ("an added T-pose", "added T-poses"),
+    "end-jump": ("an end that is no part of the motion", "ends that are no part of the motion"),
+    "root-jump": ("a jump of the root", "jumps of the root"),
+    "joint-flip": ("a flip of a leg", "flips of a leg"),
+    "joint-jump": ("a jump of a joint", "jumps of joints"),
+    "below-floor": ("feet below the floor", "feet below the floor"),
+    "floating": ("feet above the floor", "feet above the floor"),
+}
+
+
+def told(defects: Sequence[Defect], *, kept: bool, first_frame: int) -> str:
+    """A clip's defects and what became of them, in one line for its history.
+
+    Parameters
+    ----------
+    defects
+        What was found.
+    kept
+        Whether they are still there.
+    first_frame
+        The frame of the file that is frame 0 of the clip.
+    """
+    counts: Counter[str] = Counter(defect.kind for defect in defects)
+    found = {kind: words for kind, words in _MENDABLE.items() if counts[kind]}
+    mended = [one if counts[kind] == 1 else f"{counts[kind]} {many}" for kind, (one, many) in found.items()]
+    left = [defect.message for defect in defects if defect.kind not in _MENDABLE]
+    parts = [f"{'kept' if kept else 'dropped or mended'}: {', '.join(mended)}"] if mended else []
+    parts += [f"not mended: {'; '.join(left)}"] if left else []
+    parts += [f"frame 0 is frame {first_frame} of the file"] if first_frame else []
+    return TOLD + "; ".join(parts)
 
 
 # -- Finding --------------------------------------------------------------------------------------------------------
@@ -302,6 +351,13 @@ def _explained(clip: Clip, joint: int, jump: int, flipping: dict[str, tuple[tupl
 
 def _clusters(jumps: IntArray, gap: int) -> list[IntArray]:
     return [c for c in np.split(jumps, np.flatnonzero(np.diff(jumps) > gap) + 1) if len(c)]
+
+
+def _tempo_defects(clip: Clip) -> list[Defect]:
+    tempo = wrong_tempo(clip)
+    if tempo is None:
+        return []
+    return [Defect("frame-time", 0, clip.frames, "", tempo.times, "times", tempo.message(clip.fps), "major")]
 
 
 def _floor_defects(found: _Findings) -> list[Defect]:

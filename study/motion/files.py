@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from study.errors import MotionError, MotionFileError
@@ -53,11 +52,7 @@ def read_clip(
         rate = CMU_FPS if fps is None else fps
         return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=rate, mapping=mapping))
     if suffix == ".bvh":
-        clip = put_upright(read_bvh(path, metres_per_unit=metres_per_unit, mapping=mapping))
-        if fps is None or fps == clip.fps:
-            return clip
-        note = f"taken at {fps:g} fps, as told, and not at the file's {clip.fps:g}"
-        return replace(clip, fps=fps, history=(*clip.history, note))
+        return put_upright(read_bvh(path, metres_per_unit=metres_per_unit, fps=fps, mapping=mapping))
     hint = "; name the .amc file, and its .asf is found beside it" if suffix == ".asf" else ""
     found = by_suffix(path) or f"found {suffix or 'no suffix'}{hint}."
     raise MotionFileError(f"Expected a motion file ({', '.join(SUFFIXES)}), {found}", path)

@@ -1,25 +1,40 @@
 """The library: motions by name, synthetic or from a folder of motion capture.
 
-In: `"synthetic"`, or a folder that holds CMU trials (the official layout, a flat folder of BVH conversions, or both,
-nested) or any other `.bvh` and `.amc` files. Out: `Clip`s that are fit for use: defects mended, cut to the usable
-frames, floor at zero, starting over the origin towards +Z, at the frame rate asked for. Protocols name motions, not
-files, so that each runs on any library.
+In: `"synthetic"`, or a folder of `.bvh` and `.amc` files, nested or not, which may have a `library.toml`. Out: `Clip`s
+that are fit for use: defects dropped or mended, floor at zero, starting over the origin towards +Z, at the frame rate
+asked for. Every file has a name of its own; CMU trials have the names of the index as well. Protocols name motions,
+not files, so that each runs on any library.
 """
 
 from __future__ import annotations
 
 import difflib
+import os
 from abc import ABC, abstractmethod
-from collections import OrderedDict
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections import Counter, OrderedDict, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from math import ceil
 from pathlib import Path
 
-from study.counting import counted
-from study.errors import MotionError
-from study.motion.clip import Clip, resample, trim
-from study.motion.cmu import CMU_ACKNOWLEDGEMENT, CMU_SITE, Boundary, IndexedMotion, Take, cmu_index, is_trial
+from study.errors import MotionError, MotionFileError
+from study.motion.clip import Clip, resample
+from study.motion.cmu import CMU_ACKNOWLEDGEMENT, CMU_SITE, Boundary, IndexedMotion, cmu_index, is_trial
 from study.motion.download import download_trial
+from study.motion.entries import (
+    Entry,
+    entry_of_file,
+    indexed_entries,
+    is_indexed,
+    motion_file,
+    named_entries,
+    own_entry,
+    own_names,
+    own_tables,
+    prepared,
+)
+from study.motion.files import SUFFIXES
+from study.motion.library_file import LibraryFile, absolute, composed, find_library_file, placed
 
 __all__ = ["CMU_ACKNOWLEDGEMENT", "Entry", "Library", "download_trial", "open_library"]
 
@@ -27,52 +42,6 @@ SYNTHETIC = "synthetic"
 
 # Clips kept in memory; a clip of ten seconds at 30 fps takes 0.3 MB, the longest captured ones 6 MB.
 _KEPT_CLIPS = 48
-
-
-@dataclass(frozen=True)
-class Entry:
-    """What a library knows of a motion without reading it.
-
-    Parameters
-    ----------
-    name
-        What protocols call it.
-    kind
-        walking, running, standing, turning, boxing, dancing, tai-chi, or `""` where nobody said.
-    words
-        A few words for lists.
-    start, end
-        How it begins and ends: `"gait"`, `"still"`, or `""` where it can't be continued (or nobody looked).
-    file
-        The file it comes from; None for synthetic motions.
-    first_frame, last_frame
-        Usable frames of the file, both included, counted from 0 at the file's rate; `last_frame` None for the last.
-    mirrored
-        Whether the file is mirrored left to right to give the motion.
-    trial
-        The CMU trial, or `""`.
-    """
-
-    name: str
-    kind: str = ""
-    words: str = ""
-    start: Boundary = ""
-    end: Boundary = ""
-    file: Path | None = None
-    first_frame: int = 0
-    last_frame: int | None = None
-    mirrored: bool = False
-    trial: str = ""
-
-    @property
-    def cyclic_start(self) -> bool:
-        """Whether the motion can be continued backwards from its start."""
-        return bool(self.start)
-
-    @property
-    def cyclic_end(self) -> bool:
-        """Whether the motion can be continued beyond its end."""
-        return bool(self.end)
 
 
 class Library(ABC):
@@ -83,7 +52,7 @@ class Library(ABC):
     acknowledgement: str
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[tuple[str, float | None, float | None], Clip] = OrderedDict()
+        self._kept: OrderedDict[tuple[Entry, float | None, float | None, bool], Clip] = OrderedDict()
 
     @abstractmethod
     def names(self) -> tuple[str, ...]:
@@ -104,36 +73,70 @@ class Library(ABC):
         """
         return "" if entry.file is None else entry.file.name
 
-    @abstractmethod
-    def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
-        """Read or synthesize a motion."""
+    def distinct(self) -> tuple[str, ...]:
+        """The motions, no file twice: by its further names where it has any, else by its own."""
+        return self.names()
 
-    def clip(self, name: str, fps: float | None = None, min_seconds: float | None = None) -> Clip:
+    def find(self, spec: str) -> Entry:
+        """A motion by its name, or a motion file by its path.
+
+        Raises
+        ------
+        MotionError
+            For what is neither.
+        """
+        try:
+            return self.entry(spec)
+        except MotionError:
+            if motion_file(spec) is None and Path(spec).suffix.lower() not in SUFFIXES:
+                raise
+            return entry_of_file(spec)
+
+    def clip(
+        self, motion: str | Entry, fps: float | None = None, min_seconds: float | None = None, *, as_is: bool = False
+    ) -> Clip:
         """A motion, fit for use.
 
         Parameters
         ----------
-        name
-            One of `names()`.
+        motion
+            One of `names()`, or an entry.
         fps
             Frames per second; by default those of the file (30 for synthetic motions).
         min_seconds
             At least so long: synthetic motions are made so long; captured ones are continued at their end, so that
             their frames keep their numbers, where they end in cycles or standing still, and stay as long as they are
             where they don't. Use `cycles.extend` to continue a clip at its start, too.
+        as_is
+            Leave a file's defects in, and its floor and place as they are.
 
         Raises
         ------
         MotionError
             For a name that is not there, or a file that can't be read.
         """
-        key = (name, None if fps is None else float(fps), min_seconds)
+        entry = self.entry(motion) if isinstance(motion, str) else motion
+        key = (entry, None if fps is None else float(fps), min_seconds, as_is)
         if key not in self._kept:
-            self._kept[key] = self._make(self.entry(name), fps, min_seconds)
+            self._kept[key] = _made(entry, fps, min_seconds, as_is)
             while len(self._kept) > _KEPT_CLIPS:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
         return self._kept[key]
+
+
+def _made(entry: Entry, fps: float | None, min_seconds: float | None, as_is: bool) -> Clip:
+    """Read or synthesize a motion; the one way in which an entry becomes a clip."""
+    if entry.file is None:
+        from study.motion import synthetic
+
+        return synthetic.synthesize(entry.name, seconds=min_seconds, fps=30.0 if fps is None else fps)
+    clip = prepared(entry, as_is=as_is)
+    if min_seconds is not None and clip.seconds < min_seconds and entry.cyclic_end:
+        from study.motion.cycles import extend
+
+        clip = extend(clip, frames_after=ceil(min_seconds * clip.fps) - clip.frames).clip
+    return clip if fps is None else resample(clip, fps)
 
 
 def open_library(spec: str | Path) -> Library:
@@ -152,9 +155,15 @@ def open_library(spec: str | Path) -> Library:
     if str(spec) == SYNTHETIC:
         return SyntheticLibrary()
     folder = Path(spec).expanduser()
-    if folder.is_file():
+    try:
+        is_file, is_folder = folder.is_file(), folder.is_dir()
+    except OSError as problem:
+        raise MotionError(
+            f"Expected a folder as library, but {folder} can't be read ({problem.strerror})."
+        ) from problem
+    if is_file:
         raise MotionError(f"Expected 'synthetic' or a folder as library, found the file {folder}. Name its folder.")
-    if not folder.is_dir():
+    if not is_folder:
         raise MotionError(
             f"Expected 'synthetic' or a folder of motion files as library, found nothing at {folder}. "
             "Check the path; `segue motions download` fills a folder with CMU trials."
@@ -184,35 +193,78 @@ class SyntheticLibrary(Library):
         end: Boundary = "gait" if about.cyclic_end else ""
         return Entry(name, about.kind, f"synthetic: {about.line}", start, end)
 
-    def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
-        from study.motion import synthetic
-
-        return synthetic.synthesize(entry.name, seconds=min_seconds, fps=30.0 if fps is None else fps)
-
 
 class FolderLibrary(Library):
-    """Motion files below a folder: CMU trials under the names of the index, others under their own."""
+    """Motion files below a folder: each under its own name, and under those of the CMU index and of `library.toml`."""
 
     synthetic = False
 
     def __init__(self, folder: Path) -> None:
         super().__init__()
         self.name = str(folder)
-        self.folder = folder
-        self._files = files = _motion_files(folder)
-        if not files:
+        self.folder = absolute(folder)
+        self.skipped: list[str] = []
+        self._files = sorted(_motion_files(self.folder, self.skipped))
+        if not self._files:
             raise MotionError(
                 f"Expected .bvh or .amc files in {folder} or its subfolders, {_only_others(folder)} Put motion files "
-                "there, or fill it with `segue motions download`."
+                f"there, or fill it with `segue motions download`.{_also(self.skipped)}"
             )
-        trials, others = _sorted_out(files)
-        indexed = {take.trial for motion in cmu_index().values() for take in motion.takes}
-        self._is_cmu = bool(indexed & set(trials)) or (folder / "subjects").is_dir()
+        self._described = {at: find_library_file(at) for at in {file.parent for file in self._files}}
+        self._check_tables()
+        self._trials = _trials(self._files)
+        self._is_cmu = any(map(is_indexed, self._trials)) or (self.folder / "subjects").is_dir()
         self.acknowledgement = CMU_ACKNOWLEDGEMENT if self._is_cmu else ""
-        self._trials: Mapping[str, Path] = trials
-        self._entries = _own_entries(folder, others, {} if self._is_cmu else trials)
-        if self._is_cmu:
-            self._entries = {**_indexed_entries(trials), **self._entries}
+        self._entries = self._all_entries()
+        self._by_place: defaultdict[str, list[str]] = defaultdict(list)
+        for name, entry in self._entries.items():
+            if entry.own and entry.file is not None:
+                place = placed(entry.file, self.folder)
+                for way in {composed(entry.file.stem), place, place.removesuffix(entry.file.suffix)}:
+                    self._by_place[way].append(name)
+
+    def _description(self, file: Path) -> LibraryFile | None:
+        return self._described[file.parent]
+
+    def _all_entries(self) -> dict[str, Entry]:
+        """First the names of `library.toml`, then those of the index, then the files' own, then numbers of trials."""
+        folders = {file: one.path.parent for file in self._files if (one := self._description(file)) is not None}
+        named = [
+            entry
+            for file in self._files
+            for entry in named_entries(file, placed(file, self.folder), self._description(file))
+        ]
+        entries = _by_name(named, self.folder, folders)
+        given = {file: tables[0].name for file in self._files if (tables := own_tables(file, self._description(file)))}
+        times = Counter((*given.values(), *entries))
+        given = {file: name for file, name in given.items() if times[name] == 1}
+        names = own_names(self._files, self.folder, given, entries)
+        own = {name: self._own(file, name) for file, name in names.items()}
+        indexed = {entry.name: entry for entry in indexed_entries(self._trials, self._description)}
+        numbers = {trial: self._own(file, trial) for trial, file in self._trials.items()}
+        for more in (indexed, dict(sorted(own.items())), numbers):
+            entries |= {
+                name: entry for name, entry in more.items() if name not in entries and own.get(name, entry) is entry
+            }
+        return entries
+
+    def _own(self, file: Path, name: str) -> Entry:
+        return own_entry(file, name, placed(file, self.folder), self._description(file))
+
+    def _check_tables(self) -> None:
+        """Refuse a `library.toml` with tables about files that are not there."""
+        for described in {id(one): one for one in self._described.values() if one is not None}.values():
+            places = [placed(f, described.path.parent) for f in self._files if f.is_relative_to(described.path.parent)]
+            inside = self.folder == described.path.parent or self.folder in described.path.parents
+            for table in described.tables:
+                if inside and table.file not in places:
+                    near = difflib.get_close_matches(table.file, places, n=1)
+                    hint = f" Did you mean {near[0]!r}?" if near else ""
+                    raise MotionFileError(
+                        f"[clips.{table.name!r}] file: expected a motion file in {described.path.parent}, found none "
+                        f"at {table.file!r}.{hint}",
+                        described.path,
+                    )
 
     def where(self, entry: Entry) -> str:
         if entry.file is None or not entry.file.is_relative_to(self.folder):
@@ -222,88 +274,74 @@ class FolderLibrary(Library):
     def names(self) -> tuple[str, ...]:
         return tuple(self._entries)
 
+    def distinct(self) -> tuple[str, ...]:
+        named = {entry.file for entry in self._entries.values() if not entry.own}
+        once: dict[object, str] = {}
+        for name, entry in self._entries.items():
+            if not entry.own or entry.file not in named:
+                once.setdefault(entry.file if entry.own else name, name)
+        return tuple(once.values())
+
     def files(self) -> tuple[Path, ...]:
-        return tuple(self._files)
+        described = {one.path for one in self._described.values() if one is not None}
+        return (*self._files, *sorted(described))
 
     def trials(self) -> tuple[str, ...]:
         """The CMU trials that are there; each can be asked for by its number as well."""
         return tuple(self._trials)
 
     def entry(self, name: str) -> Entry:
-        if name in self._entries:
-            return self._entries[name]
-        if name in self._trials:
-            return Entry(name, words="CMU trial", file=self._trials[name], trial=name)
+        for wanted in (name, composed(name)):
+            if wanted in self._entries:
+                return self._entries[wanted]
         if self._is_cmu and name in cmu_index():
             raise MotionError(_missing(cmu_index()[name], self.folder))
-        same_stem = [known for known in self._entries if known.rsplit("/", 1)[-1] == name]
-        if same_stem:
+        placed_so = self._by_place.get(composed(name), [])
+        if len(placed_so) == 1:
+            return self._entries[placed_so[0]]
+        if placed_so:
             raise MotionError(
-                f"Expected one file named {name!r} in {self.folder}, found {len(same_stem)}. "
-                f"Say which: {', '.join(same_stem)}."
+                f"Expected one file named {name!r} in {self.name}, found {len(placed_so)}. "
+                f"Say which: {', '.join(placed_so)}."
             )
-        raise MotionError(_unknown(name, (*self._entries, *self._trials), str(self.folder)))
-
-    def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
-        clip = prepared(entry)
-        if min_seconds is not None and clip.seconds < min_seconds and entry.cyclic_end:
-            from math import ceil
-
-            from study.motion.cycles import extend
-
-            clip = extend(clip, frames_after=ceil(min_seconds * clip.fps) - clip.frames).clip
-        return clip if fps is None else resample(clip, fps)
+        raise MotionError(_unknown(name, self._entries, self.name))
 
 
-def prepared(entry: Entry) -> Clip:
-    """Read an entry's file and make it fit for use, at the file's own frame rate; the clip's history says how."""
-    from study.motion.defects import find_defects, mend
-    from study.motion.feet import faced, grounded
-    from study.motion.files import read_clip
-    from study.motion.mirror import mirror
-
-    if entry.file is None:
-        raise MotionError(f"Expected a file behind {entry.name!r}, found none.")
-    clip = read_clip(entry.file)
-    if entry.trial:
-        clip = clip.noting(f"CMU trial {entry.trial}, as {entry.name!r}")
-    clip = _without_added_pose(clip, entry)
-    clip = _usable(clip, entry)
-    clip = mend(clip, find_defects(clip))
-    if entry.mirrored:
-        clip = mirror(clip)
-    has_legs = {"hip.L", "hip.R", "ankle.L", "ankle.R"} <= set(clip.skeleton.roles)
-    if has_legs:
-        clip = grounded(faced(clip))
-    return replace(clip, name=entry.name)
+def _by_name(entries: Iterable[Entry], folder: Path, described: dict[Path, Path]) -> dict[str, Entry]:
+    """Entries by name; names that several `library.toml`s give stand behind the folders of these."""
+    listed = list(entries)
+    times = Counter(entry.name for entry in listed)
+    named: dict[str, Entry] = {}
+    for entry in listed:
+        name = entry.name
+        if times[name] > 1 and entry.file is not None and described[entry.file].is_relative_to(folder):
+            name = (described[entry.file].relative_to(folder) / name).as_posix()
+        named[name] = replace(entry, name=name)
+    return named
 
 
-def _without_added_pose(clip: Clip, entry: Entry) -> Clip:
-    """Drop the T-pose that BVH conversions of CMU trials have in front, so that frames count as in the original."""
-    from study.motion.defects import find_defects
-
-    if not entry.trial or entry.file is None or entry.file.suffix.lower() != ".bvh":
-        return clip
-    added = [defect for defect in find_defects(clip) if defect.kind == "t-pose" and defect.frame_start == 0]
-    return trim(clip, added[0].frame_stop, clip.frames) if added else clip
-
-
-def _usable(clip: Clip, entry: Entry) -> Clip:
-    """The usable frames of an entry's file."""
-    stop = clip.frames if entry.last_frame is None else entry.last_frame + 1
-    if not 0 <= entry.first_frame < stop <= clip.frames:
-        raise MotionError(
-            f"Expected frames {entry.first_frame} to {stop - 1} for {entry.name!r} in {entry.file}, found "
-            f"{counted(clip.frames, 'frame')}. The file is not the whole trial; download it again."
-        )
-    return trim(clip, entry.first_frame, stop)
-
-
-def _motion_files(folder: Path) -> list[Path]:
-    from study.motion.files import SUFFIXES
-
-    found = (path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
-    return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+def _motion_files(folder: Path, skipped: list[str]) -> Iterator[Path]:
+    """The motion files below a folder, links followed; what can't be listed or followed is noted in `skipped`."""
+    seen: set[str] = set()
+    folders, links = [folder], list[Path]()
+    while folders or links:
+        at = folders.pop() if folders else links.pop(0)
+        if (real := os.path.realpath(at)) in seen:
+            continue  # a link to where we have been
+        seen.add(real)
+        try:
+            found = sorted(path for path in at.iterdir() if not path.name.startswith("."))
+            kinds = [(path, path.is_dir(), path.is_file()) for path in found]
+        except OSError as problem:
+            skipped.append(f"{at.relative_to(folder)}: can't be listed ({problem.strerror})")
+            continue
+        for path, is_folder, is_file in kinds:
+            if is_folder:
+                (links if path.is_symlink() else folders).append(path)
+            elif path.suffix.lower() in SUFFIXES and is_file:
+                yield path
+            elif path.suffix.lower() in SUFFIXES:
+                skipped.append(f"{path.relative_to(folder)}: is a link to nothing")
 
 
 def _only_others(folder: Path) -> str:
@@ -314,58 +352,17 @@ def _only_others(folder: Path) -> str:
     return str(by_suffix(others[0])) if others else "found none."
 
 
-def _sorted_out(files: Iterable[Path]) -> tuple[dict[str, Path], list[Path]]:
-    """CMU trials by number (the original where a conversion is there, too), and all other files."""
+def _also(skipped: list[str]) -> str:
+    return f" ({'; '.join(skipped)}.)" if skipped else ""
+
+
+def _trials(files: Iterable[Path]) -> dict[str, Path]:
+    """CMU trials by number: the original where a conversion is there, too."""
     trials: dict[str, Path] = {}
-    others = []
     for file in files:
-        if not is_trial(file.stem):
-            others.append(file)
-        elif file.stem not in trials or file.suffix.lower() == ".amc":
+        if is_trial(file.stem) and (file.stem not in trials or file.suffix.lower() == ".amc"):
             trials[file.stem] = file
-    return dict(sorted(trials.items())), others
-
-
-def _own_entries(folder: Path, others: Iterable[Path], trials: Mapping[str, Path]) -> dict[str, Entry]:
-    """Files under their stems; where two have the same stem, under their path without the suffix."""
-    files = [*others, *trials.values()]
-    stems = [file.stem for file in files]
-    entries: dict[str, Entry] = {}
-    for file in files:
-        path = file.relative_to(folder)
-        name = file.stem if stems.count(file.stem) == 1 else path.with_suffix("").as_posix()
-        if name in entries:
-            raise MotionError(
-                f"Expected motion files with different names in {folder}, found {path} beside "
-                f"{name}{(entries[name].file or path).suffix}. Rename or remove one."
-            )
-        entries[name] = Entry(name, words=path.as_posix(), file=file)
-    return entries
-
-
-def _indexed_entries(trials: Mapping[str, Path]) -> dict[str, Entry]:
-    """The motions of the CMU index whose files are there, each by its best take."""
-    entries = {}
-    for motion in cmu_index().values():
-        take = next((take for take in motion.takes if take.trial in trials), None)
-        if take is not None:
-            entries[motion.name] = _entry_of(motion, take, trials[take.trial])
-    return entries
-
-
-def _entry_of(motion: IndexedMotion, take: Take, file: Path) -> Entry:
-    return Entry(
-        name=motion.name,
-        kind=motion.kind,
-        words=f"{motion.words} (CMU {take.trial}{', mirrored' if take.mirrored else ''})",
-        start=take.start,
-        end=take.end,
-        file=file,
-        first_frame=take.first,
-        last_frame=take.last,
-        mirrored=take.mirrored,
-        trial=take.trial,
-    )
+    return dict(sorted(trials.items()))
 
 
 def _missing(motion: IndexedMotion, folder: Path) -> str:

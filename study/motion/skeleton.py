@@ -54,17 +54,17 @@ class Skeleton:
 
     def __post_init__(self) -> None:
         joints = len(self.names)
-        for field, kind, shape in (
+        for label, kind, shape in (
             ("parents", np.int64, (joints,)),
             ("offsets", np.float64, (joints, 3)),
             ("end_parents", np.int64, (len(self.end_parents),)),
             ("end_offsets", np.float64, (len(self.end_parents), 3)),
         ):
-            array = np.array(getattr(self, field), dtype=kind)
+            array = np.array(getattr(self, label), dtype=kind)
             if array.shape != shape:
-                raise MotionError(f"Expected skeleton {field} of shape {shape}, got {array.shape}.")
+                raise MotionError(f"Expected skeleton {label} of shape {shape}, got {array.shape}.")
             array.setflags(write=False)
-            object.__setattr__(self, field, array)
+            object.__setattr__(self, label, array)
         if len(set(self.names)) != joints:
             twice = sorted(name for name, times in Counter(self.names).items() if times > 1)
             raise MotionError(f"Expected unique joint names, found {', '.join(twice)} more than once.")

@@ -364,6 +364,7 @@ def _assemble(
         positions,
         rotations,
         source.fps,
+        metres_per_unit=source.metres_per_unit,
         name=f"{names[0]} to {names[1]}",
         history=(
             *(f"{names[0]}: {line}" for line in source.history),

@@ -16,6 +16,7 @@ from study.motion import quaternions as quat
 from study.motion.bvh import frame_rate, read_bvh, write_bvh
 from study.motion.clip import joint_positions
 from study.motion.digits import parse_words, split_words
+from study.motion.units import CMU_UNIT
 
 HIERARCHY = """HIERARCHY
 ROOT Hips
@@ -305,12 +306,48 @@ def test_fast_numbers_know_what_is_none(word: str) -> None:
 def test_writing_and_reading_gives_the_same_motion(tmp_path: Path, bvh: Callable[[str], Path]) -> None:
     clip = read_bvh(bvh(HIERARCHY + ROWS), metres_per_unit=1.0)
     path = tmp_path / "out.bvh"
-    write_bvh(clip, path)
+    write_bvh(clip, path, metres_per_unit=0.01)
     again = read_bvh(path, metres_per_unit=0.01)
     assert again.skeleton.names == clip.skeleton.names
     assert again.fps == clip.fps
     assert np.allclose(joint_positions(again, ends=True), joint_positions(clip, ends=True), rtol=0, atol=1e-9)
     assert [p.name for p in tmp_path.iterdir() if p.name != "clip.bvh"] == ["out.bvh"]
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01, 0.0254, CMU_UNIT])
+def test_a_file_is_written_in_the_unit_that_it_was_read_in(
+    tmp_path: Path, bvh: Callable[[str], Path], unit: float
+) -> None:
+    write_bvh(read_bvh(bvh(HIERARCHY + ROWS), metres_per_unit=unit), tmp_path / "out.bvh")
+    assert "OFFSET 0 0.5 0" in (tmp_path / "out.bvh").read_text()
+
+
+@pytest.mark.parametrize(
+    ("stated", "fps", "words"),
+    [
+        ("30", 30.0, "30 frames a second"),
+        ("120.0", 120.0, "frames a second"),
+        ("59.94", 60000 / 1001, "frames a second"),
+        ("250", 250.0, "frames a second"),
+        ("33.3333", 30.0, "milliseconds"),
+        ("8.3333", 120.0, "8.3333 milliseconds"),
+        ("16", 60.0, "milliseconds"),
+    ],
+)
+def test_a_frame_time_that_is_none_is_read_as_what_it_must_be(
+    bvh: Callable[[str], Path], stated: str, fps: float, words: str
+) -> None:
+    path = bvh(HIERARCHY + ROWS.replace("0.0083333", stated))
+    with pytest.warns(MotionWarning, match=rf"Frame Time:', found {stated}; read as .*{words}, so at {fps:g} fps"):
+        assert read_bvh(path).fps == fps
+    assert read_bvh(path, fps=25.0).fps == 25.0, "whoever says it is not warned"
+
+
+@pytest.mark.parametrize("stated", ["1", "2", "10", "20", "40", "33333", "1e6"])
+def test_a_frame_time_that_may_be_anything_is_refused(bvh: Callable[[str], Path], stated: str) -> None:
+    said = refusal(bvh(HIERARCHY + ROWS.replace("0.0083333", stated)))
+    assert f"Expected the seconds between frames after 'Frame Time:', found {stated}" in said
+    assert "`fps` in library.toml" in said
 
 
 def test_an_interrupted_write_leaves_the_old_file(
@@ -388,5 +425,5 @@ def test_real_files_come_back_from_writing(mocap: Path, tmp_path: Path) -> None:
     write_bvh(clip, tmp_path / "02_03.bvh")
     again = read_bvh(tmp_path / "02_03.bvh")
     assert again.fps == 120.0
-    assert "centimetres" in " ".join(again.history)
+    assert again.metres_per_unit == clip.metres_per_unit == CMU_UNIT
     assert np.max(np.abs(joint_positions(again, ends=True) - joint_positions(clip, ends=True))) < 1e-7

@@ -5,19 +5,21 @@ from __future__ import annotations
 import http.server
 import shutil
 import threading
+import unicodedata
 from collections.abc import Iterator
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
 
-from study.errors import FileError, MotionError
+from study.errors import FileError, MotionError, MotionFileError
 from study.motion.bvh import write_bvh
 from study.motion.clip import Clip, joint_positions, moved, trim
 from study.motion.cmu import CMU_ACKNOWLEDGEMENT, cmu_index, is_trial, trial_files
 from study.motion.cycles import find_cycle
 from study.motion.download import download_trial
+from study.motion.entries import motion_file
 from study.motion.feet import faced, floor_height, foot_points, grounded, heading, stance
 from study.motion.library import FolderLibrary, open_library
 from study.motion.synthetic import synthesize
@@ -128,10 +130,71 @@ def test_equal_stems_are_told_apart_by_folder(plain_folder: Path) -> None:
         library.clip("short")
 
 
-def test_one_name_in_two_formats_is_refused(plain_folder: Path) -> None:
+def test_files_that_would_have_one_name_are_all_reachable(plain_folder: Path) -> None:
     (plain_folder / "stroll.amc").write_text(":FULLY-SPECIFIED\n")
-    with pytest.raises(MotionError, match=r"different names in .* found stroll\.(amc|bvh) beside stroll"):
-        open_library(plain_folder)
+    for other in ("Stroll.bvh", "stroll.BVH", "indoors/away.bvh"):
+        (plain_folder / other).parent.mkdir(exist_ok=True)
+        shutil.copy(plain_folder / "stroll.bvh", plain_folder / other)
+    library = open_library(plain_folder)
+    assert set(library.names()) == {
+        *("stroll.amc", "stroll.bvh", "stroll.BVH", "Stroll"),
+        *("away", "indoors/away", "short"),
+    }
+    for name in library.names():
+        place = library.where(library.entry(name))
+        assert name in place
+        assert library.entry(place) == library.entry(name)
+    assert {library.entry(name).file for name in library.names()} == set(library.files())
+    with pytest.raises(MotionError, match=r"named 'stroll' .* found 3. Say which: stroll.BVH, stroll.amc, stroll.bvh"):
+        library.clip("stroll")
+
+
+@pytest.mark.parametrize("name", ["läuft", "walk [1]", " two  blanks", "(a) b{c}", "50%", "歩く", "-dash", "a;b&c"])
+@pytest.mark.parametrize("form", ["NFC", "NFD"])
+def test_names_work_as_they_are_listed_and_as_people_type_them(
+    tmp_path: Path, walk: Clip, name: str, form: Literal["NFC", "NFD"]
+) -> None:
+    file = tmp_path / f"{unicodedata.normalize(form, name)}.bvh"
+    write_bvh(walk, file)
+    library = open_library(tmp_path)
+    assert library.names() == (unicodedata.normalize("NFC", name),)
+    for typed in ("NFC", "NFD"):
+        assert library.entry(unicodedata.normalize(typed, name)).file == file  # type: ignore[arg-type]
+    assert motion_file(str(tmp_path / f"{unicodedata.normalize('NFC', name)}.bvh")) == file
+
+
+def test_one_name_in_both_forms_of_accents_is_two_files(tmp_path: Path, walk: Clip) -> None:
+    for form in ("NFC", "NFD"):
+        write_bvh(walk, tmp_path / f"{unicodedata.normalize(form, 'läuft')}.bvh")  # type: ignore[arg-type]
+    library = open_library(tmp_path)
+    assert len({library.entry(name).file for name in library.names()}) == len(library.names()) == 2
+
+
+def test_links_are_followed_and_what_is_left_out_is_told(plain_folder: Path) -> None:
+    (plain_folder / "elsewhere").symlink_to(plain_folder / "outside")
+    (plain_folder / "outside" / "up").symlink_to(plain_folder)
+    (plain_folder / "same.bvh").symlink_to("stroll.bvh")
+    (plain_folder / "gone.bvh").symlink_to("nothing.bvh")
+    (plain_folder / "._stroll.bvh").write_bytes(b"")
+    library = open_library(plain_folder)
+    assert isinstance(library, FolderLibrary)
+    assert set(library.names()) == {"stroll", "away", "short", "same"}
+    assert library.skipped == ["gone.bvh: is a link to nothing"]
+
+
+def test_a_clip_is_one_clip_by_path_and_by_name(plain_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    library = open_library(plain_folder)
+    monkeypatch.chdir(plain_folder / "outside")
+    named = library.clip("short")
+    for spec in ("short.bvh", "../outside/short.bvh", str(plain_folder / "outside" / "short.bvh")):
+        other = library.clip(open_library("synthetic").find(spec))
+        assert other.name == named.name
+        np.testing.assert_array_equal(other.rotations, named.rotations)
+        np.testing.assert_array_equal(other.root_positions, named.root_positions)
+    with pytest.raises(
+        MotionFileError, match=r"shrt.bvh: Expected a motion file, found nothing there. Did you mean 's"
+    ):
+        library.find("shrt.bvh")
 
 
 def test_missing_empty_and_mistaken_folders(tmp_path: Path, plain_folder: Path) -> None:
@@ -170,12 +233,49 @@ def cmu_folder(tmp_path: Path, walk: Clip) -> Path:
 def test_a_flat_folder_supplies_what_it_can(cmu_folder: Path) -> None:
     library = open_library(cmu_folder)
     assert isinstance(library, FolderLibrary)
-    assert library.names() == ("walk",)
+    assert library.names() == ("walk", "07_01", "99_01")
+    assert library.distinct() == ("walk", "99_01")
     assert library.trials() == ("07_01", "99_01")
     assert library.acknowledgement == CMU_ACKNOWLEDGEMENT
-    entry = library.entry("walk")
-    assert (entry.kind, entry.trial, entry.cyclic_start, entry.cyclic_end) == ("walking", "07_01", True, True)
+    for name in ("walk", "07_01"):
+        entry = library.entry(name)
+        assert (entry.kind, entry.trial, entry.cyclic_start, entry.cyclic_end) == ("walking", "07_01", True, True)
     assert library.clip("99_01").frames == library.clip("walk").frames
+
+
+def test_one_trial_hides_no_other_file(cmu_folder: Path, walk: Clip) -> None:
+    for number in range(20):
+        write_bvh(trim(walk, 0, 10 + number), cmu_folder / f"own{number}.bvh")
+    write_bvh(trim(walk, 0, 60), cmu_folder / "walk.bvh")
+    library = open_library(cmu_folder)
+    assert len(library.files()) == 23
+    assert {library.entry(name).file for name in library.names()} == set(library.files())
+    assert library.entry("walk").file == cmu_folder / "walk.bvh", "a file's own name goes before the index"
+    assert len(library.distinct()) == 23
+
+
+def test_a_trial_in_two_formats_is_reachable_in_both(cmu_folder: Path) -> None:
+    (cmu_folder / "07_01.amc").write_text(":FULLY-SPECIFIED\n")
+    library = open_library(cmu_folder)
+    assert set(library.names()) == {"walk", "07_01", "07_01.amc", "07_01.bvh", "99_01"}
+    assert library.entry("07_01").file == library.entry("walk").file == cmu_folder / "07_01.amc"
+    assert library.entry("07_01.bvh").file == cmu_folder / "07_01.bvh"
+
+
+@pytest.mark.parametrize("spec", ["walk", "07_12", "outside/07_12.bvh"])
+def test_path_name_and_number_are_the_usable_frames(
+    tmp_path: Path, walk: Clip, spec: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "outside").mkdir()
+    write_bvh(walk, tmp_path / "outside" / "07_12.bvh")
+    library = open_library(tmp_path)
+    clip = library.clip(library.find("walk_fast" if spec == "walk" else spec))
+    assert clip.frames == walk.frames - 3
+    assert clip.start_s == 3 / walk.fps
+    whole = library.clip(library.find("07_12"), as_is=True)
+    assert whole.frames == walk.frames
+    np.testing.assert_allclose(whole.root_positions, walk.root_positions, atol=1e-9)
 
 
 def test_a_missing_trial_is_named_with_where_to_get_it(cmu_folder: Path) -> None:
@@ -229,6 +329,14 @@ def test_the_official_layout_supplies_every_shared_name(mocap: Path) -> None:
         lowest = min(points[..., 1].min() for points in foot_points(clip))
         assert lowest > -0.08, name
         np.testing.assert_allclose(clip.root_positions[0, [0, 2]], 0.0, atol=1e-6)
+
+
+@pytest.mark.mocap
+def test_every_file_is_listed_under_a_name_of_its_own(mocap: Path) -> None:
+    for folder in (mocap, mocap / "cmu", mocap / "cmu_bvh", mocap / "bandai", mocap / "perfume"):
+        library = open_library(folder)
+        files = [path for path in folder.rglob("*") if path.suffix in (".bvh", ".amc")]
+        assert {library.entry(name).file for name in library.names() if library.entry(name).own} == set(files)
 
 
 @pytest.mark.mocap

@@ -37,7 +37,12 @@ def read_beats(path: Path, clip: Clip) -> OffsetArray:
             times.append(float(words[0]))
         except ValueError:
             raise TransitionError(f"{path}:{number}: expected a time in seconds, found {words[0]!r}.") from None
-    frames = np.unique(np.round(np.array(times) * clip.fps).astype(np.int64))
+    return beats_at(times, clip)
+
+
+def beats_at(times_s: Sequence[float], clip: Clip) -> OffsetArray:
+    """Times in seconds from a clip's frame 0 as frames of the clip; those outside of it are left out."""
+    frames = np.unique(np.round(np.array(times_s) * clip.fps).astype(np.int64))
     return frames[(frames >= 0) & (frames < clip.frames)]
 
 
