@@ -298,7 +298,7 @@ def _read_motion_header(source: Source, offset: int) -> tuple[_FrameTime, int | 
             raise source.error(
                 at,
                 f"Expected a Frame Time above 0, in seconds, from {1.0 / HIGHEST_FPS:g} to {1.0 / LOWEST_FPS:g}, "
-                f"found {shown(value)}. Write 1 / fps, such as 0.0083333 for 120 fps.",
+                f"found {shown(value)}. Write 1 / fps, such as 0.0083333 for 120 fps; or say `fps` in library.toml.",
             )
         # Digits beyond those of a double say no more.
         return _FrameTime(value.decode() if len(value) <= 40 else repr(seconds), at), stated, offset

@@ -88,7 +88,8 @@ def by_beginning(content: bytes) -> str | None:
     for beginning, found in _BEGINNINGS:
         if start.startswith(beginning):
             return _sentence(found)
-    if content[1:2] == bytes([_C3D_MARK]) and b"\0" in content[:512]:
+    # The first byte of a C3D file counts blocks before its parameters: a few.
+    if content[1:2] == bytes([_C3D_MARK]) and 2 <= content[0] < 32 and b"\0" in content[:512]:
         return _sentence(_SUFFIXES[".c3d"])
     return None
 

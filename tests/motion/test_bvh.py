@@ -343,7 +343,7 @@ def test_a_frame_time_that_is_none_is_read_as_what_it_must_be(
     assert read_bvh(path, fps=25.0).fps == 25.0, "whoever says it is not warned"
 
 
-@pytest.mark.parametrize("stated", ["1", "2", "10", "20", "40", "33333", "1e6"])
+@pytest.mark.parametrize("stated", ["1", "2", "10", "20", "40"])
 def test_a_frame_time_that_may_be_anything_is_refused(bvh: Callable[[str], Path], stated: str) -> None:
     said = refusal(bvh(HIERARCHY + ROWS.replace("0.0083333", stated)))
     assert f"Expected the seconds between frames after 'Frame Time:', found {stated}" in said
@@ -367,9 +367,10 @@ def test_an_interrupted_write_leaves_the_old_file(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["clip.bvh", "out.bvh"]
 
 
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, bvh: Callable[[str], Path]) -> None:
-    with pytest.raises(MotionFileError, match="Expected to write a BVH file here"):
-        write_bvh(read_bvh(bvh(HIERARCHY + ROWS)), tmp_path / "none" / "out.bvh")
+def test_a_folder_that_is_not_there_is_made(tmp_path: Path, bvh: Callable[[str], Path]) -> None:
+    clip = read_bvh(bvh(HIERARCHY + ROWS))
+    write_bvh(clip, tmp_path / "none" / "out.bvh")
+    assert read_bvh(tmp_path / "none" / "out.bvh").frames == clip.frames
 
 
 # -- Real files -----------------------------------------------------------------------------------------------------
