@@ -73,6 +73,10 @@ class Library(ABC):
         """
         return "" if entry.file is None else entry.file.name
 
+    def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
+        """Make a motion up that has no file; for libraries that have such motions."""
+        raise MotionError(f"Expected a file behind {entry.name!r} in {self.name}, found none.")
+
     def distinct(self) -> tuple[str, ...]:
         """The motions, no file twice: by its further names where it has any, else by its own."""
         return self.names()
@@ -118,19 +122,16 @@ class Library(ABC):
         entry = self.entry(motion) if isinstance(motion, str) else motion
         key = (entry, None if fps is None else float(fps), min_seconds, as_is)
         if key not in self._kept:
-            self._kept[key] = _made(entry, fps, min_seconds, as_is)
+            made = _from_file(entry, fps, min_seconds, as_is) if entry.file else self._make(entry, fps, min_seconds)
+            self._kept[key] = made
             while len(self._kept) > _KEPT_CLIPS:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
         return self._kept[key]
 
 
-def _made(entry: Entry, fps: float | None, min_seconds: float | None, as_is: bool) -> Clip:
-    """Read or synthesize a motion; the one way in which an entry becomes a clip."""
-    if entry.file is None:
-        from study.motion import synthetic
-
-        return synthetic.synthesize(entry.name, seconds=min_seconds, fps=30.0 if fps is None else fps)
+def _from_file(entry: Entry, fps: float | None, min_seconds: float | None, as_is: bool) -> Clip:
+    """A captured motion; the one way in which a file becomes a clip."""
     clip = prepared(entry, as_is=as_is)
     if min_seconds is not None and clip.seconds < min_seconds and entry.cyclic_end:
         from study.motion.cycles import extend
@@ -192,6 +193,11 @@ class SyntheticLibrary(Library):
         start: Boundary = "gait" if about.cyclic_start else ""
         end: Boundary = "gait" if about.cyclic_end else ""
         return Entry(name, about.kind, f"synthetic: {about.line}", start, end)
+
+    def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
+        from study.motion import synthetic
+
+        return synthetic.synthesize(entry.name, seconds=min_seconds, fps=30.0 if fps is None else fps)
 
 
 class FolderLibrary(Library):

@@ -120,11 +120,13 @@ def _by_falls(clip: Clip) -> Tempo | None:
     in_air = lowest > np.quantile(lowest, 0.05) + _AIR_M
     stone = np.sqrt(2.0 * _DROP_M / _GRAVITY)
     falls, flights = [], []
+    rises = np.append(np.flatnonzero(np.diff(height) > 0.0), clip.frames)
     for top in np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] > height[2:])) + 1:
-        below = np.flatnonzero(height[top:] < height[top] - _DROP_M)
-        bottom = top + int(below[0]) if len(below) else clip.frames
-        if bottom == clip.frames or np.any(np.diff(height[top : bottom + 1]) > 0.0):
+        descent = height[top : rises[np.searchsorted(rises, top)] + 1]
+        below = np.flatnonzero(descent < height[top] - _DROP_M)
+        if not len(below):
             continue
+        bottom = top + int(below[0])
         part = (height[bottom - 1] - height[top] + _DROP_M) / (height[bottom - 1] - height[bottom])
         falls.append(float((bottom - 1 + part - top) / clip.fps / stone))
         if in_air[top] and lowest[top] - lowest[bottom] > _ALONG * _DROP_M:

@@ -191,6 +191,8 @@ def test_a_clip_is_one_clip_by_path_and_by_name(plain_folder: Path, monkeypatch:
         assert other.name == named.name
         np.testing.assert_array_equal(other.rotations, named.rotations)
         np.testing.assert_array_equal(other.root_positions, named.root_positions)
+    with pytest.raises(MotionFileError, match=r"outside: Expected a motion file, found a folder. Name one of its"):
+        entry_of_file("../outside")
     with pytest.raises(
         MotionFileError, match=r"shrt.bvh: Expected a motion file, found nothing there. Did you mean 's"
     ):

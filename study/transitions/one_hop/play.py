@@ -328,4 +328,5 @@ def _joined(tape: _Tape, how: str) -> Clip:
         f"{names[tape.segments[0].clip]} to {names[tape.number]}, {how}",
         (f"played {how}: {words}",),
         any(clip.synthetic for clip in tape.clips),
+        metres_per_unit=source.metres_per_unit,
     )
