@@ -31,9 +31,10 @@ _MOST_PAIRS = 24
 # Two chains are no pair when their lengths differ by more than this factor, as a logarithm.
 _UNLIKE = 0.35
 # What a choice of joints loses: by a ratio that is off (its logarithm), a joint that hardly bends, bones beyond a fan
-# of fingers, an end site in place of the third joint, mere bits for bones; a pair, by a third chain like it.
+# of fingers, an end site in place of the third joint, mere bits for bones, parts that are not straight; a pair, by a
+# third chain like it.
 _RATIO_COST, _STIFF_COST, _FAN_COST, _TIP_COST, _UNFIT_COST = 2.0, 0.6, 1.0, 1.0, 3.0
-_CROWD_COST = 1.0
+_CROWD_COST, _BENT_COST = 1.0, 5.0
 _STIFF_RAD = 0.035
 # Bones within this of each other, as a logarithm, are the same on two sides.
 _SAME = 0.15
@@ -246,10 +247,27 @@ def _weigh_bones(tree: Tree, chain: tuple[int, ...]) -> tuple[IntArray, FloatArr
     # A limb's first joint lies beside the one that it branches off, not in it; its two parts are no mere bits.
     scores -= _UNFIT_COST * ((np.minimum(upper, lower) < 0.05 * whole) | (places[combos[:, 0]] <= 1e-6 * whole))
     scores -= _STIFF_COST * _stiff(tree, chain)[combos].sum(axis=1) + _TIP_COST * (combos[:, 2] == len(chain))
+    bent = _bent(tree, chain, places)
+    scores -= _BENT_COST * (bent[combos[:, 0], combos[:, 1]] + bent[combos[:, 1], combos[:, 2]])
     fans = np.array([*(fans_out(tree, joint) for joint in chain), False])
     within = np.concatenate([[0], np.cumsum(fans)])
     scores += _FAN_COST * (0.5 * fans[combos[:, 2]] - (within[combos[:, 2]] - within[combos[:, 0]]))
     return combos, upper, lower, scores
+
+
+def _bent(tree: Tree, chain: tuple[int, ...], places: FloatArray) -> FloatArray:
+    """How much nearer to each other points of a chain are than along it, as a mean share `(points, points)`.
+
+    Nothing for a bone, or one in several pieces; much for a shank with the foot, or a collar with the upper arm.
+    """
+    points = [*chain, tree.ends.get(chain[-1], chain[-1:])[0]]
+    poses = np.concatenate([tree.rest[None, points], tree.poses[:, points]])
+    straight = np.linalg.norm(poses[:, :, None] - poses[:, None], axis=-1).mean(axis=0)
+    along = np.abs(places[:, None] - places)
+    bent = 1.0 - straight / np.maximum(along, 1e-12)
+    if points[-1] == chain[-1]:
+        bent[-1] = bent[:, -1] = 0.0
+    return np.asarray(np.where(along > 0.0, np.clip(bent, 0.0, 1.0), 0.0))
 
 
 def unlikeness(a: FloatArray | float, b: FloatArray | float) -> FloatArray:

@@ -791,3 +791,16 @@ def test_trees_of_thousands_of_joints_take_no_time(shape: str) -> None:
     roles = Skeleton(names, parents, offsets, np.zeros(0, dtype=np.int64), np.zeros((0, 3))).roles
     assert not roles
     assert time.perf_counter() - start < 5.0
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_people_of_other_proportions_have_their_roles_without_names(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rig = human(("hang", "aside", "aslant")[seed % 3])
+    parts = {name: name.partition(".")[0] for name in rig.joints}
+    scale = {part: float(np.exp(rng.normal(0.0, 0.05))) for part in sorted(set(parts.values()))}
+    for name, (parent, offset) in rig.joints.items():
+        share = scale[parts[name]] * float(np.exp(rng.normal(0.0, 0.02)))
+        rig.joints[name] = (parent, tuple(share * c for c in offset))  # type: ignore[assignment]
+    names = _random_names(rng, rig)
+    assert found(rig.skeleton(names, rng)) == {role: names[role] for role in ROLES}
