@@ -153,7 +153,7 @@ def test_a_single_skeleton_in_the_folder_serves(acclaim: Writer, tmp_path: Path)
 
 
 def test_gaps_in_the_frame_numbers_are_warned_of(acclaim: Writer) -> None:
-    with pytest.warns(MotionWarning, match="frame numbers jump 1 times from 1 to 5"):
+    with pytest.warns(MotionWarning, match="frame numbers jump 1 time from 1 to 5"):
         assert read_amc(acclaim(ASF, AMC.replace("\n2\n", "\n5\n"))).frames == 2
 
 
@@ -195,7 +195,7 @@ def test_motions_that_cannot_be_read_are_refused(acclaim: Writer, old: str, new:
         ("name ltibia", "name lfemur", ":27:11", "Expected each bone once"),
         ("     name ltibia\n", "", ":26:6", "Expected a name in each bone"),
         ("direction 0 0 2", "direction 0 0 0", ":37:16", "not zero"),
-        ("direction 0 0 2", "direction 0 0", ":37:18", "Expected 3 number(s)"),
+        ("direction 0 0 2", "direction 0 0", ":37:18", "Expected 3 numbers"),
         ("dof rx ry rz", "dof rx ry rq", ":20:15", "found 'rq'"),
         ("20  ZXY", "20  ZYY", ":30:20", "Expected an order of axes"),
         ("    ltibia lfoot\n", "", ":36:11", "Expected bone 'lfoot' to hang on the root"),
