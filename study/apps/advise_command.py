@@ -44,7 +44,6 @@ def advise(
     one that suits the motion (Wang & Bodenheimer 2004): geodesic where one of the two is cyclic, else velocity.
     """
     from study.errors import SegueError
-    from study.motion.clip import resample
     from study.motion.library import open_library
     from study.transitions.advice import is_cyclic
 
@@ -53,8 +52,8 @@ def advise(
         raise click.UsageError(f"expected at least two clips, or --library with two or more, found {len(set(names))}.")
     clips, cyclic = {}, {}
     for name in dict.fromkeys(names):
-        own = load_clip(name, library, None)
-        clips[name], cyclic[name] = resample(own, fps), is_cyclic(own)
+        # As `transition` has it, which for synthetic motions is made at this rate; cycles show best at the clip's own.
+        clips[name], cyclic[name] = load_clip(name, library, fps), is_cyclic(load_clip(name, library, None))
     rows: list[dict[str, Any]] = []
     problems: list[str] = []
     pairs = list(permutations(clips, 2))
@@ -139,7 +138,7 @@ def _table(rows: Sequence[dict[str, Any]], fps: float, library: str | None) -> I
         )
         for row in sorted(rows, key=lambda row: -row["jnd"])
     ]
-    yield f"Frames at {fps:g} fps; “in file”: the frame of the motion's own file, at the file's rate."
+    yield f"Frames at {fps:g} fps; 'in file' is the frame of the motion's own file, at the file's rate."
     yield from columns([HEADINGS, *cells], left=(0, 1, 2))
     yield "JND: just noticeable differences of the blend length from the default; from 1 on, people see it."
     if cells:
