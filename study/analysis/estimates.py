@@ -177,7 +177,8 @@ def mean_test(values: ArrayLike, expected: float = 0.5, confidence: float = 0.95
         return MeanTest(1, mean, None, open_interval, None, None, None, "one participant: no spread to judge by")
     spread = float(data.std(ddof=1))
     if spread <= 1e-12:
-        note = f"all {counted(count, 'participant')} gave the same value: the spread between people can't be estimated"
+        people = counted(count, "participant")
+        note = f"all {people} gave the same value: the spread between participants can't be estimated"
         return MeanTest(count, mean, 0.0, open_interval, None, count - 1, None, note)
     error = spread / math.sqrt(count)
     half = t_quantile(confidence, count - 1) * error

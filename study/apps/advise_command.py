@@ -45,7 +45,6 @@ def advise(
     """
     from study.errors import SegueError
     from study.files import check_place
-    from study.motion.clip import resample
     from study.motion.library import open_library
     from study.transitions.advice import is_cyclic
 
@@ -59,14 +58,16 @@ def advise(
     problems: list[str] = []
     for name in dict.fromkeys(names):
         try:
-            own, said = load_clip(name, opened, None), find_entry(name, opened)[1].cyclic
+            # As `transition` has it, which for synthetic motions is made at this rate; cycles show best at the clip's own.
+            made, own = load_clip(name, opened, fps), load_clip(name, opened, None, tell=False)
+            said = find_entry(name, opened)[1].cyclic
         except SegueError as error:
             if motions:
                 raise
             # A file of a whole folder that can't be read is named, and the others are advised on.
             problems.append(f"{name}: {error}")
         else:
-            clips[name], cyclic[name] = resample(own, fps), is_cyclic(own) if said is None else said
+            clips[name], cyclic[name] = made, is_cyclic(own) if said is None else said
     if len(clips) < 2:
         raise click.UsageError(
             f"expected at least two clips that can be read, found {len(clips)}. {'; '.join(problems)}"
@@ -156,7 +157,7 @@ def _table(rows: Sequence[dict[str, Any]], fps: float, library: str | None) -> I
         )
         for row in sorted(rows, key=lambda row: -row["jnd"])
     ]
-    yield f"Frames at {fps:g} fps; “in file”: the frame of the motion's own file, at the file's rate."
+    yield f"Frames at {fps:g} fps; 'in file' is the frame of the motion's own file, at the file's rate."
     yield from columns([HEADINGS, *cells], left=(0, 1, 2))
     yield "JND: just noticeable differences of the blend length from the default; from 1 on, people see it."
     if cells:
