@@ -90,7 +90,7 @@ def scratch_folder(kind: str) -> Iterator[Path]:
     except OSError as error:
         why = error.strerror or str(error)
         raise DiskError(
-            f"The folder for temporary files can't be written to ({why}); name another as TMPDIR."
+            f"The folder for temporary files can't be used ({why}); name another as TMPDIR."
         ) from error
     with folder as name:
         for left in Path(name).parent.glob(f"{kind}-*-*"):

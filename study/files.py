@@ -143,8 +143,8 @@ def make_folder(folder: str | Path) -> None:
     """
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
-    except FileExistsError as error:
-        raise FileError(f"{folder}: expected a folder to write to, found a file; name another.") from error
+    except (FileExistsError, NotADirectoryError) as error:
+        raise FileError(f"{folder}: expected a folder to write to, found a file in its place; name another.") from error
     except OSError as error:
         raise refused(error, folder) from error
 

@@ -58,7 +58,7 @@ def advise(
     problems: list[str] = []
     for name in dict.fromkeys(names):
         try:
-            # As `transition` has it, which for synthetic motions is made at this rate; cycles show best at the clip's own.
+            # As `transition` has it: synthetic motions are made at this rate. Cycles show best at the clip's own.
             made, own = load_clip(name, opened, fps), load_clip(name, opened, None, tell=False)
             said = find_entry(name, opened)[1].cyclic
         except SegueError as error:

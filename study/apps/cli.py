@@ -101,6 +101,7 @@ def _show_warning(
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line on arguments (default: the process's own) and return the exit status."""
+    streams = sys.stdout, sys.stderr
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
@@ -115,10 +116,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, click.Abort):
         say("segue: interrupted; what was finished is kept, and the same command goes on from there.")
         return 130
-    except (BrokenPipeError, SystemExit) as end:
-        # The reader of our output went away (`segue ... | head`), at which click may exit: not a fault.
-        if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
+    except SystemExit:
+        # The reader of our output went away (`segue ... | head`), at which click wraps the streams and exits: no fault.
+        if (sys.stdout, sys.stderr) == streams:
             raise
+        sys.stdout, sys.stderr = streams
         hush()
         return 0
     except Exception as fault:  # the one place where everything is caught: to say whose fault it is

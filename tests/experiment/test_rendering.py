@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import os
 import signal
@@ -310,3 +311,32 @@ def test_a_changed_motion_file_or_a_damaged_video_is_noticed(prepared, rendered,
     assert rendered_already(protocol, ToyLibrary(MOTIONS), folder) is None
     assert render(prepared, folder, workers=1).rendered == 1
     assert rendered_already(protocol, ToyLibrary(MOTIONS), folder) is not None
+
+
+def test_a_manifest_that_lacks_a_key_or_holds_something_else_is_refused_by_its_place(prepared, tmp_path):
+    record(prepared, tmp_path)
+    path = tmp_path / "manifest.json"
+    whole = json.loads(path.read_text())
+    keyed = [("fps",), ("size",), ("versions",), ("stimuli", 0, "source", "frame"), ("pairs", 0, "a")]
+    for keys, value in [
+        *itertools.product(keyed, ("gone", None, [], -1.5)),
+        (("pairs",), "gone"),
+        (("stimuli",), None),
+    ]:
+        changed = json.loads(json.dumps(whole))
+        at = changed
+        for key in keys[:-1]:
+            at = at[key]
+        if value == "gone":
+            del at[keys[-1]]
+        else:
+            at[keys[-1]] = value
+        path.write_text(json.dumps(changed))
+        with pytest.raises(StimulusError, match=rf"expected what Segue wrote, found {'.'.join(map(str, keys))}"):
+            read_manifest(tmp_path)
+    for text in ("[]", "null", '"x"', "{}", json.dumps(whole)[:-9], "\x00"):
+        path.write_text(text)
+        with pytest.raises(StimulusError, match="expected JSON of a manifest"):
+            read_manifest(tmp_path)
+    path.write_text(json.dumps(whole))
+    assert read_manifest(tmp_path).records == prepared.records

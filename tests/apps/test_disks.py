@@ -1,0 +1,193 @@
+"""Every verb on disks that refuse: a refusal in one line with exit status 2, and nothing half written.
+
+A limit on the size of files stands for a full disk: the system refuses each write in the same place. The verbs run in
+one process of their own, which alone has the limit.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from serving import PROTOCOL, unfilmed
+
+from study.apps.cli import VERBS, run
+from study.experiment.databases import try_to_write
+from study.experiment.responses import open_responses
+from study.files import write_whole
+
+ROOT = Path(__file__).parents[2]
+
+# What each verb writes, below the folder OUT; STUDY is a finished study elsewhere.
+WRITES = {
+    "preview": ["preview", "walk", "--out", "OUT/x.mp4", "--size", "160x120"],
+    "strip": ["preview", "walk", "--out", "OUT/x.png"],
+    "blend-length": ["blend-length", "walk", "run", "--start", "60", "--end", "80", "--out", "OUT/x.csv"],
+    "curve": ["blend-length", "walk", "run", "--start", "60", "--end", "80", "--out", "OUT/x.png"],
+    "transition": ["transition", "walk", "run", "--start", "60", "--end", "80", "--frames", "9", "--out", "OUT/x.bvh"],
+    "cost-matrix": ["cost-matrix", "walk", "run", "--out", "OUT/x.npy"],
+    "matrix": ["cost-matrix", "walk", "run", "--out", "OUT/x.png"],
+    "label": ["label", "walk", "run", "--strips", "--best", "1", "--worst", "0", "--random", "0", "--out", "OUT/x.csv"],
+    "one-hop": ["one-hop", "build", "walk", "run", "--fps", "10", "--weight", "0.01", "--out", "OUT/x.npz"],
+    "flat": ["one-hop", "build", "walk", "run", "--fps", "10", "--weight", "0.01", "--out", "OUT/x.bin"],
+    "advise": ["advise", "walk", "run", "--no-strips", "--out", "OUT/x"],
+    "power": ["power", "demo", "--study", "velocity_vs_fixed", "--participants", "4", "--studies=10", "--out", "OUT/x"],
+    "render": ["render", "STUDY/protocol.toml", "--out", "OUT/x"],
+    "simulate": ["simulate", "STUDY/protocol.toml", "--participants", "2", "--out", "OUT/x"],
+    "serve": ["serve", "STUDY/protocol.toml", "--port", "0", "--out", "OUT/x"],
+    "demo": ["demo", "--out", "OUT/x"],
+    "database": ["simulate", "STUDY/protocol.toml", "--participants", "2", "--out", "STUDY", "--database", "OUT/x.db"],
+    "report": ["report", "STUDY", "--out", "OUT/x"],
+    "export": ["export", "STUDY", "--out", "OUT/x.csv"],
+    "psych-ds": ["export", "STUDY", "--to", "psych-ds", "--out", "OUT/x"],
+    "bids": ["export", "STUDY", "--to", "bids", "--out", "OUT/x"],
+}  # fmt: skip
+
+FULL = """
+import contextlib, io, json, resource, sys
+from study.apps.cli import run
+verbs = json.loads(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+found = {}
+for name, arguments in verbs.items():
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+        status = run(arguments)
+    found[name] = [status, said.getvalue()]
+print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study with two simulated participants, without films."""
+    folder = tmp_path_factory.mktemp("finished")
+    unfilmed(folder)
+    assert run(["simulate", str(folder / "protocol.toml"), "--participants", "2", "--out", str(folder)]) == 0
+    return folder
+
+
+def told(verbs: dict[str, list[str]], out: Path, study: Path) -> dict[str, list[str]]:
+    places = {"OUT": str(out), "STUDY": str(study)}
+    return {
+        name: [argument.replace("OUT", places["OUT"]).replace("STUDY", places["STUDY"]) for argument in arguments]
+        for name, arguments in verbs.items()
+    }
+
+
+def files_in(folder: Path) -> list[str]:
+    return [path.name for path in folder.rglob("*") if path.is_file()]
+
+
+@pytest.mark.gl
+@pytest.mark.skipif(os.name != "posix", reason="limits on file sizes are POSIX")
+def test_a_full_disk_is_said_by_every_verb_and_nothing_is_half_written(tmp_path: Path, finished: Path) -> None:
+    study = tmp_path / "study"
+    shutil.copytree(finished, study)
+    out = tmp_path / "out"
+    out.mkdir()
+    verbs = json.dumps(told(WRITES, out, study))
+    child = subprocess.run(
+        [sys.executable, "-c", FULL, verbs], cwd=ROOT, capture_output=True, text=True, timeout=600, check=True
+    )
+    for name, (status, said) in json.loads(child.stdout).items():
+        assert status == 2, f"{name}: {said}"
+        last = said.splitlines()[-1]
+        assert last.startswith("segue: "), f"{name}: {said}"
+        if WRITES[name][0] in ("report", "export"):  # under the limit the study itself can't be opened
+            assert "temporary files can't be used" in last or "grow so large" in last, last
+            continue
+        assert str(out) in said, f"{name}: {said}"
+        assert "files may not grow so large there" in last or "no room left" in last or "its disk fails" in last, last
+    assert files_in(out) == []
+
+
+@pytest.mark.parametrize("name", [name for name in WRITES if name not in ("demo", "serve")])
+def test_a_file_where_a_folder_should_be_is_said_by_every_verb(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, finished: Path, name: str
+) -> None:
+    out = tmp_path / "out"
+    out.write_text("mine")
+    (arguments,) = told({name: WRITES[name]}, out, finished).values()
+    assert run(arguments) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert str(out) in said
+    assert "found a file" in said or "part of the path is a file" in said or "is a file" in said, said
+    assert out.read_text() == "mine"
+
+
+def test_every_verb_that_writes_is_tried() -> None:
+    reads = {"motions", "fit-weights", "check", "play", "analyse", "fit", "doctor"}
+    assert {arguments[0] for arguments in WRITES.values()} == set(VERBS) - reads
+
+
+needs_mounts = pytest.mark.skipif(
+    subprocess.run(
+        ["unshare", "-m", "mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True, check=False
+    ).returncode
+    != 0
+    if shutil.which("unshare")
+    else True,
+    reason="only root may mount a folder read-only",
+)
+
+READ_ONLY = 'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1" && shift && exec "$@"'
+
+
+@needs_mounts
+def test_a_finished_study_on_a_read_only_disk_is_analysed_reported_and_exported_elsewhere(
+    tmp_path: Path, finished: Path
+) -> None:
+    folder, out = tmp_path / "disk", tmp_path / "out"
+    shutil.copytree(finished, folder)
+
+    def segue(*arguments: str) -> tuple[int, str]:
+        command = ["unshare", "-m", "sh", "-c", READ_ONLY, "sh", str(folder), sys.executable, "-m", "study.apps.cli"]
+        done = subprocess.run([*command, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr
+
+    study = str(folder)
+    assert segue("analyse", study)[0] == 0
+    assert segue("report", study, "--out", str(out))[0] == 0
+    assert (out / "report.html").stat().st_size > 10_000
+    for kind, place in (("csv", "a.csv"), ("psych-ds", "set"), ("bids", "bids")):
+        assert segue("export", study, "--to", kind, "--out", str(out / place)) == (0, "")
+    for verb in (["report", study], ["export", study], ["export", study, "--to", "bids"]):
+        status, said = segue(*verb)
+        assert (status, "the disk is read-only; write somewhere else" in said) == (2, True), said
+    for verb in ("simulate", "serve"):
+        extra = ["--participants", "3"] if verb == "simulate" else ["--port", "0", "--database", f"{study}/new.sqlite"]
+        status, said = segue(verb, f"{study}/protocol.toml", "--out", study, *extra)
+        assert (status, "read-only" in said or "may not be written to" in said) == (2, True), said
+        assert "http" not in said, "an address is printed once answers can be stored"
+    with_log = folder / "responses.sqlite-wal"
+    assert not with_log.exists()
+
+
+def test_a_server_tries_to_write_and_changes_nothing(tmp_path: Path, finished: Path) -> None:
+    shutil.copy(finished / "responses.sqlite", tmp_path)
+    before = (tmp_path / "responses.sqlite").read_bytes()
+    with open_responses(tmp_path) as responses:
+        try_to_write(responses.engine, responses.place)
+    after = (tmp_path / "responses.sqlite").read_bytes()
+    assert len(after) == len(before)
+    assert sum(a != b for a, b in zip(after, before, strict=True)) < 20, "counters of the header alone"
+
+
+def test_a_protocol_with_a_mark_is_run_from_end_to_end(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    protocol, out = tmp_path / "mark.toml", tmp_path / "out"
+    protocol.write_bytes(b"\xef\xbb\xbf" + PROTOCOL.replace("\n", "\r\n").encode())
+    for _ in range(2):
+        assert run(["simulate", str(protocol), "--participants", "1", "--out", str(out)]) == 0
+    write_whole(out / "protocol.toml", b"\xef\xbb\xbf" + (out / "protocol.toml").read_bytes())
+    assert run(["simulate", str(protocol), "--participants", "2", "--out", str(out), "--library", "synthetic"]) == 0
+    assert run(["analyse", str(out)]) == 0
+    protocol.write_bytes(PROTOCOL.encode("utf-16"))
+    capsys.readouterr()
+    assert run(["check", str(protocol)]) == 2
+    assert "found UTF-16" in capsys.readouterr().err
