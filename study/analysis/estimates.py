@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+LARGEST = 1e12
+"""Levels, differences and ratings beyond this are slips, and their squares are past what a computer counts with."""
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -298,10 +301,16 @@ def numbers(values: ArrayLike, name: str) -> FloatArray:
     Raises
     ------
     AnalysisError
-        Naming the first that is none.
+        Naming the first that is none, or too large for any use.
     """
     try:
-        return np.asarray(values, dtype=np.float64)
+        found = np.asarray(values, dtype=np.float64)
+        large = found[np.isfinite(found) & (np.abs(found) > LARGEST)]
+        if not large.size:
+            return found
+        raise AnalysisError(
+            f"expected at most {LARGEST:g} in {name}, found {large[0]:g}; correct it, or change the unit"
+        )
     except (TypeError, ValueError):
         pass
     for value in np.asarray(values, dtype=object).ravel():

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from study.analysis.estimates import LARGEST
 from study.analysis.foreign_words import BLANK, NO, YES
 from study.counting import counted
 from study.errors import AnalysisError
@@ -22,8 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TASKS = ("2afc", "yes-no", "same-different")
-# Larger and smaller numbers are slips, and their squares are past what a computer counts with.
-LARGEST, SMALLEST, MOST_ANSWERS = 1e12, 1e-12, 1_000_000
+SMALLEST, MOST_ANSWERS = 1e-12, 1_000_000
 
 
 @dataclass(frozen=True)

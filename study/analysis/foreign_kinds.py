@@ -12,7 +12,9 @@ IN_R = 'save it as CSV in R, as in write.csv(readRDS("data.rds"), "data.csv", ro
 IN_PYTHON = 'save it as CSV in Python, as in pandas.read_parquet("data.parquet").to_csv("data.csv", index=False)'
 UNPACK = "unpack it, and name the table inside"
 
-_SIGNATURES = (
+PICKLES = tuple(bytes([0x80, protocol]) for protocol in range(2, 6))
+
+_SIGNATURES: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
     (b"PAR1", "a Parquet file", IN_PYTHON),
     (b"ARROW1", "a Feather (Arrow) file", IN_PYTHON.replace("parquet", "feather")),
     (b"FEA1", "a Feather file", IN_PYTHON.replace("parquet", "feather")),
@@ -34,10 +36,7 @@ _SIGNATURES = (
     (b"Rar!", "a RAR archive", UNPACK),
     (b"%PDF", "a PDF document", "export the table from the program that made the data"),
     (b"{\\rtf", "a text document (RTF)", SAVE),
-    (b"\x80\x02", "a Python pickle (PsychoPy's .psydat)", "use the .csv that PsychoPy writes beside it"),
-    (b"\x80\x03", "a Python pickle (PsychoPy's .psydat)", "use the .csv that PsychoPy writes beside it"),
-    (b"\x80\x04", "a Python pickle (PsychoPy's .psydat)", "use the .csv that PsychoPy writes beside it"),
-    (b"\x80\x05", "a Python pickle (PsychoPy's .psydat)", "use the .csv that PsychoPy writes beside it"),
+    (PICKLES, "a Python pickle (PsychoPy's .psydat)", "use the .csv that PsychoPy writes beside it"),
 )
 _IN_ARCHIVES = (
     (b"opendocument.spreadsheet", "a spreadsheet of LibreOffice (.ods)", SAVE),

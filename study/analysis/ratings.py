@@ -27,7 +27,7 @@ def rated(answers: pd.DataFrame) -> pd.DataFrame:
     part = answers[answers["task"] == "rating"] if "task" in answers.columns else answers
     part = part[part["answer"].notna()].copy()
     part["rating"] = pd.to_numeric(part["answer"].astype(str).str.strip(), errors="coerce").astype(float)
-    strange = ~np.isfinite(part["rating"])
+    strange = ~(part["rating"].abs() <= estimates.LARGEST)
     if strange.any():
         found = part.loc[strange, "answer"].iloc[0]
         raise AnalysisError(f"expected ratings as numbers, found {str(found)!r}; recode the column `answer`")

@@ -209,6 +209,7 @@ def test_tables_of_hits_and_false_alarms(counts: tuple[float, float, float, floa
         (lambda: d_prime(math.nan, 10, 0, 10), "found nan of 10 pairs"),
         (lambda: fit_psychometric([1, 2], ["a", "b"], [3, 3]), "numbers"),
         (lambda: fit_psychometric([1, 2], [1, 2], [3, math.inf]), "finite"),
+        (lambda: fit_psychometric([1, 1e308], [1, 2], [3, 3]), "expected at most 1e.12 in levels, found 1e.308"),
         (lambda: fit_psychometric([[1, 2]], [[1, 2]], [[3, 3]]), "one shape"),
         (lambda: fit_psychometric([1, 2], [1, 2], [3, 3], confidence=95), "between 0 and 1"),
         (lambda: analyse_psychometric(pd.DataFrame({"level": [1.0]})), "none named participant"),
@@ -225,6 +226,12 @@ def test_tables_of_hits_and_false_alarms(counts: tuple[float, float, float, floa
                 pd.DataFrame({"participant": ["a"], "difference_frames": [math.inf], "answer": ["same"]})
             ),
             "infinite",
+        ),
+        (
+            lambda: analyse_jnd(
+                pd.DataFrame({"participant": ["a"], "difference_frames": [-1e300], "answer": ["same"]})
+            ),
+            "expected at most 1e.12 in difference_frames",
         ),
         (
             lambda: analyse_psychometric(

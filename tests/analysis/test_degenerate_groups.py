@@ -153,7 +153,7 @@ def test_a_perfect_preference_is_no_certainty() -> None:
     assert result["no_preference"]["equivalence_p_value"] is None
 
 
-@pytest.mark.parametrize("answer", ["good", "", "3 points", "inf", True, "nan "])
+@pytest.mark.parametrize("answer", ["good", "", "3 points", "inf", "1e308", True, "nan "])
 def test_ratings_that_are_no_numbers_are_refused(answer: object) -> None:
     table = pd.DataFrame({"participant": ["a", "b"], "method_a": ["x", "y"], "trial": [1, 1], "answer": ["3", answer]})
     for function in (rating_table, rating_anova):

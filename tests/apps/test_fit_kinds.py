@@ -183,7 +183,10 @@ def archive(*names: str) -> bytes:
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as file:
         for name in names:
-            file.writestr(name, "application/vnd.oasis.opendocument.spreadsheet" if name == "mimetype" else "<x/>")
+            file.writestr(
+                zipfile.ZipInfo(name),
+                "application/vnd.oasis.opendocument.spreadsheet" if name == "mimetype" else "<x/>",
+            )
     return content.getvalue()
 
 
@@ -200,9 +203,9 @@ def archive(*names: str) -> bytes:
         (b"$FL2@(#) IBM SPSS STATISTICS", "an SPSS file (.sav)", "save it as CSV"),
         (b"<stata_dta><header>", "a Stata file (.dta)", "save it as CSV"),
         (b"X\n\0\0\0\x03", "an R file (.rds)", "readRDS"),
-        (gzip.compress(b"X\n\0\0\0\x03\0\x04"), "an R file (.rds)", "readRDS"),
-        (gzip.compress(b"RDX3\nX\n"), "an R file (.RData)", "write.csv"),
-        (gzip.compress(b"level,c\n1,1\n"), "a compressed file (gzip)", "unpack it"),
+        (gzip.compress(b"X\n\0\0\0\x03\0\x04", mtime=0), "an R file (.rds)", "readRDS"),
+        (gzip.compress(b"RDX3\nX\n", mtime=0), "an R file (.RData)", "write.csv"),
+        (gzip.compress(b"level,c\n1,1\n", mtime=0), "a compressed file (gzip)", "unpack it"),
         (bz2.compress(b"X\n"), "a compressed file (bzip2)", "unpack it"),
         (lzma.compress(b"X\n"), "a compressed file (xz)", "unpack it"),
         (b"\x80\x04\x95\x10", "a Python pickle (PsychoPy's .psydat)", "the .csv that PsychoPy writes"),
