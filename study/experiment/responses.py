@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -429,7 +430,23 @@ def insert_rows(connection: sa.Connection, rows: Sequence[Row]) -> None:
     for statement, row in rows:
         tables.setdefault(statement, []).append(row)
     for statement, together in tables.items():
-        connection.execute(statement, together)
+        text, bound = _compiled(statement, tuple(together[0]), connection.dialect)
+        connection.exec_driver_sql(text, [bound(row) for row in together])
+
+
+@lru_cache(maxsize=64)
+def _compiled(statement: sa.Insert, names: tuple[str, ...], dialect: sa.Dialect) -> tuple[str, Callable[..., Any]]:
+    """An insertion as the driver takes it, and how it takes a row: SQLAlchemy itself needs twice as long for each."""
+    compiled = statement.compile(dialect=dialect, column_keys=names)
+    columns = statement.table.c
+    made = [(name, columns[name].type.dialect_impl(dialect).bind_processor(dialect)) for name in names]
+    position = compiled.positiontup
+
+    def bound(row: Mapping[str, Any]) -> Any:
+        values = {name: row[name] if process is None else process(row[name]) for name, process in made}
+        return values if position is None else tuple([values[name] for name in position])
+
+    return str(compiled), bound
 
 
 _INSERT_ANSWER, _INSERT_PRESENTATION, _INSERT_EVENT = sa.insert(answers), sa.insert(presentations), sa.insert(events)

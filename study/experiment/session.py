@@ -193,7 +193,12 @@ def advanced(session: Session) -> Session:
         )
     if step.kind == "done":
         raise SessionError("Expected no further step: the session is done.")
-    return replace(session, position=session.position + 1)
+    return _at(session, session.position + 1)
+
+
+def _at(session: Session, position: int) -> Session:
+    # Not `replace`, which takes as long as the rest of an answer.
+    return Session(session.plan, session.protocol, session.steps, session.trials_left, position, session.badly_shown)
 
 
 def restarted(session: Session) -> Session:
@@ -202,7 +207,7 @@ def restarted(session: Session) -> Session:
     if step.kind not in ("first", "gap", "second"):
         raise SessionError(f"Expected a trial before its question to start again, found the session at {step.kind!r}.")
     firsts = (i for i in range(session.position, -1, -1) if session.steps[i].kind == "first")
-    return replace(session, position=next(firsts))
+    return _at(session, next(firsts))
 
 
 def filled(session: Session, values: Mapping[str, str]) -> tuple[Session, dict[str, str]]:
@@ -219,7 +224,7 @@ def filled(session: Session, values: Mapping[str, str]) -> tuple[Session, dict[s
     if strays := sorted(set(values) - set(fields)):
         raise SessionError(f"Expected the form's fields {', '.join(fields)}, found {', '.join(map(repr, strays))}.")
     taken = {name: field_value(field, values.get(name, "").strip()) for name, field in fields.items()}
-    return replace(session, position=session.position + 1), {name: value for name, value in taken.items() if value}
+    return _at(session, session.position + 1), {name: value for name, value in taken.items() if value}
 
 
 def field_value(field: FormField, value: str) -> str:

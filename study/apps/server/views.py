@@ -8,6 +8,7 @@ are loaded.
 from __future__ import annotations
 
 import hmac
+from functools import lru_cache
 from typing import Any
 
 from study.experiment import session as sitting
@@ -26,8 +27,12 @@ def session_name(participant: Participant) -> str:
 
 def film_name(participant: Participant, step: Step) -> str:
     """The name of a film in one showing: unguessable, and different for every place, trial and attempt."""
-    place = f"{step.kind}/{step.study}/{step.trial}/{step.attempt}/{step.stimulus}"
-    return hmac.digest(participant.secret.encode(), place.encode(), "sha256").hex()[:40]
+    return _film_name(participant.secret, f"{step.kind}/{step.study}/{step.trial}/{step.attempt}/{step.stimulus}")
+
+
+@lru_cache(maxsize=4096)
+def _film_name(secret: str, place: str) -> str:
+    return hmac.digest(secret.encode(), place.encode(), "sha256").hex()[:40]
 
 
 def step_key(session: Session) -> str:
