@@ -283,13 +283,13 @@ def message(generator: Generator, folder: Path) -> Callable[[], int]:
 
 
 KINDS: Mapping[str, tuple[Callable[[Generator, Path], Callable[[], int]], float]] = {
-    "bvh": (motion, 0.32),
-    "acclaim": (acclaim, 0.14),
-    "library": (library, 0.06),
-    "protocol": (protocol, 0.2),
-    "table": (table, 0.14),
-    "results": (results, 0.06),
-    "message": (message, 0.08),
+    "bvh": (motion, 0.34),
+    "acclaim": (acclaim, 0.16),
+    "library": (library, 0.07),
+    "protocol": (protocol, 0.20),
+    "table": (table, 0.08),
+    "results": (results, 0.05),
+    "message": (message, 0.10),
 }
 """Each kind of input, and its share of the cases."""
 

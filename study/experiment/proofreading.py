@@ -93,7 +93,9 @@ _NUMBERS = {
     **dict.fromkeys(("ten", "zehn", "dix"), 10),
 }
 # A number or a word is looked at from its beginning only, so that one long word is run through once.
-_SECONDS = re.compile(r"((?<!\d)\d+(?:[.,]\d+)?|(?<!\w)\w+)\s*(?:seconds?|secondes?|Sekunden?|秒)(?!\w)", re.IGNORECASE)
+_SECONDS = re.compile(
+    r"((?<!\d)\d+(?:[.,]\d+)?|(?<!\w)[^\W\d]+)\s*(?:(?:seconds?|secondes?|Sekunden?)(?!\w)|秒)", re.IGNORECASE
+)
 
 
 def _other_windows(protocol: Protocol, study: StudySpec) -> list[str]:

@@ -48,7 +48,8 @@ MOST_PROBLEMS = 50
 """So many are told at once."""
 _DEEPEST = 20
 # More keys in a row than that, parted by points: the time to read them grows with the square of their number.
-_DEEP_KEY = re.compile(r"""(?<![\w\-"'])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){200}""")
+_KEY = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_DEEP_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_KEY}){{200}}", re.MULTILINE)
 
 
 class Protocol(Part):

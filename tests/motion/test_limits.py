@@ -1,0 +1,225 @@
+"""Motion files with numbers, sizes and names past what anybody means: refused with their place, or read in no time."""
+
+from __future__ import annotations
+
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.errors import MotionError, MotionFileError, MotionWarning
+from study.motion.acclaim import read_amc
+from study.motion.bvh import read_bvh, write_bvh
+from study.motion.clip import MOST_POSES, Clip, resample
+from study.motion.files import read_clip
+from study.motion.skeleton import MOST_JOINTS, Skeleton
+from study.motion.source import NUMBER
+
+ONE = (
+    "HIERARCHY\nROOT a\n{{\nOFFSET {offset}\nCHANNELS {channels}\n}}\n"
+    "MOTION\nFrames: {frames}\nFrame Time: {time}\n{row}\n"
+)
+SECONDS = 6.0  # many times what it takes, as other tests run beside this one
+
+
+def one(folder: Path, **parts: str) -> Path:
+    """A file of one joint, sound but for what is given."""
+    sound = {"offset": "0 0 0", "channels": "1 Xrotation", "frames": "1", "time": "0.03", "row": "0"}
+    path = folder / "one.bvh"
+    path.write_text(ONE.format(**(sound | parts)), encoding="utf-8")
+    return path
+
+
+def tree(
+    path: Path, depths: list[int], names: list[str], channels: str = "CHANNELS 3 Zrotation Xrotation Yrotation"
+) -> Path:
+    """A file of a tree, depth first: depth and name of each joint."""
+    lines = ["HIERARCHY"]
+    for number, (depth, name) in enumerate(zip(depths, names, strict=True)):
+        lines += [
+            f"{'JOINT' if depth else 'ROOT'} {name}",
+            "{",
+            "OFFSET 0 1 0",
+            channels if depth else "CHANNELS 1 Xrotation",
+        ]
+        following = depths[number + 1] if number + 1 < len(depths) else 0
+        lines += ["}"] * (depth + 1 - following)
+    columns = 1 + channels.count("rotation") * (len(depths) - 1)
+    lines += ["MOTION", "Frames: 2", "Frame Time: 0.03", *[" ".join(["1"] * columns)] * 2]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"frames": "9" * 5000}, r"one.bvh:8:9: Expected the number of frames .* below 1e\+09, found '9{40}'"),
+        ({"channels": "9" * 5000 + " Xrotation"}, r"one.bvh:5:10: Expected the number of channels of 'a'"),
+        ({"channels": "13 " + "Xrotation " * 13}, r"one.bvh:5:10: Expected at most 12 channels in 'a', found 13"),
+        (
+            {"time": "1e-309"},
+            r"one.bvh:9:13: Expected a Frame Time above 0, in seconds, from 1e-05 to 3600, found '1e-309'",
+        ),
+        ({"time": "1e300"}, r"one.bvh:9:13: Expected the seconds .* of at most 1e\+09, found '1e300'"),
+        ({"time": "1e8"}, r"one.bvh:9:13: Expected a Frame Time .* found '1e8'. Write 1 / fps"),
+        ({"time": "0"}, r"one.bvh:9:13: Expected a Frame Time above 0"),
+        ({"time": "-0.03"}, r"one.bvh:9:13: Expected a Frame Time above 0"),
+        ({"time": "nan"}, r"one.bvh:9:13: Expected the seconds between frames"),
+        ({"time": "1e-9999999"}, r"one.bvh:9:13: Expected a Frame Time above 0"),
+        ({"offset": "0 1.7e308 0"}, r"one.bvh:4:10: Expected a length in the OFFSET of 'a' of at most 1e\+09"),
+        ({"row": "1.7e308"}, r"one.bvh:10:1: Expected a number in frame 0, value 1 of 1 of at most 1e\+09"),
+        ({"row": "-2e9"}, r"one.bvh:10:1: Expected a number in frame 0"),
+        ({"row": "9" * 5000}, r"one.bvh:10:1: Expected a number in frame 0"),
+        ({"row": "1e400"}, r"one.bvh:10:1: Expected a number in frame 0"),
+    ],
+)
+def test_numbers_past_what_is_meant_are_refused_with_their_place(tmp_path, parts, message):
+    with pytest.raises(MotionFileError, match=message):
+        read_bvh(one(tmp_path, **parts))
+
+
+def test_a_frame_time_of_thousands_of_digits_is_read(tmp_path):
+    assert read_bvh(one(tmp_path, time="0.0333333333" + "3" * 5000)).fps == pytest.approx(30.0)
+
+
+def test_the_largest_numbers_are_read_and_overflow_nothing(tmp_path):
+    clip = read_clip(
+        one(tmp_path, offset="1e9 1e9 1e9", channels="3 Xposition Yposition Xrotation", row="1e9 -1e9 1e9")
+    )
+    assert np.isfinite(clip.root_positions).all()
+    assert read_bvh(one(tmp_path, offset="0 1e-320 0")).frames == 1  # a length that is zero but for rounding
+
+
+@pytest.mark.parametrize(("shape", "most"), [("deep", MOST_JOINTS), ("wide", MOST_JOINTS)])
+def test_as_many_joints_as_are_taken_are_read_and_written_in_no_time(tmp_path, shape, most):
+    depths = [k if shape == "deep" else min(k, 1) for k in range(most)]
+    path = tree(tmp_path / "many.bvh", depths, [f"j{k}" for k in range(most)])
+    started = time.process_time()
+    clip = read_clip(path)
+    assert clip.skeleton.joints == most
+    assert most > sys.getrecursionlimit()
+    assert "hip.L" not in clip.skeleton.roles
+    write_bvh(clip, tmp_path / "again.bvh")
+    again = read_clip(tmp_path / "again.bvh", metres_per_unit=0.01)
+    assert time.process_time() - started < SECONDS
+    assert again.skeleton.names == clip.skeleton.names
+    assert again.skeleton.parents.tolist() == clip.skeleton.parents.tolist()
+    np.testing.assert_allclose(again.skeleton.offsets, clip.skeleton.offsets, atol=1e-9)
+
+
+@pytest.mark.parametrize("most", [5000, 20_000])
+def test_more_joints_are_refused_where_the_first_too_many_stands(tmp_path, most):
+    path = tree(tmp_path / "many.bvh", [min(k, 1) for k in range(most)], [f"j{k}" for k in range(most)])
+    started = time.process_time()
+    # Each joint takes five lines, the root's brace closes last.
+    with pytest.raises(
+        MotionFileError, match=rf"many.bvh:{5 * MOST_JOINTS + 1}:1: Expected at most 4000 joints, found more"
+    ):
+        read_bvh(path)
+    assert time.process_time() - started < SECONDS
+
+
+def test_thousands_of_joints_of_one_name_are_numbered_in_no_time(tmp_path):
+    path = tree(tmp_path / "same.bvh", [min(k, 1) for k in range(MOST_JOINTS)], ["same"] * MOST_JOINTS)
+    started = time.process_time()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        clip = read_bvh(path)
+    assert time.process_time() - started < SECONDS
+    assert clip.skeleton.names == ("same", *(f"same_{k}" for k in range(2, MOST_JOINTS + 1)))
+    told = [str(each.message) for each in said if issubclass(each.category, MotionWarning)]
+    assert "two joints are called 'same'; the second is read as 'same_2'" in told[0]
+    assert any(f"{MOST_JOINTS - 4} more joints have the name of another" in each for each in told)
+
+
+def test_a_numbered_name_that_is_there_already_is_not_taken_twice(tmp_path):
+    path = tree(tmp_path / "names.bvh", [0, 1, 1, 1, 1], ["a", "a_2", "a", "a_2", "a"])
+    with pytest.warns(MotionWarning, match="two joints are called"):
+        clip = read_bvh(path)
+    assert clip.skeleton.names == ("a", "a_2", "a_3", "a_2_2", "a_4")
+
+
+def test_a_name_of_thousands_of_letters_is_refused(tmp_path):
+    with pytest.raises(MotionFileError, match=r"names.bvh:6:1: Expected a name of at most 1000 letters, found 5000"):
+        read_bvh(tree(tmp_path / "names.bvh", [0, 1], ["a", "b" * 5000]))
+
+
+def test_few_numbers_can_not_ask_for_a_large_clip(tmp_path):
+    path = tree(tmp_path / "few.bvh", [min(k, 1) for k in range(400)], [f"j{k}" for k in range(400)], channels="")
+    path.write_text(path.read_text().replace("Frames: 2", "") + "1\n" * 60_000)
+    with pytest.raises(
+        MotionError, match=r"few\.bvh to move, found 400 joints and 1 numbers a frame\. Leave out the joints"
+    ):
+        read_bvh(path)
+
+
+def test_resampling_is_refused_where_the_memory_would_not_do():
+    skeleton = Skeleton(("a",), np.array([-1]), np.zeros((1, 3)), np.array([], dtype=int), np.zeros((0, 3)))
+    clip = Clip(skeleton, np.zeros((100, 3)), np.tile([1.0, 0, 0, 0], (100, 1, 1)), 0.01, name="slow")
+    with pytest.raises(MotionError, match=f"at most {MOST_POSES:,} frames times joints in slow at 30000 fps"):
+        resample(clip, 30_000.0)
+
+
+@pytest.mark.parametrize("option", [{"fps": 1e308}, {"fps": 1e-320}, {"metres_per_unit": 1e300}, {"fps": float("nan")}])
+def test_options_past_what_is_meant_are_refused(tmp_path, option):
+    with pytest.raises(MotionError, match=f"Expected {next(iter(option))} above 0, from"):
+        read_clip(one(tmp_path), **option)
+
+
+def test_a_clip_that_moves_too_far_is_not_written(tmp_path):
+    clip = read_clip(one(tmp_path, channels="1 Xposition", row="1e9"), metres_per_unit=1.0)
+    with pytest.raises(MotionFileError, match=r"Expected to write no number above 1e\+09"):
+        write_bvh(clip, tmp_path / "far.bvh")
+    assert not (tmp_path / "far.bvh").exists()
+
+
+def test_long_words_that_are_no_numbers_take_no_time():
+    started = time.process_time()
+    for word in (b"9" * 300_000 + b"x", b"." * 300_000, b"1e" + b"9" * 300_000 + b"x", b"-" * 300_000):
+        assert NUMBER.fullmatch(word) is None
+    assert time.process_time() - started < SECONDS
+
+
+ASF = ":root\norder {order}\n:bonedata\n{bones}:hierarchy\nbegin\nroot {children}\nend\n"
+
+
+def acclaim(folder: Path, frames: str, order: str = "TX RX", bones: str = "", children: str = "") -> Path:
+    (folder / "1.asf").write_text(ASF.format(order=order, bones=bones, children=children), encoding="utf-8")
+    (folder / "1_1.amc").write_text(f":DEGREES\n{frames}", encoding="utf-8")
+    return folder / "1_1.amc"
+
+
+@pytest.mark.parametrize(
+    ("frames", "parts", "message"),
+    [
+        ("1\n2\n", {"order": ""}, r"1.asf:1:1: Expected a degree of freedom in the root's order .* nothing moves"),
+        ("9" * 5000 + "\nroot 1 2\n", {}, r"1_1.amc:2:1: Expected a frame's number, a whole number below 1e\+09"),
+        ("1\nroot 1 1e308\n", {}, r"1_1.amc:3:8: Expected a value of 'root' in frame 1 of at most 1e\+09"),
+        ("1\nroot 1 2e9\n", {}, r"1_1.amc:3:8: Expected a value of 'root' in frame 1 of at most 1e\+09"),
+        (
+            "1\nroot 1 2\n",
+            {"bones": "begin\nname b\ndirection 0 1e-200 0\nlength 1\nend\n", "children": "b"},
+            r"1.asf:6:11: Expected a direction of 'b' that is not zero",
+        ),
+        (
+            "1\nroot 1 2\n",
+            {"bones": "begin\nname b\ndirection 0 1 0\nlength 1e308\nend\n", "children": "b"},
+            r"1.asf:7:8: Expected the length of 'b' of at most 1e\+09",
+        ),
+    ],
+)
+def test_acclaim_files_past_what_is_meant_are_refused_with_their_place(tmp_path, frames, parts, message):
+    with pytest.raises(MotionFileError, match=message):
+        read_amc(acclaim(tmp_path, frames, **parts))
+
+
+def test_more_bones_are_refused_in_no_time(tmp_path):
+    bones = "".join(f"begin\nname b{k}\ndirection 0 1 0\nlength 1\nend\n" for k in range(15_000))
+    children = " ".join(f"b{k}" for k in range(15_000))
+    started = time.process_time()
+    with pytest.raises(MotionFileError, match=r"1.asf:\d+:6: Expected at most 4000 bones, found more"):
+        read_amc(acclaim(tmp_path, "1\nroot 1 2\n", bones=bones, children=children))
+    assert time.process_time() - started < SECONDS

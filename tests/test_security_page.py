@@ -1,0 +1,59 @@
+"""The security page names what is installed, and an audit that could not be made does not pass."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"scripts_{name}", ROOT / "scripts" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_package_that_segue_installs_stands_on_the_page():
+    page = (ROOT / "docs" / "security.md").read_text(encoding="utf-8")
+    missing = [name for name in script("licences").installed("segue") if f"| {name} | " not in page]
+    assert not missing, "run `python scripts/licences.py` and put its lines onto the page"
+    assert "libx264 and libx265 (GPL-2.0-or-later)" in page
+
+
+@pytest.mark.parametrize(
+    ("answer", "status", "said"),
+    [
+        ("", 2, "could not be asked"),
+        ('{"error": "x"}', 2, "could not be asked"),
+        ({"dependencies": []}, 2, "0 of 0 packages looked up"),
+        ({"dependencies": [{"name": "av", "skip_reason": "not found"}]}, 2, "not looked up: av"),
+        ({"dependencies": [{"name": "av", "version": "1", "vulns": []}]}, 0, "1 of 1 packages looked up, 0 with"),
+        (
+            {
+                "dependencies": [
+                    {"name": "segue", "skip_reason": "not found"},
+                    {"name": "av", "version": "1", "vulns": []},
+                ]
+            },
+            0,
+            "1 of 1 packages looked up",
+        ),
+        (
+            {"dependencies": [{"name": "av", "version": "1", "vulns": [{"id": "CVE-1", "fix_versions": ["2"]}]}]},
+            1,
+            "av 1: CVE-1, mended in 2",
+        ),
+    ],
+)
+def test_only_packages_that_were_looked_up_pass_an_audit(answer, status, said):
+    found, lines = script("audited").audited("pypi", answer if isinstance(answer, str) else json.dumps(answer))
+    assert found == status
+    assert said in "\n".join(lines)
