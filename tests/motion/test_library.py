@@ -19,7 +19,7 @@ from study.motion.clip import Clip, joint_positions, moved, trim
 from study.motion.cmu import CMU_ACKNOWLEDGEMENT, cmu_index, is_trial, trial_files
 from study.motion.cycles import find_cycle
 from study.motion.download import download_trial
-from study.motion.entries import motion_file
+from study.motion.entries import entry_of_file, motion_file
 from study.motion.feet import faced, floor_height, foot_points, grounded, heading, stance
 from study.motion.library import FolderLibrary, open_library
 from study.motion.synthetic import synthesize
