@@ -75,6 +75,7 @@ class Library(ABC):
 
     def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
         """Make a motion up that has no file; for libraries that have such motions."""
+        del fps, min_seconds
         raise MotionError(f"Expected a file behind {entry.name!r} in {self.name}, found none.")
 
     def distinct(self) -> tuple[str, ...]:
