@@ -29,6 +29,7 @@ def ask(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, obj
 def with_t_pose(clip: Clip) -> Clip:
     """The clip with a T-pose put in front, as converters do it."""
     rotations, path = (np.concatenate([array[:1], array]) for array in (clip.rotations, clip.root_positions))
+    path[0] = 2.0 * path[1] - path[2]
     rotations[0, 1:] = quat.IDENTITY
     for name, angle in (("LeftArm", np.pi / 2), ("RightArm", -np.pi / 2)):
         rotations[0, clip.skeleton.names.index(name)] = quat.from_axis_angle([0.0, 0.0, 1.0], angle)
