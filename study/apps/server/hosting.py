@@ -51,8 +51,8 @@ TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
 
 GONE_SECONDS = 300.0
-"""A sitting that was not heard of for so long is kept in the database alone, and taken up from there; one whose page was
-closed, after the time of a tab."""
+"""A sitting that was not heard of for so long is kept in the database alone, and taken up from there; one whose page
+was closed, after the time of a tab."""
 
 MOST_EVENTS = 2000
 """So much of what a page tells, or causes by opening over and over, is stored of a session: it can't fill the disk."""
