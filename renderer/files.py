@@ -89,9 +89,7 @@ def scratch_folder(kind: str) -> Iterator[Path]:
         folder = tempfile.TemporaryDirectory(prefix=f"{kind}-{os.getpid()}-", ignore_cleanup_errors=True)
     except OSError as error:
         why = error.strerror or str(error)
-        raise DiskError(
-            f"The folder for temporary files can't be used ({why}); name another as TMPDIR."
-        ) from error
+        raise DiskError(f"The folder for temporary files can't be used ({why}); name another as TMPDIR.") from error
     with folder as name:
         for left in Path(name).parent.glob(f"{kind}-*-*"):
             owner = left.name.removeprefix(f"{kind}-").partition("-")[0]
