@@ -398,7 +398,13 @@ def main() -> int:
         print(json.dumps(asdict(outcome), indent=2) if options.json else f"{outcome.result}\n{outcome.details}")
         return int(outcome.result == "fault")
     started = time.monotonic()
-    outcomes = list(run_all(options.cases, options.seed, options.kinds.split(","), options.workers, options.keep))
+    outcomes: list[Outcome] = []
+    for outcome in run_all(options.cases, options.seed, options.kinds.split(","), options.workers, options.keep):
+        outcomes.append(outcome)
+        if outcome.result == "fault":
+            print(f"{outcome.name}: {outcome.fault}", file=sys.stderr, flush=True)
+        elif len(outcomes) % 1000 == 0:
+            print(f"{len(outcomes)} cases", file=sys.stderr, flush=True)
     summary = summarise(outcomes, time.monotonic() - started)
     if options.json:
         print(json.dumps(summary, indent=2))
