@@ -84,6 +84,7 @@ attention_checks = 1
 [[studies]]
 name = "liking"
 task = "preference"
+instructions = ""
 reference = "geodesic"
 comparison = "fixed"
 order = "by-group"
@@ -92,6 +93,7 @@ question = "Which was more natural?"
 [[studies]]
 name = "rating"
 task = "rating"
+instructions = ""
 reference = "geodesic"
 comparison = "cut"
 order = "by-group"
@@ -109,6 +111,7 @@ question = "How noticeable was the passage?"
 [[studies]]
 name = "compared"
 task = "rating"
+instructions = ""
 show = "pair"
 reference = "geodesic"
 comparison = "cut"

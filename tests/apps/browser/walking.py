@@ -42,6 +42,7 @@ destination = "jog"
 [[studies]]
 name = "jnd"
 task = "same-different"
+instructions = ""
 reference = "geodesic"
 differences_frames = [-2, 0]
 order = "both"
@@ -55,6 +56,7 @@ RATED = (
 [[studies]]
 name = "rating"
 task = "rating"
+instructions = ""
 reference = "geodesic"
 comparison = "cut"
 order = "random"

@@ -64,6 +64,7 @@ RATING = """
 [[studies]]
 name = "rating"
 task = "rating"
+instructions = ""
 reference = "geodesic"
 question = "How was it?"
 scale_points = 11
@@ -83,6 +84,7 @@ COMPARED = """
 [[studies]]
 name = "compared"
 task = "rating"
+instructions = ""
 show = "pair"
 reference = "geodesic"
 comparison = "cut"
