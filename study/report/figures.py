@@ -208,13 +208,15 @@ def preference_figure(comparison: Result, name: str, mark: str) -> str:
         figure, axes = new_figure(7.2, 0.34 * (len(motions) + 3) + 0.9)
         axes.axvline(50, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
         for row, motion in enumerate(motions):
-            axes.plot([motion["low"], motion["high"]], [-row, -row], color=INK, linewidth=1.4)
-            axes.plot([motion["percent"]], [-row], "o", color=INK, markersize=4.5)
+            if motion["percent"] is not None:
+                axes.plot([motion["low"], motion["high"]], [-row, -row], color=INK, linewidth=1.4)
+                axes.plot([motion["percent"]], [-row], "o", color=INK, markersize=4.5)
             _at_the_right(axes, -row, f"{motion['favouring']} / {motion['answers']}")
         foot = -len(motions) - 0.3
-        low, high = 100 * pooled["interval"]["low"], 100 * pooled["interval"]["high"]
-        axes.plot([low, high], [foot, foot], color=INK, linewidth=2.4)
-        axes.plot([pooled["percent"]], [foot], "o", color=INK, markersize=6)
+        if pooled["percent"] is not None:
+            ends = [100 * pooled["interval"][end] for end in ("low", "high")]
+            axes.plot(ends, [foot, foot], color=INK, linewidth=2.4)
+            axes.plot([pooled["percent"]], [foot], "o", color=INK, markersize=6)
         _at_the_right(axes, foot, f"{pooled['favouring']} / {pooled['answers']}")
         if people["low"] is not None:
             axes.plot([people["low"], people["high"]], [foot - 1, foot - 1], color=BLUE, linewidth=2.4)
@@ -231,7 +233,8 @@ def preference_figure(comparison: Result, name: str, mark: str) -> str:
         a, b = _readable(comparison["method_a"]), _readable(comparison["method_b"])
         axes.set_xlabel(f"answers that favoured {a} over {b}")
         add_mark(figure, mark)
-        spoken = "; ".join(f"{_readable(row['motion'])}: {row['percent']:.0f}%" for row in motions)
+        known = [row for row in motions if row["percent"] is not None]
+        spoken = "; ".join(f"{_readable(row['motion'])}: {row['percent']:.0f}%" for row in known)
         return to_svg(figure, name, f"Percent favouring {a} over {b}", spoken)
 
 

@@ -35,7 +35,8 @@ def test_answers_are_turned_so_that_the_comparison_is_judged() -> None:
     (found,) = pair_ratings(answers, 5)
     assert (found["method_a"], found["method_b"], found["of"]) == ("old", "new", "new compared with old")
     assert found["distribution"] == {"0": 0, "1": 0, "2": 1, "3": 1, "4": 2}
-    assert found["published"] == {"mean": 3.25, "standard_deviation": pytest.approx(np.std([4, 4, 3, 2], ddof=1))}
+    spread = pytest.approx(np.std([4, 4, 3, 2], ddof=1))
+    assert found["published"] == {"mean": 3.25, "standard_deviation": spread, "note": ""}
     assert found["middle"] == 2
 
 
