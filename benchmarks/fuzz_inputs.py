@@ -500,22 +500,25 @@ def _large_protocol(generator: Generator) -> str:
 
 def table(generator: Generator) -> tuple[bytes, tuple[str, ...]]:
     """A few answers of a few people, of all degrees of agreement; and the options that `fit` needs for it."""
-    task = pick(generator, ("preference", "preference", "rating", "same-different", "2afc", "yes-no"))
-    people, trials = int(pick(generator, (1, 2, 3, 4, 4, 5, 7, 12))), int(pick(generator, (1, 2, 3, 3, 4, 8)))
+    task = pick(generator, ("preference", "preference", "preference", "rating", "same-different", "2afc", "yes-no"))
+    people, answers = (
+        int(pick(generator, (1, 2, 3, 4, 4, 5, 7, 12))),
+        int(pick(generator, (1, 4, 6, 8, 10, 12, 16, 40))),
+    )
     agree, motions = float(generator.choice([0.0, 0.5, 0.7, 0.9, 1.0])), int(generator.integers(1, 4))
     methods = ("geo", "fix", "cut")[: int(pick(generator, (2, 2, 2, 3)))]
     rows = []
-    for person in range(people):
-        for _ in range(int(generator.integers(1, trials + 1))):
-            a, b = (str(name) for name in generator.permutation(methods)[:2])
-            level = int(generator.integers(-3, 4))
-            right = generator.random() < agree
-            answer = {
-                "preference": ("first" if a < b else "second") if right else pick(generator, ("first", "second")),
-                "rating": str(int(generator.integers(1, 6)) if not right else 4 + (a == methods[0])),
-                "same-different": "different" if (level != 0) == right else "same",
-            }.get(task, "1" if right or generator.random() < 0.5 else "0")
-            rows.append((f"s{person}", a, b, f"m{generator.integers(motions)}", level, f"i{level % 2}", answer))
+    # Who has how many answers is chance, too: small unequal tables are where models fail.
+    for person in generator.integers(people, size=answers):
+        a, b = (str(name) for name in generator.permutation(methods)[:2])
+        level = int(generator.integers(-3, 4))
+        right = generator.random() < agree
+        answer = {
+            "preference": ("first" if a < b else "second") if right else pick(generator, ("first", "second")),
+            "rating": str(int(generator.integers(1, 6)) if not right else 4 + (a == methods[0])),
+            "same-different": "different" if (level != 0) == right else "same",
+        }.get(task, "1" if right or generator.random() < 0.5 else "0")
+        rows.append((f"s{person}", a, b, f"m{generator.integers(motions)}", level, f"i{level % 2}", answer))
     lines = ["participant,first,second,motion,level,item,answer", *(",".join(map(str, row)) for row in rows)]
     content = ("\n".join(lines) + "\n").encode()
     if generator.random() < 0.4:
