@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -44,6 +46,19 @@ def serve(stimuli, responses):
     yield start
     for serving in opened:
         serving.client.__exit__(None, None, None)
+
+
+@pytest.fixture
+def connect(port):
+    """`connect()`: a socket to the server that a test file's fixture `port` runs."""
+    with contextlib.ExitStack() as stack:
+
+        def opened():
+            client = stack.enter_context(socket.create_connection(("127.0.0.1", port)))
+            client.settimeout(10)
+            return client
+
+        yield opened
 
 
 @pytest.fixture

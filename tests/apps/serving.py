@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import socket
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ import uvicorn
 from starlette.testclient import TestClient
 
 from study.apps.server.hosting import Host
+from study.apps.server.running import configuration
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.experiment.protocol import Protocol, parse_protocol
@@ -307,6 +310,25 @@ def _spoilt(send: Any, site: Site) -> Any:
                 await asyncio.sleep(0.05)
 
     return spoil
+
+
+@contextlib.contextmanager
+def listening(app: Any, **settings: Any) -> Iterator[int]:
+    """The port of a server as `segue serve` starts it, in a thread; `settings` are uvicorn's."""
+    config = configuration(app)
+    config.host, config.port = "127.0.0.1", free_port()
+    for name, value in settings.items():
+        setattr(config, name, value)
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    end = time.monotonic() + 20
+    while not server.started:
+        assert time.monotonic() < end, "the server did not start"
+        time.sleep(0.01)
+    yield config.port
+    server.should_exit = True
+    thread.join(20)
 
 
 def free_port() -> int:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import socket
-import threading
 import time
 
 import pytest
-import uvicorn
-from serving import free_port
+from serving import listening
 
 from study.apps.server import connections, running
-from study.apps.server.running import configuration
 
 LARGE = b"x" * 20_000_000
 
@@ -38,31 +34,8 @@ def port(monkeypatch):
     monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.3)
     monkeypatch.setattr(connections, "REPLY_SECONDS", 1.5)
     monkeypatch.setattr(running, "MOST_CONNECTIONS", 150)
-    free = free_port()
-    config = configuration(app)
-    config.host, config.port, config.lifespan = "127.0.0.1", free, "off"
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    end = time.monotonic() + 20
-    while not server.started:
-        assert time.monotonic() < end, "the server did not start"
-        time.sleep(0.01)
-    yield free
-    server.should_exit = True
-    thread.join(20)
-
-
-@pytest.fixture
-def connect(port):
-    with contextlib.ExitStack() as stack:
-
-        def opened():
-            client = stack.enter_context(socket.create_connection(("127.0.0.1", port)))
-            client.settimeout(10)
-            return client
-
-        yield opened
+    with listening(app, lifespan="off") as port:
+        yield port
 
 
 def ended(client):

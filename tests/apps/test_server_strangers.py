@@ -8,12 +8,10 @@ import json
 import logging
 import socket
 import struct
-import threading
 import time
 
 import pytest
-import uvicorn
-from serving import TOKEN, free_port, make_host, protocol_of
+from serving import TOKEN, listening, make_host, protocol_of
 from starlette.testclient import TestClient
 
 from study.apps.server import connections
@@ -21,7 +19,6 @@ from study.apps.server.connections import LARGEST_HEAD
 from study.apps.server.films import whole_bytes
 from study.apps.server.limits import GUESSES_AT_ONCE, MOST_GUESSERS, SECONDS_A_GUESS, Guesses
 from study.apps.server.names import Named, own_names
-from study.apps.server.running import configuration
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
@@ -32,31 +29,8 @@ from study.experiment.plan import draw_plan
 @pytest.fixture
 def port(stimuli, responses):
     """The whole server, on a port."""
-    free = free_port()
-    config = configuration(make_app(make_host(stimuli, responses)))
-    config.host, config.port = "127.0.0.1", free
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    end = time.monotonic() + 20
-    while not server.started:
-        assert time.monotonic() < end, "the server did not start"
-        time.sleep(0.01)
-    yield free
-    server.should_exit = True
-    thread.join(20)
-
-
-@pytest.fixture
-def connect(port):
-    with contextlib.ExitStack() as stack:
-
-        def opened():
-            client = stack.enter_context(socket.create_connection(("127.0.0.1", port)))
-            client.settimeout(10)
-            return client
-
-        yield opened
+    with listening(make_app(make_host(stimuli, responses))) as port:
+        yield port
 
 
 def head(path, length, *more):
