@@ -34,7 +34,7 @@ _PLAUSIBLE = (
 WORDS = (
     "", " ", "a", "A" * 300, "word" * 2500, "=1+1", "@x", "-", "_", ".", "..", "../x", "con", "é", "日本語",
     "\u202e", "\ufeff", "\0", "\x1b[31m", "{standard}", "{nonsense}", "{", "}", "%s", "${x}", "<b>", "&amp;",
-    "'", '"', "\\", "ROOT", "MOTION", "End", ":root", "begin", "end", "#", ",", ";", "\t", "\r", "nan",
+    "'", '"', "\\", "ROOT", "MOTION", "End", ":root", "begin", "end", "#", ",", ";", "\t", "\r",
     "None", "null", "first", "second", "same", "1 2",
 )  # fmt: skip
 
@@ -234,24 +234,21 @@ def sound_bvh(generator: Generator) -> bytes:
 _LIBRARY = """\
 [defaults]
 unit = "cm"
-up = "Y"
 
 [clips.walk]
 file = "walk.bvh"
-kind = "walking"
-words = "a walk"
-start_s = 0.1
-end_s = 0.5
+category = "walking"
 fps = 30.0
+cyclic = false
+beats = [0.1, 0.3]
 
-[clips.run]
+[clips.turned]
 file = "run.bvh"
-mirrored = true
+mirror = true
 first_frame = 1
 last_frame = 15
 
-[clips.run.joints]
-"hip.L" = "LeftUpLeg"
+[clips.turned.joints]
 pelvis = "Hips"
 """
 

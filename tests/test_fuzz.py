@@ -10,6 +10,8 @@ from types import ModuleType
 import pytest
 
 CASES, SEED, CHUNKS = 2000, 1, 16
+# Rare ones that were found among many more: models of preferences that overflowed or divided by zero.
+FOUND_ONCE = {"table": (2603, 6312, 7638)}
 PATH = Path(__file__).parents[1] / "benchmarks" / "fuzz.py"
 
 
@@ -31,6 +33,12 @@ def test_damaged_input_ends_in_an_answer_or_a_refusal(fuzz, chunk):
     finds = [f"{o.name}: {o.fault}\n{o.details[-1500:]}" for o in outcomes if o.result == "fault"]
     assert not finds, "\n\n".join(finds)
     assert {o.result for o in outcomes} == {"accepted", "refused"}
+
+
+@pytest.mark.parametrize(("kind", "number"), [(kind, n) for kind, numbers in FOUND_ONCE.items() for n in numbers])
+def test_what_was_found_once_stays_mended(fuzz, kind, number):
+    outcome = fuzz.run_case(kind, SEED, number)
+    assert outcome.result != "fault", outcome.details
 
 
 def test_a_case_is_the_same_each_time(fuzz, tmp_path):
