@@ -14,7 +14,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
-SCRIPTS = [*sorted((ROOT / "scripts").iterdir()), *sorted((ROOT / ".ci").iterdir())]
+SCRIPTS = [path for name in ("scripts", ".ci") for path in sorted((ROOT / name).iterdir()) if path.suffix != ".py"]
 
 # Goes on printing, slowly, after the line that is looked for: a reader that stops early would end this with SIGPIPE.
 SLOW_APT_CACHE = """#!/usr/bin/env bash

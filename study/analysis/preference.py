@@ -345,8 +345,8 @@ def _order_in_words(method_a: str, method_b: str, order: dict[str, Any], alpha: 
         return ""
     place = "first" if order["first_percent"] else "second"
     return (
-        f"Each of {order['answers']} answers favoured the one shown {place}: the order of presentation decided, and "
-        f"nothing can be said about {method_a} and {method_b}."
+        f"Each of {counted(order['answers'], 'answer')} favoured the one shown {place}: the order of presentation "
+        f"decided, and nothing can be said about {method_a} and {method_b}."
     )
 
 

@@ -10,8 +10,6 @@ What a key means stands in its `description`; `docs/protocols.md` is written fro
 from __future__ import annotations
 
 import hashlib
-import re
-import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -23,11 +21,12 @@ from study.counting import counted
 from study.errors import FileError, ProtocolError
 from study.experiment.languages import with_words
 from study.experiment.protocol_checks import check_whole
-from study.experiment.protocol_errors import explain, full_location, key_lines, key_path, line_of, telling
+from study.experiment.protocol_errors import explain, full_location, key_lines, line_of, telling
 from study.experiment.protocol_parts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
 from study.experiment.protocol_stimuli import Points, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol_studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec
 from study.files import read_text
+from study.toml_text import LARGEST_TEXT, parse_toml
 
 __all__ = [
     "OPTIMUM_CUTS",
@@ -42,14 +41,8 @@ __all__ = [
     "protocols_folder",
 ]
 
-LARGEST_TEXT = 1_000_000
-"""Letters of a protocol."""
 MOST_PROBLEMS = 50
 """So many are told at once."""
-_DEEPEST = 20
-# More keys in a row than that, parted by points: the time to read them grows with the square of their number.
-_KEY = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
-_DEEP_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_KEY}){{200}}", re.MULTILINE)
 
 
 class Protocol(Part):
@@ -189,7 +182,10 @@ def load_protocol(path: str | Path) -> Protocol:
 def parse_protocol(text: str, path: Path | None = None) -> Protocol:
     """Check a protocol's text; `path` is for messages."""
     where = str(path) if path else "protocol"
-    data = _read_toml(text, where)
+    try:
+        data = parse_toml(text, where)
+    except FileError as error:
+        raise ProtocolError(str(error)) from error
     try:
         protocol = Protocol.model_validate(with_words(data))
     except ValidationError as error:
@@ -203,37 +199,6 @@ def parse_protocol(text: str, path: Path | None = None) -> Protocol:
         raise ProtocolError("\n".join(sentences)) from None
     protocol._text, protocol._path = text, path
     return protocol
-
-
-def _read_toml(text: str, where: str) -> dict[str, Any]:
-    """The data of a text; refused where it is no TOML, or is larger, deeper or of larger numbers than any protocol."""
-    too_deep = f"{where}: expected keys and lists at most {_DEEPEST} deep, found deeper ones; remove them."
-    if len(text) > LARGEST_TEXT:
-        raise ProtocolError(
-            f"{where}: expected a protocol of at most {LARGEST_TEXT:,} letters, found more; shorten it."
-        )
-    if _DEEP_KEY.search(text):
-        raise ProtocolError(too_deep)
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ProtocolError(f"{where}: expected TOML, found a mistake: {error}. Mend that line.") from error
-    except RecursionError:
-        raise ProtocolError(too_deep) from None
-    except ValueError as error:  # Python's own limit for whole numbers, or a date that there is not
-        raise ProtocolError(f"{where}: expected TOML, found a number or a date out of range ({error}).") from error
-    parts: list[tuple[Any, tuple[int | str, ...]]] = [(data, ())]
-    while parts:
-        part, location = parts.pop()
-        if len(location) > _DEEPEST:
-            raise ProtocolError(too_deep)
-        if isinstance(part, int) and not -(2**63) <= part < 2**63:
-            raise ProtocolError(
-                f"{where}: {key_path(location)}: expected a whole number of at most 64 bits, found more."
-            )
-        inner = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
-        parts += [(value, (*location, key)) for key, value in inner]
-    return data
 
 
 def protocols_folder() -> Path:

@@ -117,7 +117,7 @@ def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
     trials = protocol.trials_of(study)
     if trials > MOST_TRIALS:
         raise KeyMismatchError(
-            f"expected at most {MOST_TRIALS:,} trials in {study.name!r}, found {trials:,}; lower repeats",
+            f"expected at most {counted(MOST_TRIALS, 'trial')} in {study.name!r}, found {trials:,}; lower repeats",
             "studies",
             index,
         )

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from study.counting import counted
+from study.toml_text import key_path
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -167,17 +168,6 @@ def _near_key(model: type[BaseModel], location: Location) -> str:
     parent = model_at(model, location[:-1])
     near = get_close_matches(str(location[-1])[:80], list(parent.model_fields) if parent else [], n=1)
     return near[0] if near else ""
-
-
-def key_path(location: Location) -> str:
-    """A pydantic location as people write it: `studies[0].task`."""
-    path = ""
-    for step in location:
-        if isinstance(step, int):
-            path += f"[{step}]"
-        else:
-            path += ("." if path else "") + (step if len(step) <= 80 else f"{step[:77]}...")
-    return path
 
 
 def _unwrap(annotation: Any) -> Any:

@@ -11,7 +11,6 @@ import difflib
 import json
 import math
 import os
-import tomllib
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,8 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import MotionFileError
+from study.files import read_text, write_whole
+from study.motion.clip import HIGHEST_FPS, LOWEST_FPS
 from study.motion.joint_names import CENTRE_ROLES, ROLES
 from study.motion.units import INCH
+from study.toml_text import LARGEST_TEXT, parse_toml
 
 NAME = "library.toml"
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH}
@@ -95,17 +97,12 @@ def read_library_file(path: Path) -> LibraryFile:
 
     Raises
     ------
+    FileError
+        For what can't be read, or is no TOML.
     MotionFileError
-        For what is no TOML, keys that there are not (with the nearest one), values that can't be meant.
+        For keys that there are not (with the nearest one), and values that can't be meant.
     """
-    try:
-        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except OSError as problem:
-        raise MotionFileError(f"Expected a library.toml, but it can't be read ({problem.strerror}).", path) from problem
-    except UnicodeDecodeError as problem:
-        raise MotionFileError("Expected UTF-8 text, found other bytes. Save it again as UTF-8.", path) from problem
-    except tomllib.TOMLDecodeError as problem:
-        raise MotionFileError(f"Expected TOML, found something else: {problem}. Mend the line.", path) from problem
+    content = parse_toml(read_text(path, "a library.toml", LARGEST_TEXT + 1), str(path))
     _only(content, ("clips", "defaults"), "", path)
     clips = _table(content.get("clips", {}), "clips", path)
     defaults = _fields(_table(content.get("defaults", {}), "defaults", path), "defaults", tuple(_KEYS), path)
@@ -196,6 +193,12 @@ def _positive(value: object) -> float:
     return found
 
 
+def _rate(value: object) -> float:
+    if not LOWEST_FPS <= (found := _number(value)) <= HIGHEST_FPS:
+        raise ValueError
+    return found
+
+
 def _unit(value: object) -> float:
     return UNITS[value] if isinstance(value, str) and value in UNITS else _positive(value)
 
@@ -233,7 +236,7 @@ _KEYS: Mapping[str, tuple[Callable[[object], dict[str, Any]], str]] = {
     "last_frame": (lambda v: {"last_frame": _whole(v)}, "a frame number from 0"),
     "mirror": (lambda v: {"mirrored": _flag(v)}, "true or false"),
     "unit": (lambda v: {"metres_per_unit": _unit(v)}, 'metres in a unit of the file, or "m", "cm", "mm" or "in"'),
-    "fps": (lambda v: {"fps": _positive(v)}, "frames per second above 0"),
+    "fps": (lambda v: {"fps": _rate(v)}, f"frames per second from {LOWEST_FPS:.1g} to {HIGHEST_FPS:g}"),
     "cyclic": (_cyclic, 'true, false, "start" or "end"'),
     "category": (lambda v: {"kind": _text(v)}, "text in quotes"),
     "beats": (lambda v: {"beats": _beats(v)}, "a list of times in seconds, such as [0.5, 1.0]"),
@@ -268,25 +271,22 @@ def write_library_file(folder: Path, tables: Iterable[tuple[str, str, str, str]]
     Raises
     ------
     MotionFileError
-        Where the folder has one already, or can't be written to.
+        Where the folder has one already.
+    FileError
+        Where it can't be written.
     """
     path = folder / NAME
+    if path.exists():
+        raise MotionFileError(
+            "Expected a folder without library.toml, found one. It is never overwritten: add to it, or move it away.",
+            path,
+        )
     lines = [_FIRST_LINES]
     for name, file, category, comment in tables:
         comment = "".join(letter if letter.isprintable() else " " for letter in comment)
         lines += [f"[clips.{_quoted(name)}]  # {comment}", f"file = {_quoted(file)}"]
         lines += [f"category = {_quoted(category)}", ""] if category else [""]
-    text = "\n".join(lines)
-    try:
-        with path.open("x", encoding="utf-8", newline="\n") as out:
-            out.write(text)
-    except FileExistsError:
-        raise MotionFileError(
-            "Expected a folder without library.toml, found one. It is never overwritten: add to it, or move it away.",
-            path,
-        ) from None
-    except OSError as problem:
-        raise MotionFileError(f"Expected to write here, but can't ({problem.strerror}).", path) from problem
+    write_whole(path, "\n".join(lines))
     return path
 
 

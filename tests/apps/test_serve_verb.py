@@ -51,7 +51,7 @@ except KeyboardInterrupt:
 )
 def test_what_can_not_be_is_refused_before_anything_is_rendered(capsys, tmp_path, option, value, why):
     protocol = tmp_path / "study.toml"
-    protocol.write_text(PROTOCOL, encoding="utf-8")
+    protocol.write_text(PROTOCOL.replace('instructions = ""', 'instructions = "Watch both."'), encoding="utf-8")
     assert run(["serve", str(protocol), "--out", str(tmp_path / "out"), option, value]) == 2
     printed = capsys.readouterr()
     assert why in printed.err

@@ -207,7 +207,9 @@ def test_files_that_are_no_text_are_refused(tmp_path):
         load_protocol(tmp_path / "none.toml")
     bad = tmp_path / "bad.toml"
     bad.write_bytes(b"name = '\xff\xfe'")
-    with pytest.raises(ProtocolError, match="expected UTF-8 text, found byte 8"):
+    with pytest.raises(
+        ProtocolError, match=r"bad\.toml:1: expected a protocol file in UTF-8, found a letter in another"
+    ):
         load_protocol(bad)
 
 
