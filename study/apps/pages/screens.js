@@ -101,7 +101,7 @@ async function example(view, study) {
     video = await load(view.example, view.fps);
     status("");
     place.append(video);
-    matchBackground(video);
+    matchBackground(video, study);
     video.classList.add("now");
     await play(video, view.example, view.fps);
   } catch {

@@ -1,7 +1,7 @@
 // A trial: films, gap, question, as the server's view says. Resolves with the message that is the answer.
 
 import { attend, faults, filmsOn, unseen, visible } from "./attention.js";
-import { surround } from "./colours.js";
+import { fromHex, surround } from "./colours.js";
 import { ask, element, heading, secondClick, show, sleep, status } from "./dom.js";
 import { FilmFault, forget, load, loadAhead, release } from "./film.js";
 import { play } from "./playing.js";
@@ -20,12 +20,17 @@ export function stage(study) {
   return made;
 }
 
+const NEAR = 12; // of 255: what decoding may change of a colour
+
 // The page takes the colour that the browser makes of the films' background, to the last bit, so that nothing flashes.
-export function matchBackground(video) {
+// A busy browser may have no frame to draw yet, and draws black or nothing: only a colour near the stated one is taken.
+export function matchBackground(video, study) {
   const canvas = element("canvas", { width: 1, height: 1 });
   const context = canvas.getContext("2d");
   context.drawImage(video, 0, 0, 1, 1, 0, 0, 1, 1);
-  surround([...context.getImageData(0, 0, 1, 1).data].slice(0, 3));
+  const colour = [...context.getImageData(0, 0, 1, 1).data];
+  const stated = [...fromHex(study.background), 255];
+  if (colour.every((value, i) => Math.abs(value - stated[i]) <= NEAR)) surround(colour.slice(0, 3));
 }
 
 async function loadAll(view, study, onFault) {
@@ -55,7 +60,7 @@ class Unseen extends Error {} // films that were played to nobody
 async function showFilms(view, study, { restarts, pauseOver, onFault }) {
   const { place, videos } = await loadAll(view, study, onFault);
   const scale = place.clientWidth / study.size[0]; // of the film's own size
-  matchBackground(videos[0]);
+  matchBackground(videos[0], study);
   await pauseOver;
   await visible();
   if (restarts === MOST_RESTARTS) attend();

@@ -108,6 +108,20 @@ def test_nothing_flashes_between_films_and_pages(make_site, make_tab, tmp_path):
     assert len(set(corners)) == 1
 
 
+def test_a_frame_that_can_not_be_drawn_yet_leaves_the_pages_colour(make_site, make_tab):
+    """As in a busy browser, where a film is ready before its first frame can be drawn."""
+    site, tab = make_site(SHORT), make_tab()
+    nothing = "CanvasRenderingContext2D.prototype.drawImage = () => { window.asked = true; };"
+    tab.call("Page.addScriptToEvaluateOnNewDocument", source=nothing)
+    tab.open(site.address)
+    to_question(tab)
+    assert tab.run("window.asked")
+    stated = tab.run("fetch('api/study').then((found) => found.json()).then((study) => study.background)")
+    red, green, blue = (int(stated[at : at + 2], 16) for at in (1, 3, 5))
+    colour = tab.run("getComputedStyle(document.documentElement).getPropertyValue('--stage').trim()")
+    assert colour == f"rgb({red}, {green}, {blue})"
+
+
 def test_reduced_motion_is_told_of_and_hides_no_film(make_site, make_tab):
     site, tab = make_site(), make_tab()
     tab.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
