@@ -112,8 +112,8 @@ def press(tab, keys=True):
     return True
 
 
-def read_on(tab, keys=True):
-    """Pass a page that is read or filled in, whichever is there."""
+def read_on(tab, keys=True, again=True):
+    """Pass a page that is read or filled in, whichever is there; one that offers to try again only with `again`."""
     seen = tab.run(LOOK)
     if seen == "form":
         tab.run("(() => { const age = document.getElementById('field-age'); if (age) age.value = '33'; })()")
@@ -123,7 +123,7 @@ def read_on(tab, keys=True):
         tab.key("Enter")
     elif seen.startswith("Continue") or seen == "form":
         tab.try_click("Continue")
-    elif seen.startswith(("Try again", "Go on here instead")):
+    elif again and seen.startswith(("Try again", "Go on here instead")):
         tab.try_click(seen)
     time.sleep(0.03)
 
