@@ -13,27 +13,27 @@ export const hasFrameCallback = "requestVideoFrameCallback" in HTMLVideoElement.
 // The frames that the browser says it presented.
 class Frames {
   constructor(film, fps) {
-    Object.assign(this, { film, fps, times: [], indices: [], first: 0, latest: 0, gap: 0 });
+    Object.assign(this, { film, fps, times: [], indices: [], presented: 0, latest: 0, gap: 0 });
   }
 
   add(data) {
     const index = Math.round(data.mediaTime * this.fps);
     // An expectation, which a busy machine does not always meet: no frame is seen before the one before it.
     const at = Math.max(data.expectedDisplayTime, this.times.at(-1) ?? 0);
-    if (this.indices.length > 0 && index <= this.indices.at(-1)) {
+    const counted = data.presentedFrames - this.latest;
+    this.latest = data.presentedFrames;
+    const before = this.indices.at(-1);
+    if (index <= before) {
       // Told of one frame twice, as of the first one, which stood before the film started: no further frame.
-      this.first += data.presentedFrames - this.latest;
-      this.latest = data.presentedFrames;
       if (this.indices.length === 1) this.times = [at];
       return;
     }
+    // A browser may count a frame twice that it draws twice: between two frames there are no more than stand between them
+    // in the film. The first frame stood there before the film started, and then is not always presented once more.
+    const presented = before === undefined ? Math.min(index + 1, 2) : Math.min(Math.max(1, counted), index - before);
     // The first frame stands while the film starts: no gap is counted before the second.
-    if (this.indices.length > 0 && this.indices.at(-1) > 0) {
-      const presented = Math.max(1, data.presentedFrames - this.latest);
-      this.gap = Math.max(this.gap, ((at - this.times.at(-1)) * this.fps) / 1000 / presented);
-    }
-    if (this.indices.length === 0) this.first = data.presentedFrames;
-    this.latest = data.presentedFrames;
+    if (before > 0) this.gap = Math.max(this.gap, ((at - this.times.at(-1)) * this.fps) / 1000 / presented);
+    this.presented += presented;
     this.times.push(at);
     this.indices.push(index);
   }
@@ -49,14 +49,11 @@ class Frames {
       const last = endedAt - 1000 / this.fps;
       return { method: "ended", frames_presented: null, longest_gap_frames: null, shown_well: true, times_ms: [], frames: [], last };
     }
-    // The first frame stood there before the film started, and then is not always presented once more.
-    const stood = this.indices[0] > 0 ? 1 : 0;
-    const presented = this.indices.length > 0 ? this.latest - this.first + 1 + stood : 0;
     return {
       method: "requestVideoFrameCallback",
-      frames_presented: presented,
+      frames_presented: this.presented,
       longest_gap_frames: Math.round(this.gap * 1000) / 1000,
-      shown_well: this.whole && presented >= this.film.frames && this.gap <= GAP_FRAMES,
+      shown_well: this.whole && this.presented === this.film.frames && this.gap <= GAP_FRAMES,
       times_ms: this.times.map((time) => Math.round(time * 100) / 100),
       frames: this.indices,
       last: this.times.at(-1) ?? endedAt,

@@ -17,7 +17,10 @@ pytestmark = pytest.mark.gl
 def walk(site, tab, keys=True):
     """A whole session; returns how its films were shown."""
     tab.open(site.address)
-    slowest = go_on(tab, keys)
+    try:
+        slowest = go_on(tab, keys)
+    except AssertionError as error:
+        raise AssertionError(f"{error}; faults that the page told: {happened(site, 'fault')}") from error
     table = answers(site)
     assert len(table) == QUESTIONS
     assert set(table["task"]) == {"same-different", "preference", "rating"}
