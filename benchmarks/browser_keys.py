@@ -101,7 +101,7 @@ def main() -> None:
     wanted = parser.parse_args()
     from serving import Site, prepared
 
-    from study.experiment.rendering import render
+    from study.experiment.stimuli.rendering import render
 
     text = PROTOCOL.format(repeats=(wanted.keys + 3) // 4)
     with tempfile.TemporaryDirectory() as name:

@@ -24,16 +24,16 @@ import pandas as pd
 from scipy.special import ndtr
 from scipy.stats import beta
 
-from study.analysis import differencing
-from study.analysis.group_models import psychometric_mixed
-from study.analysis.preference import published_test
-from study.analysis.preference_tests import participant_tests
-from study.analysis.psychometric import fit_many, fit_psychometric, make_model
-from study.analysis.psychometric_likelihood import fit_likelihood
-from study.analysis.psychometric_study import analyse_psychometric
-from study.analysis.same_different import Counts, crossings
-from study.analysis.same_different_mixed import fit_mixed_thresholds
-from study.analysis.same_different_model import fit_model
+from study.analysis.preference.analyse import published_test
+from study.analysis.preference.models import psychometric_mixed
+from study.analysis.preference.participants import participant_tests
+from study.analysis.psychometric.analyse import analyse_psychometric
+from study.analysis.psychometric.likelihood import fit_likelihood
+from study.analysis.psychometric.posterior import fit_many, fit_psychometric, make_model
+from study.analysis.same_different import fits as differencing
+from study.analysis.same_different.interpolation import Counts, crossings
+from study.analysis.same_different.mixed import fit_mixed_thresholds
+from study.analysis.same_different.model import fit_model
 
 PSYCHOMETRIC = {"first": psychometric.FIRST, "check": psychometric.CHECK, "confirm": psychometric.CONFIRM}
 SAME_DIFFERENT = {"2004": same_different.DESIGN_2004, "other": same_different.OTHER}

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import gumbel_l, logistic, norm
 
-from study.analysis import posterior_grid
-from study.analysis.psychometric import (
+from study.analysis.psychometric.likelihood import fit_likelihood
+from study.analysis.psychometric.posterior import (
     LARGEST_GUESS,
     LARGEST_LAPSE,
     even_edges,
@@ -29,7 +29,7 @@ from study.analysis.psychometric import (
     make_model,
     quantiles,
 )
-from study.analysis.psychometric_likelihood import fit_likelihood
+from study.models import posterior_grid
 
 PEERS = {"normal": norm, "logistic": logistic, "gumbel": gumbel_l, "weibull": gumbel_l}
 

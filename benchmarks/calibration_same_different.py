@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from study.analysis.same_different import Counts, crossing_of_lines, crossings
-from study.analysis.same_different_mixed import fit_mixed_thresholds
-from study.analysis.same_different_model import fit_model
+from study.analysis.same_different.interpolation import Counts, crossing_of_lines, crossings
+from study.analysis.same_different.mixed import fit_mixed_thresholds
+from study.analysis.same_different.model import fit_model
 
 SIDES = ("shorter", "longer")
 

@@ -14,11 +14,11 @@ import numpy as np
 import pandas as pd
 from scipy.special import expit, ndtr
 
-from study.analysis.group_models import preference_models, psychometric_mixed
-from study.analysis.no_effect import no_preference
-from study.analysis.preference import published_test
-from study.analysis.preference_tests import motions_as_sample, participant_tests
-from study.analysis.rating_comparisons import rating_anova
+from study.analysis.preference.analyse import published_test
+from study.analysis.preference.models import preference_models, psychometric_mixed
+from study.analysis.preference.no_effect import no_preference
+from study.analysis.preference.participants import motions_as_sample, participant_tests
+from study.analysis.ratings.comparisons import rating_anova
 
 CORRELATIONS = (0.0, 0.1, 0.2, 0.3)
 
@@ -177,9 +177,9 @@ def mixed(studies, seed):
 
 def power(studies, seed):
     """Time of `segue power` for a preference study of 35 people: simulated and analysed studies a second."""
-    from study.analysis.power import power_curve
-    from study.apps.power_command import AT_ONCE, planned, plans_of
-    from study.apps.study_commands import load
+    from study.apps.cli.power import AT_ONCE, planned, plans_of
+    from study.apps.cli.study import load
+    from study.power.curve import power_curve
 
     protocol = load("geodesic_vs_fixed")
     plans = plans_of(protocol, None, 35)

@@ -45,7 +45,7 @@ from study.transitions.one_hop.problem import (
     weight_in_counts,
 )
 from study.transitions.one_hop.table import OneHopTable
-from study.transitions.one_hop.threads import cores
+from study.transitions.threads import cores
 
 WEIGHT = 2.5e-4
 ALIGNMENTS = {"music": Alignment(offset=0), "start": Alignment(destination_frame=100)}

@@ -162,13 +162,13 @@ def measure(trials: int, full_screen: bool) -> dict[str, Any]:
     import glfw
 
     from renderer.window import open_window
-    from study.apps.play_commands import page_look
+    from study.apps.cli.play import page_look
     from study.apps.player.calm import take_precedence
     from study.apps.player.loop import play
     from study.experiment.plan import draw_plan
-    from study.experiment.protocol import parse_protocol
+    from study.experiment.protocol.whole import parse_protocol
     from study.experiment.session import open_session
-    from study.experiment.stimuli import prepare
+    from study.experiment.stimuli.prepare import prepare
     from study.motion.library import open_library
 
     protocol = parse_protocol(PROTOCOL.replace("{trials}", str(trials)))

@@ -54,7 +54,7 @@ def test_a_case_is_the_same_each_time(fuzz, tmp_path):
 
 def test_what_a_verb_may_not_do_is_found(fuzz, monkeypatch):
     """A traceback, silence, endless work, too much memory and a missing number: each is a find, and says where."""
-    from study.apps import motion_commands
+    from study.apps.cli import motions as motion_commands
 
     def ends(fault):
         def inspect(*_: object, **__: object) -> None:

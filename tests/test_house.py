@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FLOORS = ("motion", "transitions", "experiment", "analysis", "report", "apps")
+FLOORS = ("motion", "models", "transitions", "tasks", "experiment", "analysis", "power", "report", "apps")
 # Analysis takes tables, so it needs nothing of the experiment that made them.
-FORBIDDEN = {("analysis", "experiment"), ("analysis", "motion"), ("analysis", "transitions")}
+FORBIDDEN = {("analysis", room) for room in ("experiment", "tasks", "motion", "transitions")} | {("models", "motion")}
 
 
 def imported_modules(path: Path) -> set[str]:

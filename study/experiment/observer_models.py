@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import SessionError
-from study.experiment.protocol import Protocol, StudySpec
+from study.experiment.protocol.whole import Protocol, StudySpec
 
 FloatArray = NDArray[np.float64]
 

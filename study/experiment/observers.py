@@ -27,8 +27,8 @@ from study.experiment.observer_models import (
     truth,
 )
 from study.experiment.plan import Pair, Plan, Trial, draw_plan, generator
-from study.experiment.protocol import Protocol
-from study.experiment.responses import (
+from study.experiment.protocol.whole import Protocol
+from study.experiment.store.responses import (
     Responses,
     SessionRecord,
     begin_session,

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from study.errors import SessionError
-from study.experiment.protocol import Protocol, StudySpec
+from study.experiment.protocol.whole import Protocol, StudySpec
 
 PLAN_VERSION = 1
 

@@ -17,8 +17,8 @@ from typing import Literal
 from study.errors import SessionError
 from study.experiment import wording
 from study.experiment.plan import Plan, Trial, legal_answers
-from study.experiment.protocol import Protocol, StudySpec
-from study.experiment.protocol_parts import FormField
+from study.experiment.protocol.texts import FormField
+from study.experiment.protocol.whole import Protocol, StudySpec
 
 __all__ = [
     "Answer",

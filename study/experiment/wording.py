@@ -13,10 +13,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from study.experiment.languages import words
+from study.experiment.protocol.languages import words
 
 if TYPE_CHECKING:
-    from study.experiment.protocol import Protocol, StudySpec
+    from study.experiment.protocol.whole import Protocol, StudySpec
 
 _BLEND_S = 1.0
 _ANSWER_S = 2.0

@@ -56,8 +56,8 @@ def write_report(
     SegueError
         When a part of the folder is missing or can't be read.
     """
+    from study.analysis.analyse import analyse
     from study.analysis.exclusions import rules_of
-    from study.analysis.summary import analyse
     from study.report.media import embedding
     from study.report.page import compose
 

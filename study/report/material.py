@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.errors import AnalysisError
-from study.report.planning import read_power
+from study.report.power import read_power
 
 if TYPE_CHECKING:
     import pandas as pd
     import sqlalchemy as sa
 
-    from study.experiment.protocol import Protocol
-    from study.experiment.rendering import Manifest
-    from study.experiment.responses import Responses
+    from study.experiment.protocol.whole import Protocol
+    from study.experiment.stimuli.rendering import Manifest
+    from study.experiment.store.responses import Responses
 
 Result = Mapping[str, Any]
 
@@ -61,10 +61,10 @@ def gather(folder: Path, database: str | None = None) -> Material:
     SegueError
         When a part of the folder is missing or can't be read.
     """
-    from study.experiment.protocol import load_protocol
-    from study.experiment.rendering import PROTOCOL, read_manifest
-    from study.experiment.response_tables import presentations, withdrawals
-    from study.experiment.responses import answers_frame, open_answers, session_table
+    from study.experiment.protocol.whole import load_protocol
+    from study.experiment.stimuli.rendering import PROTOCOL, read_manifest
+    from study.experiment.store.responses import answers_frame, open_answers, session_table
+    from study.experiment.store.tables import presentations, withdrawals
 
     protocol, manifest = load_protocol(folder / PROTOCOL), read_manifest(folder)
     with open_answers(folder, database) as responses:
@@ -91,7 +91,7 @@ def _table(responses: Responses, table: sa.Table) -> pd.DataFrame:
     import pandas as pd
     import sqlalchemy as sa
 
-    from study.experiment.responses import rows_of
+    from study.experiment.store.responses import rows_of
 
     columns = [column for column in table.c if column.name != "detail_json"]
     rows = rows_of(responses, sa.select(*columns).order_by(*table.primary_key))

@@ -14,8 +14,8 @@ from study.report import words
 if TYPE_CHECKING:
     import pandas as pd
 
-    from study.experiment.protocol import Protocol, StudySpec
-    from study.experiment.stimuli import Manifest
+    from study.experiment.protocol.whole import Protocol, StudySpec
+    from study.experiment.stimuli.prepare import Manifest
 
 Result = Mapping[str, Any]
 

@@ -9,22 +9,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from study.counting import counted
-from study.report import (
-    conduct,
-    course,
-    figures,
-    methods,
-    pair_ratings_section,
-    planning,
-    preference_section,
-    ratings_section,
-    same_different_section,
-    shown,
-    words,
-)
+from study.report import conduct, course, figures, methods, words
+from study.report import power as planning
+from study.report import stimuli as shown
 from study.report.material import Material
 from study.report.media import Pictures
-from study.report.sections import Drawing, Headline, Section, readings_table
+from study.report.sections.pair_ratings import section as pair_ratings_section
+from study.report.sections.preference import section as preference_section
+from study.report.sections.ratings import section as ratings_section
+from study.report.sections.same_different import section as same_different_section
+from study.report.sections.section import Drawing, Headline, Section, readings_table
 from study.report.tables import Table
 
 Result = Mapping[str, Any]

@@ -26,8 +26,8 @@ from study.motion import quaternions as quat
 from study.motion.clip import Clip, retarget
 from study.transitions.blending import facing
 from study.transitions.distances import half_angle_squares, on_joints_of
-from study.transitions.one_hop.threads import cores, one_blas_thread
 from study.transitions.point_cloud import point_cloud, window_distances
+from study.transitions.threads import cores, one_blas_thread
 from study.transitions.weights import joint_weights
 
 FloatArray = NDArray[np.float64]

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.anova import Squares, two_way
-from study.analysis.effect_sizes import effect_size
-from study.analysis.rating_comparisons import anova_sentences, rating_anova
+from study.analysis.ratings.comparisons import anova_sentences, rating_anova
+from study.analysis.variance.effect_sizes import effect_size
+from study.analysis.variance.two_way import Squares, two_way
 from study.errors import AnalysisError
 
 NAMES = ("cost", "order")

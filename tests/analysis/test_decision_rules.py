@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import norm
 
-from study.analysis import differencing
-from study.analysis.decision_rules import compare_rules, fit_independent, order_test, profile_intervals
-from study.analysis.same_different import Counts, count_answers
+from study.analysis.same_different import fits as differencing
+from study.analysis.same_different.independent import compare_rules, fit_independent, order_test, profile_intervals
+from study.analysis.same_different.interpolation import Counts, count_answers
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
 

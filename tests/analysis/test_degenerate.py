@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.jnd import analyse_jnd, d_prime
-from study.analysis.psychometric import PsychometricFit, curve_of, fit_psychometric, make_model, threshold_at
-from study.analysis.psychometric_likelihood import fit_likelihood
-from study.analysis.psychometric_study import analyse_psychometric
+from study.analysis.psychometric.analyse import analyse_psychometric
+from study.analysis.psychometric.likelihood import fit_likelihood
+from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric, make_model, threshold_at
+from study.analysis.same_different.analyse import analyse_jnd, d_prime
 from study.errors import AnalysisError
 
 SIGMOIDS = ("normal", "logistic", "gumbel", "weibull")

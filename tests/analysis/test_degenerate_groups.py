@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.preference import compare, confirmatory, strengths
-from study.analysis.rating_comparisons import anova_sentences, rating_anova
-from study.analysis.ratings import rating_table
-from study.analysis.summary import analyse
+from study.analysis.analyse import analyse
+from study.analysis.preference.analyse import compare, confirmatory, strengths
+from study.analysis.ratings.comparisons import anova_sentences, rating_anova
+from study.analysis.ratings.table import rating_table
 from study.errors import AnalysisError
 
 

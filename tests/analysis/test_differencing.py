@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import norm
 
-from study.analysis import differencing
-from study.analysis.jnd import d_prime
-from study.analysis.same_different import Counts, count_answers, crossings
-from study.analysis.same_different_model import ModelFit, fit_model
+from study.analysis.same_different import fits as differencing
+from study.analysis.same_different.analyse import d_prime
+from study.analysis.same_different.interpolation import Counts, count_answers, crossings
+from study.analysis.same_different.model import ModelFit, fit_model
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
 CRITERION, LAPSE = 2.2, 0.02

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from study.analysis.estimating_equations import estimating_equations
+from study.analysis.regression.estimating_equations import estimating_equations
 from study.errors import AnalysisError
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.analysis.analyse import analyse
 from study.analysis.exclusions import Rules, exclude, rules_of
-from study.analysis.summary import analyse
 
 
 @pytest.fixture

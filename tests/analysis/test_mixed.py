@@ -11,8 +11,8 @@ from scipy.integrate import quad
 from scipy.special import expit
 from scipy.stats import norm
 
-from study.analysis.group_models import preference_models, psychometric_mixed
-from study.analysis.mixed import MixedFit, fit_mixed, marginal_share
+from study.analysis.preference.models import preference_models, psychometric_mixed
+from study.analysis.regression.mixed import MixedFit, fit_mixed, marginal_share
 from study.errors import AnalysisError
 
 

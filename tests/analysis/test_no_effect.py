@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp
 
-from study.analysis.bradley_terry import BradleyTerry, fit_bradley_terry
-from study.analysis.no_effect import bayes_factor_null, no_preference
+from study.analysis.preference.bradley_terry import BradleyTerry, fit_bradley_terry
+from study.analysis.preference.no_effect import bayes_factor_null, no_preference
 from study.errors import AnalysisError
 
 

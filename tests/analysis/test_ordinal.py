@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.special import expit
 from scipy.stats import norm
 
-from study.analysis.ordinal import OrdinalFit, fit_ordinal
+from study.analysis.regression.ordinal import OrdinalFit, fit_ordinal
 from study.errors import AnalysisError
 
 

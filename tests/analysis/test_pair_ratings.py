@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.pair_ratings import of_pairs, pair_ratings, pair_sentences
-from study.analysis.summary import analyse
+from study.analysis.analyse import analyse
+from study.analysis.ratings.pairs import of_pairs, pair_ratings, pair_sentences
 from study.errors import AnalysisError
 
 

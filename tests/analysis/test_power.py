@@ -9,8 +9,8 @@ import pytest
 from scipy.special import expit
 from scipy.stats import nct, t
 
-from study.analysis.power import logit_normal, power_curve
 from study.errors import AnalysisError
+from study.power.curve import logit_normal, power_curve
 
 
 def t_tests(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> np.ndarray:

@@ -11,8 +11,8 @@ import pytest
 from scipy import stats
 
 from study.analysis import estimates
-from study.analysis.preference import compare, confirmatory, published_test, strengths
-from study.analysis.preference_tests import default_p_values, motions_as_sample, participant_tests
+from study.analysis.preference.analyse import compare, confirmatory, published_test, strengths
+from study.analysis.preference.participants import default_p_values, motions_as_sample, participant_tests
 from study.errors import AnalysisError
 
 

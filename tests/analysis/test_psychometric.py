@@ -9,10 +9,17 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import betabinom, gumbel_l, logistic, norm
 
-from study.analysis import posterior_grid
-from study.analysis.psychometric import PsychometricFit, curve_of, fit_many, fit_psychometric, make_model, threshold_at
-from study.analysis.psychometric_likelihood import LikelihoodFit, fit_likelihood
+from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
+from study.analysis.psychometric.posterior import (
+    PsychometricFit,
+    curve_of,
+    fit_many,
+    fit_psychometric,
+    make_model,
+    threshold_at,
+)
 from study.errors import AnalysisError
+from study.models import posterior_grid
 
 LEVELS = np.arange(1.0, 8.0)
 PEERS = {"normal": norm, "logistic": logistic, "gumbel": gumbel_l}

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from study.analysis.psychometric import make_model
-from study.analysis.psychometric_study import analyse_psychometric
+from study.analysis.psychometric.analyse import analyse_psychometric
+from study.analysis.psychometric.posterior import make_model
 
 LEVELS = np.arange(1.0, 8.0)
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.repeated_measures import likeness, mixed_design
+from study.analysis.variance.repeated_measures import likeness, mixed_design
 
 
 def rows_of(values: np.ndarray, groups: list[int], names: list[str]) -> dict[str, dict[str, float]]:

@@ -8,7 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.same_different import Counts, count_answers, crossing_of_lines, crossings, percent_different
+from study.analysis.same_different.interpolation import (
+    Counts,
+    count_answers,
+    crossing_of_lines,
+    crossings,
+    percent_different,
+)
 from study.errors import AnalysisError
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])

@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from study.analysis.jnd import analyse_jnd
-from study.analysis.same_different import Counts, count_answers
-from study.analysis.same_different_mixed import MixedThresholds, fit_mixed_thresholds
-from study.analysis.same_different_model import ModelFit, fit_model
+from study.analysis.same_different.analyse import analyse_jnd
+from study.analysis.same_different.interpolation import Counts, count_answers
+from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
+from study.analysis.same_different.model import ModelFit, fit_model
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
 

@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.foreign import Columns, read_trials
-from study.analysis.foreign_answers import AnswerColumns, read_preferences, read_ratings
-from study.analysis.psychometric import make_model
-from study.analysis.psychometric_study import analyse_psychometric
-from study.analysis.summary import analyse
+from study.analysis.analyse import analyse
+from study.analysis.foreign.answers import AnswerColumns, read_preferences, read_ratings
+from study.analysis.foreign.trials import Columns, read_trials
+from study.analysis.psychometric.analyse import analyse_psychometric
+from study.analysis.psychometric.posterior import make_model
 from study.errors import AnalysisError
 
 TABLES = int(os.environ.get("SEGUE_TABLES", "300"))

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.jnd import across_motions
+from study.analysis.analyse import analyse, kind_of_data
 from study.analysis.quality import quality
-from study.analysis.summary import analyse, kind_of_data
+from study.analysis.same_different.analyse import across_motions
 from study.errors import AnalysisError
 
 Simulate = Callable[..., pd.DataFrame]

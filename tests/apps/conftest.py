@@ -26,7 +26,7 @@ def stimuli(tmp_path_factory):
 @pytest.fixture
 def responses(tmp_path):
     """An empty database."""
-    from study.experiment.responses import open_responses
+    from study.experiment.store.responses import open_responses
 
     with open_responses(tmp_path) as opened:
         yield opened

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from study.experiment.protocol_parts import Consent, Texts
+from study.experiment.protocol.texts import Consent, Texts
 
 
 def _word(name: str, default: str) -> str:

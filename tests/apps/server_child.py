@@ -9,7 +9,7 @@ from serving import make_host, served_manifest
 
 from study.apps.server.running import listen, serve
 from study.apps.server.web import make_app
-from study.experiment.responses import open_responses
+from study.experiment.store.responses import open_responses
 
 if __name__ == "__main__":
     folder, port = Path(sys.argv[1]), int(sys.argv[2])

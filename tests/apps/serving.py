@@ -19,10 +19,10 @@ from study.apps.server.hosting import Host
 from study.apps.server.running import configuration
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
-from study.experiment.protocol import Protocol, parse_protocol
-from study.experiment.rendering import Manifest, read_manifest, record
-from study.experiment.responses import Responses, open_responses
-from study.experiment.stimuli import prepare
+from study.experiment.protocol.whole import Protocol, parse_protocol
+from study.experiment.stimuli.prepare import prepare
+from study.experiment.stimuli.rendering import Manifest, read_manifest, record
+from study.experiment.store.responses import Responses, open_responses
 from study.motion.library import open_library
 
 TOKEN = "token-of-the-researcher-4711"

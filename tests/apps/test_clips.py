@@ -140,7 +140,7 @@ def test_inspect_reads_a_file_as_its_library_toml_says(capsys: pytest.CaptureFix
 
 
 def test_beats_of_a_library_toml_are_kept_to(folder: Path) -> None:
-    from study.apps.one_hop_commands import known_beats, load_clips
+    from study.apps.cli.one_hop import known_beats, load_clips
 
     (folder / "library.toml").write_text('[clips.gallop]\nfile = "gallop.bvh"\nbeats = [0.0, 1.0, 2.0, 9.0]\n')
     names = ("walk", "gallop")

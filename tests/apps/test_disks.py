@@ -17,8 +17,8 @@ import pytest
 from serving import PROTOCOL, unfilmed
 
 from study.apps.cli import VERBS, run
-from study.experiment.databases import try_to_write
-from study.experiment.responses import open_responses
+from study.experiment.store.databases import try_to_write
+from study.experiment.store.responses import open_responses
 from study.files import write_whole
 
 ROOT = Path(__file__).parents[2]

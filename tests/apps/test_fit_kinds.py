@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study.analysis.foreign import Columns, Trials, read_trials
-from study.analysis.foreign_words import BLANK, FIRST, NO, SECOND, YES
-from study.apps.fit_command import read_table
+from study.analysis.foreign.trials import Columns, Trials, read_trials
+from study.analysis.foreign.words import BLANK, FIRST, NO, SECOND, YES
+from study.apps.cli.fit import read_table
 
 Fitted = Callable[..., dict[str, Any]]
 Refused = Callable[..., str]

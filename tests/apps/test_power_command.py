@@ -13,17 +13,17 @@ import pytest
 from scipy.stats import binom, nct, t
 
 from study.analysis.exclusions import Rules
-from study.apps import power_studies
 from study.apps.cli import run
-from study.apps.power_command import (
+from study.apps.cli.power import (
     _pair_rating_verdict,
     _preference_verdict,
     _rating_verdict,
     _threshold_verdict,
     plans_of,
 )
-from study.apps.power_studies import Design
-from study.apps.study_commands import load
+from study.apps.cli.study import load
+from study.power import design as power_studies
+from study.power.design import Design
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from serving import PROTOCOL, Person, make_host, protocol_of, unfilmed
 from starlette.testclient import TestClient
 
 from renderer.events import Key, Typed
-from study.apps.play_commands import the_plan
+from study.apps.cli.play import the_plan
 from study.apps.player import loop
 from study.apps.player.lettering import default_font
 from study.apps.player.loop import play
@@ -28,12 +28,12 @@ from study.apps.player.store import ResponsesStore
 from study.apps.server.web import make_app
 from study.experiment.observers import simulate
 from study.experiment.plan import Plan, draw_plan, trial_table
-from study.experiment.protocol import Protocol
-from study.experiment.rendering import Manifest
-from study.experiment.response_tables import presentations, sessions
-from study.experiment.responses import ANSWER_COLUMNS, Responses, answers_frame, find_session, open_responses
+from study.experiment.protocol.whole import Protocol
 from study.experiment.session import advanced, answer_keys, answered, current, filled, open_session
-from study.experiment.stimuli import prepare
+from study.experiment.stimuli.prepare import prepare
+from study.experiment.stimuli.rendering import Manifest
+from study.experiment.store.responses import ANSWER_COLUMNS, Responses, answers_frame, find_session, open_responses
+from study.experiment.store.tables import presentations, sessions
 from study.motion.library import open_library
 
 PEOPLE = ("sim-001", "sim-002")

@@ -17,7 +17,7 @@ from serving import PROTOCOL, TOKEN, unfilmed
 from study.apps.cli import run
 from study.apps.server.running import listen
 from study.errors import SessionError
-from study.experiment.responses import find_session, open_responses
+from study.experiment.store.responses import find_session, open_responses
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,7 +27,7 @@ import sys
 from pathlib import Path
 from study.apps.server.running import run
 from study.apps.server.settings import Settings
-from study.experiment.protocol import load_protocol
+from study.experiment.protocol.whole import load_protocol
 folder = Path(sys.argv[1])
 protocol = load_protocol(folder / "protocol.toml")
 try:

@@ -10,8 +10,8 @@ from serving import PROTOCOL, QUESTIONS, answer_to, protocol_of
 from study.apps.server import views
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.response_tables import events, presentations
-from study.experiment.responses import answers_frame, open_responses, session_table, stored_form
+from study.experiment.store.responses import answers_frame, open_responses, session_table, stored_form
+from study.experiment.store.tables import events, presentations
 
 
 def happenings(responses, kind):

@@ -14,8 +14,8 @@ from serving import answer_to
 
 from study.apps.server import hosting, web
 from study.apps.server.hosting import MOST_EVENTS
-from study.experiment import participants as people
-from study.experiment.response_tables import events
+from study.experiment.store import participants as people
+from study.experiment.store.tables import events
 
 
 def count(responses, *kinds):

@@ -12,8 +12,8 @@ import pytest
 import sqlalchemy as sa
 
 from study.apps.server.links import filled_in
-from study.experiment.response_tables import events
-from study.experiment.responses import session_table
+from study.experiment.store.responses import session_table
+from study.experiment.store.tables import events
 
 SLOTS = [
     "{{%PROLIFIC_PID%}}", "%PROLIFIC_PID%", "{PROLIFIC_PID}", "{{PROLIFIC_PID}}", "${PROLIFIC_PID}",

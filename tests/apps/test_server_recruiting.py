@@ -12,8 +12,8 @@ from serving import QUESTIONS, TOKEN, Person, answer_to, make_host
 from starlette.testclient import TestClient
 
 from study.apps.server.web import make_app
-from study.experiment.response_tables import withdrawals
-from study.experiment.responses import answers_frame, open_responses, session_table
+from study.experiment.store.responses import answers_frame, open_responses, session_table
+from study.experiment.store.tables import withdrawals
 
 
 @pytest.fixture

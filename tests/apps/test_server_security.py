@@ -18,8 +18,8 @@ from study.apps.server.running import configuration
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
-from study.experiment.response_tables import events
-from study.experiment.responses import answers_frame, stored_form
+from study.experiment.store.responses import answers_frame, stored_form
+from study.experiment.store.tables import events
 
 
 @pytest.fixture

@@ -17,8 +17,8 @@ SEGUE = [sys.executable, "-m", "study.apps.cli"]
 
 PRINTS = """
 import sys
-from study.apps.console import emit, say
-from study.apps.streams import print_in_any_encoding
+from study.apps.cli.console import emit, say
+from study.apps.cli.streams import print_in_any_encoding
 print_in_any_encoding()
 emit({}, False, "k \N{MINUS SIGN} 7.7 \N{PLUS-MINUS SIGN} 1, \N{LEFT DOUBLE QUOTATION MARK}l\xe4uft\N{RIGHT DOUBLE QUOTATION MARK} \u6b69 \\udcff")
 say("\N{RIGHTWARDS ARROW} \u6b69")
@@ -73,7 +73,7 @@ def test_output_onto_a_full_disk_is_refused_and_messages_are_not_missed() -> Non
 
 
 def test_what_the_system_refuses_is_no_fault_of_ours(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
-    from study.apps import study_commands
+    from study.apps.cli import study as study_commands
 
     def fails(_: str) -> None:
         raise PermissionError(13, "Permission denied", "/there/walk.bvh")

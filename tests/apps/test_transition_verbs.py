@@ -52,7 +52,7 @@ def test_cost_matrix_is_drawn_dark_where_it_is_cheap(capsys: pytest.CaptureFixtu
 
 
 def test_a_large_matrix_keeps_its_least_cost_in_the_picture() -> None:
-    from study.report.transition_figures import Reducer
+    from study.report.costs import Reducer
 
     costs = np.random.default_rng(0).uniform(1.0, 2.0, (700, 430)).astype(np.float32)
     costs[611, 17] = 0.5

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study.experiment.protocol import Protocol, parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 
 # Tests are imported by path, without packages: this makes `toys` importable, here and in the processes they start.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -44,7 +44,7 @@ def toy_stimuli(toy_protocol: Protocol) -> FakeStimuli:
 
 @pytest.fixture
 def jnd_protocol() -> Protocol:
-    from study.experiment.protocol import find_protocol, load_protocol
+    from study.experiment.protocol.whole import find_protocol, load_protocol
 
     return load_protocol(find_protocol("blend_length_jnd"))
 

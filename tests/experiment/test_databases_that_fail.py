@@ -9,11 +9,18 @@ import pytest
 import sqlalchemy as sa
 
 from study.errors import SegueError, SessionError
-from study.experiment import databases
-from study.experiment.databases import may_pass, patiently, try_to_write
 from study.experiment.observers import simulate
-from study.experiment.response_tables import metadata
-from study.experiment.responses import all_sessions, answers_frame, open_answers, open_responses, rows_of, session_table
+from study.experiment.store import databases
+from study.experiment.store.databases import may_pass, patiently, try_to_write
+from study.experiment.store.responses import (
+    all_sessions,
+    answers_frame,
+    open_answers,
+    open_responses,
+    rows_of,
+    session_table,
+)
+from study.experiment.store.tables import metadata
 
 
 @pytest.fixture
@@ -130,7 +137,7 @@ def test_a_place_that_can_not_be_written_to_is_read_from_a_copy(folder, tmp_path
         if where == str(place / "responses.sqlite"):
             raise failed(sqlite3.SQLITE_READONLY)
 
-    monkeypatch.setattr("study.experiment.responses.refuse_damaged", refuses)
+    monkeypatch.setattr("study.experiment.store.responses.refuse_damaged", refuses)
     parts = {part.name: part.read_bytes() for part in place.iterdir() if not part.name.endswith("-shm")}
     with open_answers(place) as responses:
         assert responses.place == str(place / "responses.sqlite")

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from study.errors import SessionError
-from study.experiment.export import export, label, labels
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.responses import (
+from study.experiment.session import Answer
+from study.experiment.store.export import export, label, labels
+from study.experiment.store.responses import (
     Presentation,
     begin_session,
     export_csv,
@@ -21,7 +22,6 @@ from study.experiment.responses import (
     record_answer,
     record_form,
 )
-from study.experiment.session import Answer
 
 
 @pytest.fixture

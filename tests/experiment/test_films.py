@@ -8,11 +8,11 @@ import pytest
 from toys import ToyLibrary
 
 from study.errors import StimulusError
-from study.experiment.films import alike
-from study.experiment.one_hop_stimuli import Hops
-from study.experiment.points import settle
-from study.experiment.protocol import Protocol, find_protocol, load_protocol, parse_protocol
-from study.experiment.stimuli import check, prepare
+from study.experiment.protocol.whole import Protocol, find_protocol, load_protocol, parse_protocol
+from study.experiment.stimuli.films import alike
+from study.experiment.stimuli.hops import Hops
+from study.experiment.stimuli.points import settle
+from study.experiment.stimuli.prepare import check, prepare
 from study.motion.library import open_library
 
 TEXT = """

@@ -23,9 +23,9 @@ from study.experiment.observer_models import (
     truth,
 )
 from study.experiment.observers import ObserverSettings, default_observer, person, simulate
-from study.experiment.protocol import parse_protocol
-from study.experiment.responses import all_sessions, answers_frame, has_event, open_responses
+from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import advanced, answered, current, missed, open_session
+from study.experiment.store.responses import all_sessions, answers_frame, has_event, open_responses
 
 
 def alike(settings: ObserverSettings) -> ObserverSettings:
@@ -82,7 +82,7 @@ def test_the_default_observer_has_the_threshold_of_the_paper(jnd_protocol):
 
 def test_the_default_preferences_are_those_of_table_2():
     """2004 Table 2: 96.4% for the geodesic method, 65.7% for the velocity method."""
-    from study.experiment.protocol import find_protocol, load_protocol
+    from study.experiment.protocol.whole import find_protocol, load_protocol
 
     for name, percent in (("geodesic_vs_fixed", 96.4), ("velocity_vs_fixed", 65.7)):
         study = load_protocol(find_protocol(name)).studies[0]
@@ -186,8 +186,8 @@ import sys
 sys.path.insert(0, "tests/experiment")
 import toys as c
 from study.experiment.observers import simulate
-from study.experiment.protocol import find_protocol, load_protocol
-from study.experiment.responses import open_responses
+from study.experiment.protocol.whole import find_protocol, load_protocol
+from study.experiment.store.responses import open_responses
 protocol = load_protocol(find_protocol("blend_length_jnd"))
 say = lambda done, total: print(done, flush=True)
 simulate(protocol, c.FakeStimuli(c.pairs_of(protocol)), open_responses(sys.argv[1]), 4, 9, say)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from toys import TOY_PROTOCOL, ToyLibrary
 
-from study.experiment.outlook import look_ahead
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import Protocol, parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import open_session
-from study.experiment.stimuli import prepare
+from study.experiment.stimuli.outlook import look_ahead
+from study.experiment.stimuli.prepare import prepare
 
 
 @pytest.fixture

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from study.experiment import participants as people
 from study.experiment.plan import draw_plan
-from study.experiment.response_tables import answers, metadata, presentations, sessions, withdrawals
-from study.experiment.responses import (
+from study.experiment.session import Answer
+from study.experiment.store import participants as people
+from study.experiment.store.responses import (
     Presentation,
     begin_session,
     open_responses,
@@ -24,7 +24,7 @@ from study.experiment.responses import (
     stored_answers,
     stored_form,
 )
-from study.experiment.session import Answer
+from study.experiment.store.tables import answers, metadata, presentations, sessions, withdrawals
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 

@@ -10,7 +10,7 @@ import pytest
 
 from study.errors import SessionError
 from study.experiment.plan import TRIAL_COLUMNS, draw_plan, groups_of, plan_from_json, trial_table
-from study.experiment.protocol import parse_protocol
+from study.experiment.protocol.whole import parse_protocol
 
 
 def real(plan):
@@ -64,7 +64,7 @@ def test_another_process_draws_the_same_plan(jnd_protocol, make_stimuli, reposit
         "import sys; sys.path.insert(0, 'tests/experiment');"
         "import toys as c;"
         "from study.experiment.plan import draw_plan;"
-        "from study.experiment.protocol import find_protocol, load_protocol;"
+        "from study.experiment.protocol.whole import find_protocol, load_protocol;"
         "p = load_protocol(find_protocol('blend_length_jnd'));"
         "print(draw_plan(p, c.pairs_of(p), 'p07').to_json())"
     )

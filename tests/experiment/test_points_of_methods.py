@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from study.errors import ProtocolError, StimulusError
-from study.experiment.protocol import parse_protocol
-from study.experiment.stimuli import check, prepare
+from study.experiment.protocol.whole import parse_protocol
+from study.experiment.stimuli.prepare import check, prepare
 from study.transitions.timewarp import warp_length
 
 HEAD = """

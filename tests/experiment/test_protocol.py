@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import ProtocolError
-from study.experiment.protocol import find_protocol, load_protocol, parse_protocol, protocols_folder
+from study.experiment.protocol.whole import find_protocol, load_protocol, parse_protocol, protocols_folder
 
 GOOD = Path(__file__).parents[2].joinpath("protocols", "demo.toml").read_text()
 
@@ -214,19 +214,19 @@ def test_files_that_are_no_text_are_refused(tmp_path):
 
 
 def test_every_key_is_described_and_stands_in_the_documentation(repository):
-    from study.experiment.protocol_keys import key_tables
+    from study.experiment.protocol.keys import key_tables
 
     document = (repository / "docs" / "protocols.md").read_text()
-    assert key_tables() in document, "run `python -m study.experiment.protocol_keys` and paste its tables"
+    assert key_tables() in document, "run `python -m study.experiment.protocol.keys` and paste its tables"
 
 
 def test_an_installed_package_carries_its_protocols(tmp_path, monkeypatch):
     """The wheel has them in `study/protocols`; the repository beside `study`."""
-    from study.experiment import protocol
+    import study
 
     package = tmp_path / "study"
-    (package / "experiment").mkdir(parents=True)
-    monkeypatch.setattr(protocol, "__file__", str(package / "experiment" / "protocol.py"))
+    package.mkdir()
+    monkeypatch.setattr(study, "__file__", str(package / "__init__.py"))
     with pytest.raises(ProtocolError, match="Expected the protocols that come with Segue in"):
         protocols_folder()
     (package / "protocols").mkdir()
@@ -236,8 +236,8 @@ def test_an_installed_package_carries_its_protocols(tmp_path, monkeypatch):
 
 def test_the_study_in_the_documentation_can_be_run(repository):
     """The walk-through's protocol: sound, nothing left to write, and all of it can be shown."""
-    from study.experiment.proofreading import to_do
-    from study.experiment.stimuli import check
+    from study.experiment.protocol.proofreading import to_do
+    from study.experiment.stimuli.prepare import check
     from study.motion.library import open_library
 
     document = (repository / "docs" / "protocols.md").read_text(encoding="utf-8")

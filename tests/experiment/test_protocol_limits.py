@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from study.errors import ProtocolError
-from study.experiment.proofreading import to_do
-from study.experiment.protocol import Protocol, load_protocol, parse_protocol
+from study.experiment.protocol.proofreading import to_do
+from study.experiment.protocol.whole import Protocol, load_protocol, parse_protocol
 from study.experiment.wording import all_texts
 
 GOOD = Path(__file__).parents[2].joinpath("protocols", "demo.toml").read_text()

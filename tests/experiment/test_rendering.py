@@ -17,9 +17,9 @@ import pytest
 from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
 from study.errors import FileError, StimulusError
-from study.experiment import rendering
-from study.experiment.protocol import load_protocol, parse_protocol
-from study.experiment.rendering import (
+from study.experiment.protocol.whole import load_protocol, parse_protocol
+from study.experiment.stimuli.prepare import prepare, rendering
+from study.experiment.stimuli.rendering import (
     made_from,
     read_manifest,
     record,
@@ -27,7 +27,6 @@ from study.experiment.rendering import (
     rendered_already,
     rendered_before,
 )
-from study.experiment.stimuli import prepare
 
 MOTIONS = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
 
@@ -193,8 +192,8 @@ KILLED = """
 import sys
 sys.path.insert(0, "tests/experiment")
 from toys import TOY_PROTOCOL, Toy, ToyLibrary
-from study.experiment.protocol import parse_protocol
-from study.experiment.stimuli import prepare, render
+from study.experiment.protocol.whole import parse_protocol
+from study.experiment.stimuli.prepare import prepare, render
 motions = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
 prepared = prepare(parse_protocol(TOY_PROTOCOL), ToyLibrary(motions))
 print("ready", flush=True)
@@ -285,6 +284,14 @@ def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path):
     assert done == replace(rendered[1], rendered=0, reused=rendered[1].videos)
     assert rendered_already(parse_protocol(TOY_PROTOCOL + "\n# changed\n"), library, folder) is None
     assert rendered_already(protocol, library, tmp_path / "elsewhere") is None
+
+
+def test_the_program_is_found_wherever_its_modules_stand():
+    import renderer.window
+    import study.motion.clip
+
+    found = set(rendering.program_files())
+    assert {Path(module.__file__).resolve() for module in (rendering, renderer.window, study.motion.clip)} <= found
 
 
 def test_what_python_compiles_meanwhile_changes_nothing():

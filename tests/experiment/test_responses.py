@@ -10,11 +10,12 @@ import pytest
 import sqlalchemy as sa
 
 from study.errors import SessionError
-from study.experiment import participants as people
-from study.experiment import response_tables
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import parse_protocol
-from study.experiment.responses import (
+from study.experiment.protocol.whole import parse_protocol
+from study.experiment.session import Answer
+from study.experiment.store import participants as people
+from study.experiment.store import tables as response_tables
+from study.experiment.store.responses import (
     ANSWER_COLUMNS,
     Presentation,
     all_sessions,
@@ -31,7 +32,6 @@ from study.experiment.responses import (
     stored_answers,
     stored_form,
 )
-from study.experiment.session import Answer
 
 
 @pytest.fixture

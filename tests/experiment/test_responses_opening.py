@@ -12,12 +12,13 @@ import sqlalchemy as sa
 from postgres_server import PASSWORD, ROLE, without_password
 
 from study.errors import SessionError
-from study.experiment import databases, response_tables
-from study.experiment import participants as people
 from study.experiment.plan import draw_plan
-from study.experiment.response_migrations import MIGRATIONS
-from study.experiment.responses import begin_session, find_session, open_responses, record_answer, stored_answers
 from study.experiment.session import Answer
+from study.experiment.store import databases
+from study.experiment.store import participants as people
+from study.experiment.store import tables as response_tables
+from study.experiment.store.migrations import MIGRATIONS
+from study.experiment.store.responses import begin_session, find_session, open_responses, record_answer, stored_answers
 
 ANSWER = Answer(1, "", 1, "same", 1.0)
 

@@ -17,21 +17,21 @@ import pytest
 import sqlalchemy as sa
 
 from study.errors import SessionError
-from study.experiment import participants as people
-from study.experiment import response_tables
-from study.experiment.databases import alone, patiently
 from study.experiment.plan import draw_plan
-from study.experiment.response_migrations import MIGRATIONS
-from study.experiment.responses import answers_frame, begin_session, open_responses, record_answer, stored_answers
 from study.experiment.session import Answer
+from study.experiment.store import participants as people
+from study.experiment.store import tables as response_tables
+from study.experiment.store.databases import alone, patiently
+from study.experiment.store.migrations import MIGRATIONS
+from study.experiment.store.responses import answers_frame, begin_session, open_responses, record_answer, stored_answers
 
 WRITER = """
 import itertools, sys
 sys.path.insert(0, "tests/experiment")
 import toys as c
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import parse_protocol
-from study.experiment.responses import begin_session, open_responses, record_answer, stored_answers
+from study.experiment.protocol.whole import parse_protocol
+from study.experiment.store.responses import begin_session, open_responses, record_answer, stored_answers
 from study.experiment.session import Answer
 protocol = parse_protocol(c.TOY_PROTOCOL)
 pairs = c.pairs_of(protocol)
@@ -82,8 +82,8 @@ sys.path.insert(0, "tests/experiment")
 import toys as c
 from study.experiment import participants as people
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import parse_protocol
-from study.experiment.responses import open_responses, record_answer, session_by_id
+from study.experiment.protocol.whole import parse_protocol
+from study.experiment.store.responses import open_responses, record_answer, session_by_id
 from study.experiment.session import Answer
 database, program, newcomers, groups, cap = sys.argv[1], *map(int, sys.argv[2:])
 protocol = parse_protocol(c.TOY_PROTOCOL)

@@ -6,7 +6,7 @@ import pytest
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import parse_protocol
+from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import (
     advanced,
     answer_keys,

@@ -13,7 +13,7 @@ from toys import TOY_PROTOCOL, TOY_RATING
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import parse_protocol
+from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import (
     Answer,
     Session,

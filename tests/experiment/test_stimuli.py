@@ -11,8 +11,8 @@ from toys import TOY_PROTOCOL, Toy, ToyLibrary
 from renderer.camera import project
 from study.errors import StimulusError
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import parse_protocol
-from study.experiment.stimuli import check, prepare
+from study.experiment.protocol.whole import parse_protocol
+from study.experiment.stimuli.prepare import check, prepare
 from study.transitions.blend_length import blend_length
 
 

@@ -8,11 +8,11 @@ import tomllib
 import pytest
 
 from study.errors import ProtocolError
-from study.experiment.languages import built_in_questions, has_words, languages, words
 from study.experiment.plan import draw_plan
-from study.experiment.proofreading import to_do
-from study.experiment.protocol import parse_protocol
-from study.experiment.protocol_parts import Consent, Texts
+from study.experiment.protocol.languages import built_in_questions, has_words, languages, words
+from study.experiment.protocol.proofreading import to_do
+from study.experiment.protocol.texts import Consent, Texts
+from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import current, open_session
 from study.experiment.wording import FilmTimes, all_texts, duration_s, instructions_text, minutes, welcome_text
 
@@ -263,7 +263,7 @@ def test_the_number_of_trials_is_that_of_the_plan(toy_protocol, rating_protocol,
 
 
 def test_the_language_files_are_toml_that_a_person_can_read(repository):
-    for path in (repository / "study" / "experiment" / "words").glob("*.toml"):
+    for path in (repository / "study" / "experiment" / "protocol" / "words").glob("*.toml"):
         text = path.read_text(encoding="utf-8")
         assert tomllib.loads(text) == words(path.stem)
         assert text.startswith("#")

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.errors import MotionError
 from study.experiment.plan import Pair
-from study.experiment.protocol import Protocol
+from study.experiment.protocol.whole import Protocol
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.library import Entry, Library

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from study.analysis.bradley_terry import BradleyTerry, fit_bradley_terry
+from study.analysis.preference.bradley_terry import BradleyTerry, fit_bradley_terry
 
 TEAMS = ("Milwaukee", "Detroit", "Toronto", "New York", "Boston", "Cleveland", "Baltimore")
 # Wins and losses of the home team (row) against the visitors (column).

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from study.analysis.mixed import MixedFit, fit_mixed
+from study.analysis.regression.mixed import MixedFit, fit_mixed
 
 # Cases of animals in each of a herd's periods; herd 8 was seen in the first alone.
 HERDS = (

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from study.analysis.anova import two_way
-from study.analysis.ordinal import OrdinalFit, fit_ordinal
-from study.analysis.repeated_measures import mixed_design
+from study.analysis.regression.ordinal import OrdinalFit, fit_ordinal
+from study.analysis.variance.repeated_measures import mixed_design
+from study.analysis.variance.two_way import two_way
 
 # Crampton 1947, length of teeth by delivery of vitamin C and dose: `ToothGrowth` in R, ten animals a cell.
 TEETH = {

@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 from scipy.stats import gamma
 
-from study.analysis.psychometric import PsychometricFit, fit_psychometric, make_model, threshold_at
+from study.analysis.psychometric.posterior import PsychometricFit, fit_psychometric, make_model, threshold_at
 
 # Quanta, percent seen, number of flashes at each, quanta of the Poisson curve.
 SEEN = {

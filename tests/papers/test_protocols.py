@@ -9,10 +9,10 @@ import pytest
 from study.experiment.observer_models import default_observer, truth
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.proofreading import to_do
-from study.experiment.protocol import find_protocol, load_protocol, protocols_folder
-from study.experiment.responses import answers_frame, open_responses
-from study.experiment.stimuli import check, prepare
+from study.experiment.protocol.proofreading import to_do
+from study.experiment.protocol.whole import find_protocol, load_protocol, protocols_folder
+from study.experiment.stimuli.prepare import check, prepare
+from study.experiment.store.responses import answers_frame, open_responses
 from study.experiment.wording import all_texts
 from study.motion.library import open_library
 

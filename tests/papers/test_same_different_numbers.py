@@ -19,8 +19,8 @@ import pytest
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from study.analysis import differencing
-from study.analysis.jnd import d_prime
+from study.analysis.same_different import fits as differencing
+from study.analysis.same_different.analyse import d_prime
 
 FRAMES = np.array([[0.0], [1.0]])
 

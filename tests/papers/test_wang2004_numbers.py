@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from study.analysis.preference import compare, published_test
+from study.analysis.preference.analyse import compare, published_test
 
 
 @pytest.mark.parametrize(

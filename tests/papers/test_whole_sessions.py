@@ -8,12 +8,12 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from study.analysis.summary import analyse
+from study.analysis.analyse import analyse
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import find_protocol, load_protocol
-from study.experiment.responses import answers_frame, open_responses
-from study.experiment.stimuli import check, prepare
+from study.experiment.protocol.whole import find_protocol, load_protocol
+from study.experiment.stimuli.prepare import check, prepare
+from study.experiment.store.responses import answers_frame, open_responses
 from study.motion.library import open_library
 from study.transitions.candidates import frame_costs
 

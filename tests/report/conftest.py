@@ -16,10 +16,10 @@ import pytest
 
 from study.experiment.observers import simulate
 from study.experiment.plan import Pair
-from study.experiment.protocol import Protocol, load_protocol
-from study.experiment.rendering import read_manifest
-from study.experiment.responses import open_responses
-from study.experiment.stimulus_set import MotionUse, StimulusRecord
+from study.experiment.protocol.whole import Protocol, load_protocol
+from study.experiment.stimuli.rendering import read_manifest
+from study.experiment.stimuli.stimulus import MotionUse, StimulusRecord
+from study.experiment.store.responses import open_responses
 
 sys.path.insert(0, str(Path(__file__).parent))  # tests are imported by path, without packages
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from study.experiment import session as sitting
 from study.experiment.plan import Trial, draw_plan
-from study.experiment.protocol import load_protocol
-from study.experiment.rendering import PROTOCOL, read_manifest
-from study.experiment.responses import Presentation, begin_session, open_responses, record_answer, record_event
+from study.experiment.protocol.whole import load_protocol
+from study.experiment.stimuli.rendering import PROTOCOL, read_manifest
+from study.experiment.store.responses import Presentation, begin_session, open_responses, record_answer, record_event
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import pytest
 from sitting import Behaviour, attentive, missing, perfect, sit, stubborn, stuttering
 
 from study.errors import AnalysisError
-from study.experiment.participants import erase
-from study.experiment.responses import open_responses
+from study.experiment.store.participants import erase
+from study.experiment.store.responses import open_responses
 from study.report.document import write_report
 
 MakeFolder = Callable[..., Path]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from study.analysis.summary import analyse
+from study.analysis.analyse import analyse
 from study.report.material import Material, gather
 from study.report.methods import methods_paragraphs, references
 

@@ -11,11 +11,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from study.analysis.pair_ratings import pair_ratings
+from study.analysis.ratings.pairs import pair_ratings
 from study.report.document import write_report
-from study.report.likert_figure import likert_figure, shades
-from study.report.pair_ratings_section import pair_ratings_section
-from study.report.sections import Section
+from study.report.sections.pair_ratings.figure import likert_figure, shades
+from study.report.sections.pair_ratings.section import pair_ratings_section
+from study.report.sections.section import Section
 
 ENDS = {"better": ("much worse", "much better"), "natural": ("much less natural", "much more natural")}
 

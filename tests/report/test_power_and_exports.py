@@ -13,7 +13,7 @@ import pytest
 from study.apps.cli import run
 from study.errors import AnalysisError
 from study.report.document import write_report
-from study.report.planning import read_power
+from study.report.power import read_power
 
 MakeFolder = Callable[..., Path]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from study.analysis.preference import compare, strengths
-from study.report.preference_section import preference_section
-from study.report.sections import Section
+from study.analysis.preference.analyse import compare, strengths
+from study.report.sections.preference.section import preference_section
+from study.report.sections.section import Section
 
 
 def section_of(rows: list[tuple[str, str, str, str, bool, float]]) -> Section:

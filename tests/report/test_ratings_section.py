@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study.analysis.rating_comparisons import rating_anova
-from study.analysis.ratings import rating_table
-from study.report.ratings_section import ratings_section
-from study.report.sections import Section
+from study.analysis.ratings.comparisons import rating_anova
+from study.analysis.ratings.table import rating_table
+from study.report.sections.ratings.section import ratings_section
+from study.report.sections.section import Section
 
 
 def question(item: str, mean: float, f: float, p: float) -> dict[str, Any]:

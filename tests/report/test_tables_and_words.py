@@ -10,7 +10,7 @@ import pytest
 
 from study.report import words
 from study.report.media import _moments, strip_of_video
-from study.report.same_different_section import headline
+from study.report.sections.same_different.section import headline
 from study.report.tables import as_csv, as_json, make, p_value, written
 
 

@@ -18,7 +18,7 @@ from study.apps.player.showing import Showing
 from study.apps.player.store import Store
 from study.errors import SessionError
 from study.experiment import session as sitting
-from study.experiment.protocol_parts import FormField
+from study.experiment.protocol.texts import FormField
 
 _KEPT_PAGES = 6
 

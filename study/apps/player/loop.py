@@ -24,8 +24,8 @@ from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, find_rate, frame_at
 from study.apps.player.store import Store
 from study.experiment import session as sitting
-from study.experiment.responses import Presentation
-from study.experiment.stimulus_set import Stimulus
+from study.experiment.stimuli.stimulus import Stimulus
+from study.experiment.store.responses import Presentation
 
 
 @dataclass(frozen=True)

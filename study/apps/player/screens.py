@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from study.apps.player.pages import Button, Page
-from study.experiment.protocol import Protocol
-from study.experiment.protocol_parts import FormField
+from study.experiment.protocol.texts import FormField
+from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Step, answer_keys, answer_words
 
 

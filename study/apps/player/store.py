@@ -11,10 +11,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from typing import Protocol as Shape
 
-from study.experiment.databases import patiently
 from study.experiment.plan import Plan
-from study.experiment.protocol import Protocol
-from study.experiment.responses import (
+from study.experiment.protocol.whole import Protocol
+from study.experiment.session import Answer
+from study.experiment.store.databases import patiently
+from study.experiment.store.responses import (
     Presentation,
     Responses,
     SessionRecord,
@@ -26,7 +27,6 @@ from study.experiment.responses import (
     record_form,
     stored_answers,
 )
-from study.experiment.session import Answer
 
 
 class Store(Shape):

@@ -27,14 +27,15 @@ from study.apps.server.messages import Answered, Begin, Done, Happened, Shown
 from study.apps.server.settings import Settings
 from study.apps.server.writer import Writer
 from study.errors import SessionError
-from study.experiment import participants as people
 from study.experiment import session as flow
-from study.experiment.databases import AWAY, in_words
-from study.experiment.participants import Participant
 from study.experiment.plan import draw_plan, groups_of
-from study.experiment.protocol import Protocol
-from study.experiment.rendering import Manifest
-from study.experiment.responses import (
+from study.experiment.protocol.whole import Protocol
+from study.experiment.session import Answer, Session, Step
+from study.experiment.stimuli.rendering import Manifest
+from study.experiment.store import participants as people
+from study.experiment.store.databases import AWAY, in_words
+from study.experiment.store.participants import Participant
+from study.experiment.store.responses import (
     Presentation,
     Responses,
     SessionRecord,
@@ -45,7 +46,6 @@ from study.experiment.responses import (
     session_by_id,
     stored_answers,
 )
-from study.experiment.session import Answer, Session, Step
 
 TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""

@@ -22,7 +22,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from study.apps.server.hosting import Host, Sitting
 from study.apps.server.messages import LONGEST_PAGE, SHORTEST_PAGE, Answered, Begin, Done, Happened, Withdrawal, read
 from study.errors import SegueError
-from study.experiment.databases import AWAY
+from study.experiment.store.databases import AWAY
 
 COOKIE_SECONDS = 14 * 24 * 3600
 

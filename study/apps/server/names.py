@@ -19,7 +19,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from study.apps.server.limits import HEADERS
 from study.errors import SessionError
-from study.experiment.protocol import Protocol
+from study.experiment.protocol.whole import Protocol
 
 MOST_TOLD = 20
 """Foreign names that are logged; more tell nothing new."""

@@ -17,11 +17,11 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from study.apps.server.hosting import Host, Sitting
-from study.experiment import participants as people
 from study.experiment import session as flow
 from study.experiment.observers import questions
-from study.experiment.response_tables import events, form_values, participants, presentations, sessions, withdrawals
-from study.experiment.responses import answers_frame, session_by_id
+from study.experiment.store import participants as people
+from study.experiment.store.responses import answers_frame, session_by_id
+from study.experiment.store.tables import events, form_values, participants, presentations, sessions, withdrawals
 from study.spreadsheets import safe_cell, safe_table
 
 Handler = Callable[[Request], Awaitable[Response]]

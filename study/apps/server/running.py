@@ -16,10 +16,10 @@ from study.apps.server.names import Named, own_names
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
-from study.experiment.databases import try_to_write
-from study.experiment.protocol import Protocol
-from study.experiment.rendering import read_manifest
-from study.experiment.responses import open_responses
+from study.experiment.protocol.whole import Protocol
+from study.experiment.stimuli.rendering import read_manifest
+from study.experiment.store.databases import try_to_write
+from study.experiment.store.responses import open_responses
 
 MOST_CONNECTIONS = 4000
 """Beyond it requests get status 503, and pages ask again. A browser opens up to six while films load."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 
 from study.errors import SessionError
-from study.experiment.participants import DROPPED_AFTER
+from study.experiment.store.participants import DROPPED_AFTER
 
 SHORTEST_TOKEN = 16
 """Characters of the researcher's token."""

@@ -12,9 +12,9 @@ from functools import lru_cache
 from typing import Any
 
 from study.experiment import session as sitting
-from study.experiment.participants import Participant
-from study.experiment.protocol import Protocol
+from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Session, Step
+from study.experiment.store.participants import Participant
 
 FILMS = "films"
 """Relative to the page, which a proxy may show under any path."""

@@ -25,8 +25,8 @@ from study.apps.server.inbox import DATABASE_AWAY, Inbox, RefusedError, cookie
 from study.apps.server.limits import Limits
 from study.apps.server.researcher import researcher_routes
 from study.errors import SegueError
-from study.experiment.databases import AWAY
-from study.experiment.protocol_stimuli import StimulusSettings
+from study.experiment.protocol.stimuli import StimulusSettings
+from study.experiment.store.databases import AWAY
 
 PAGES = Path(__file__).resolve().parents[1] / "pages"
 TYPES = {

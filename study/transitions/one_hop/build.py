@@ -24,7 +24,7 @@ from study.transitions.one_hop.jobs import Found, Job, make_jobs, run_job
 from study.transitions.one_hop.problem import FORBIDDEN, IntArray, Problem
 from study.transitions.one_hop.search import Best
 from study.transitions.one_hop.table import OneHopTable, table_of
-from study.transitions.one_hop.threads import cores, one_blas_thread
+from study.transitions.threads import cores, one_blas_thread
 
 MEMORY_BYTES = 2 * 2**30
 _SAVE_EVERY_S = 5.0

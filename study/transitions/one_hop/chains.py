@@ -20,7 +20,7 @@ from study.transitions.one_hop.build import MEMORY_BYTES
 from study.transitions.one_hop.play import Step
 from study.transitions.one_hop.problem import FORBIDDEN, IntArray, Problem, Switch
 from study.transitions.one_hop.search import Table, second_leg
-from study.transitions.one_hop.threads import one_blas_thread
+from study.transitions.threads import one_blas_thread
 
 _ROWS = 64
 

@@ -16,7 +16,7 @@ from serving import Site, prepared
 from walking import PATIENT
 from webdriver import WebKitTab, webkit
 
-from study.experiment.rendering import render
+from study.experiment.stimuli.rendering import render
 
 EXECUTABLES = ("chromium", "chromium-browser", "google-chrome")
 MINI_BROWSERS = "/usr/lib/*/webkit2gtk-4.1/MiniBrowser", "/usr/lib/*/webkitgtk-6.0/MiniBrowser"

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from serving import QUESTIONS
 from walking import answers, check_frames, go_on, happened
 
-from study.experiment.response_tables import presentations
+from study.experiment.store.tables import presentations
 
 pytestmark = pytest.mark.gl
 

@@ -25,8 +25,8 @@ from walking import (
     to_question,
 )
 
-from study.experiment.response_tables import presentations
-from study.experiment.responses import answers_frame
+from study.experiment.store.responses import answers_frame
+from study.experiment.store.tables import presentations
 
 pytestmark = pytest.mark.gl
 

@@ -8,7 +8,7 @@ import time
 import pytest
 from greek import GREEK, latin
 
-from study.experiment.protocol import parse_protocol
+from study.experiment.protocol.whole import parse_protocol
 
 pytestmark = pytest.mark.gl
 

@@ -9,8 +9,8 @@ import pytest
 import sqlalchemy as sa
 from serving import PROTOCOL
 
-from study.experiment.response_tables import events, presentations
-from study.experiment.responses import answers_frame
+from study.experiment.store.responses import answers_frame
+from study.experiment.store.tables import events, presentations
 
 SHORT = """\
 name = "short"

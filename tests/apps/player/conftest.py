@@ -11,11 +11,11 @@ import pytest
 from playing import Playing
 
 from study.experiment.plan import Plan, draw_plan
-from study.experiment.protocol import Protocol, parse_protocol
-from study.experiment.responses import Presentation
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import Answer
-from study.experiment.stimuli import prepare
-from study.experiment.stimulus_set import StimulusSet
+from study.experiment.stimuli.prepare import prepare
+from study.experiment.stimuli.stimulus import StimulusSet
+from study.experiment.store.responses import Presentation
 from study.motion.library import open_library
 
 SMALL = """\

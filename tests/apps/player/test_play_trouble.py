@@ -19,8 +19,8 @@ import sqlalchemy as sa
 from PIL import ImageGrab
 from playing import Playing
 
-from study.experiment.response_tables import events, presentations
-from study.experiment.responses import find_session, has_event, open_responses, stored_answers
+from study.experiment.store.responses import find_session, has_event, open_responses, stored_answers
+from study.experiment.store.tables import events, presentations
 
 Start = Callable[..., Playing]
 

@@ -15,7 +15,7 @@ import pytest
 from playing import Playing
 
 from study.experiment.plan import draw_plan, trial_table
-from study.experiment.responses import answers_frame, find_session, has_event, open_responses, stored_answers
+from study.experiment.store.responses import answers_frame, find_session, has_event, open_responses, stored_answers
 
 Start = Callable[..., Playing]
 

@@ -9,8 +9,8 @@ import pytest
 
 from study.apps.player.store import ResponsesStore
 from study.experiment.plan import draw_plan
-from study.experiment.responses import answers_frame, find_session, has_event, open_responses, stored_form
 from study.experiment.session import Answer
+from study.experiment.store.responses import answers_frame, find_session, has_event, open_responses, stored_form
 
 
 def participant(responses: Any, small: Any, name: str) -> ResponsesStore:

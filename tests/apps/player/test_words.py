@@ -14,9 +14,9 @@ from study.apps.player.lettering import default_font
 from study.apps.player.pages import Look, Page
 from study.apps.player.scripted import ScriptedWindow
 from study.experiment.plan import draw_plan
-from study.experiment.protocol import parse_protocol
+from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import open_session
-from study.experiment.stimuli import prepare
+from study.experiment.stimuli.prepare import prepare
 from study.motion.library import open_library
 
 

@@ -1,0 +1,1 @@
+"""Preference studies: tests, models, scales."""

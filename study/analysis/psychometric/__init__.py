@@ -1,0 +1,1 @@
+"""Psychometric functions: likelihood, posterior, thresholds."""

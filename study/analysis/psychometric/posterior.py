@@ -1,0 +1,360 @@
+"""Psychometric functions: counts at stimulus levels in; threshold, width, lapse and guess rate with intervals out.
+
+    p(level) = guess + (1 - guess - lapse) F(level; threshold, width)
+
+The default is a posterior on a grid, with the intervals of its marginals (Wichmann & Hill 2001; Schuett, Harmeling,
+Macke & Wichmann 2016): a lapse rate and a spread of performance beyond the binomial (beta-binomial) are averaged over,
+not fixed. The likelihood's own maximum, profile and deviance stand in `psychometric_likelihood`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from study.analysis.estimates import Interval, check_share, numbers
+from study.errors import AnalysisError
+from study.models.posterior_grid import OVERDISPERSION_EDGES, Grid, evaluate, posterior_range
+from study.models.sigmoids import Sigmoid, sigmoid_named
+
+FloatArray = NDArray[np.float64]
+Task = Literal["2afc", "yes-no"]
+Status = Literal["reached", "not reached", "not estimable"]
+
+LARGEST_LAPSE = 0.25
+LARGEST_GUESS = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Counts at levels, rising; `yes` are right answers (2AFC) or answers "yes"."""
+
+    levels: FloatArray
+    yes: FloatArray
+    shown: FloatArray
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is fitted.
+
+    Attributes
+    ----------
+    sigmoid
+        One of `sigmoids.SIGMOIDS`.
+    guess
+        Share of "yes" where nothing can be seen: one half in 2AFC; None where it is estimated (yes-no).
+    lapse
+        Share of answers given blindly where everything can be seen; None where it is estimated.
+    overdispersion
+        Whether performance may vary more between blocks or people than the binomial has it.
+    """
+
+    sigmoid: Sigmoid
+    guess: float | None
+    lapse: float | None = None
+    overdispersion: bool = True
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter: posterior median and marginal interval; None where the data don't tell."""
+
+    value: float | None
+    interval: Interval
+    status: Status = "reached"
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class PsychometricFit:
+    """A psychometric function with its uncertainty.
+
+    Attributes
+    ----------
+    data, model
+        What was fitted to what.
+    threshold
+        The level where the sigmoid reaches one half, between guess and lapse rate; 75% in 2AFC without lapses.
+    width
+        Distance from 5% to 95% of the sigmoid; of the logarithm of the level for Weibull.
+    lapse, guess
+        Rates; a fixed one has an interval of no length.
+    overdispersion
+        Square root of the correlation of answers at one level; 0 for plain binomial.
+    grid
+        The posterior.
+    note
+        What to be careful about.
+    """
+
+    data: Data
+    model: Model
+    threshold: Estimate
+    width: Estimate
+    lapse: Estimate
+    guess: Estimate
+    overdispersion: Estimate
+    grid: Grid
+    confidence: float
+    note: str = ""
+
+
+def make_model(
+    task: str = "2afc",
+    *,
+    sigmoid: str = "normal",
+    choices: int = 2,
+    guess: float | None = None,
+    lapse: float | None = None,
+    overdispersion: bool = True,
+) -> Model:
+    """Return the model of a task.
+
+    Parameters
+    ----------
+    task
+        "2afc" (guess rate 1 / `choices`) or "yes-no" (guess rate estimated unless given).
+    sigmoid
+        "normal", "logistic", "gumbel" or "weibull".
+    guess, lapse
+        Rates to hold; estimated where None (the guess rate of a forced choice is always held).
+
+    Raises
+    ------
+    AnalysisError
+        For an unknown task or sigmoid, or rates that can't be.
+    """
+    if task not in ("2afc", "yes-no"):
+        raise AnalysisError(f"expected the task 2afc or yes-no, found {task!r}")
+    if choices < 2:
+        raise AnalysisError(f"expected at least 2 choices, found {choices}")
+    held = 1 / choices if task == "2afc" and guess is None else guess
+    for name, rate in (("guess", held), ("lapse", lapse)):
+        if rate is not None and not 0 <= rate < 1:
+            raise AnalysisError(f"expected a {name} rate from 0 to below 1, found {rate:g}")
+    if (held or 0) + (lapse or 0) >= 1:
+        raise AnalysisError(f"expected guess and lapse rate to add to less than 1, found {held} and {lapse}")
+    return Model(sigmoid_named(sigmoid), held, lapse, overdispersion)
+
+
+def tidy(levels: ArrayLike, yes: ArrayLike, shown: ArrayLike) -> Data:
+    """Return counts by level, rising, equal levels put together, levels without answers left out.
+
+    Parameters
+    ----------
+    levels, yes, shown : array_like, shape (blocks,)
+
+    Raises
+    ------
+    AnalysisError
+        When shapes differ or counts can't be.
+    """
+    named = ((levels, "levels"), (yes, "yes"), (shown, "shown"))
+    place, right, total = (numbers(part, name) for part, name in named)
+    if place.ndim != 1 or place.shape != right.shape or place.shape != total.shape:
+        raise AnalysisError(
+            f"expected levels, yes and shown of one shape (blocks,), found {place.shape}, {right.shape}, {total.shape}"
+        )
+    if not (np.isfinite(place).all() and np.isfinite(right).all() and np.isfinite(total).all()):
+        raise AnalysisError("expected finite levels and counts, found some that are not; leave those rows out")
+    if (right < 0).any() or (right > total).any():
+        at = int(np.flatnonzero((right < 0) | (right > total))[0])
+        raise AnalysisError(f"expected 0 <= yes <= shown, found {right[at]:g} of {total[at]:g} at level {place[at]:g}")
+    unique, index = np.unique(place[total > 0], return_inverse=True)
+    sums = np.zeros((2, len(unique)))
+    for row, part in zip(sums, (right, total), strict=True):
+        np.add.at(row, index, part[total > 0])
+    return Data(unique, sums[0], sums[1])
+
+
+def why_no_fit(data: Data) -> str:
+    """Return why nothing can be estimated; empty where something can."""
+    if not len(data.levels):
+        return "no answers"
+    if len(data.levels) == 1:
+        return f"one level only ({data.levels[0]:g}): threshold and width can't be told from each other"
+    return ""
+
+
+def fit_psychometric(
+    levels: ArrayLike, yes: ArrayLike, shown: ArrayLike, model: Model | None = None, *, confidence: float = 0.95
+) -> PsychometricFit | str:
+    """Fit one psychometric function; a sentence that says why where nothing can be fitted.
+
+    Parameters
+    ----------
+    levels : array_like, shape (blocks,)
+        Stimulus levels; the share of "yes" rises with them.
+    yes, shown : array_like, shape (blocks,)
+        Answers "yes" (right answers in 2AFC), and all answers.
+    model
+        From `make_model`; 2AFC with a cumulative normal unless given.
+    confidence
+        Of the intervals.
+
+    Notes
+    -----
+    Priors: flat for thresholds within the levels, falling to none half their range outside; flat for the logarithm of
+    the width from half the smallest step between levels to the whole range, falling to none at a quarter and at four
+    times; Beta(1, 20) for the lapse rate, Beta(1, 5) for the guess rate, Beta(1, 40) for overdispersion. Estimates are
+    medians, which mean the same on a level and on its logarithm.
+
+    Examples
+    --------
+    >>> fit = fit_psychometric([1, 2, 3, 4, 5], [11, 12, 16, 19, 20], [20] * 5)
+    >>> round(fit.threshold.value, 1)
+    2.7
+    """
+    check_share(confidence, "confidence")
+    data, chosen = tidy(levels, yes, shown), model or make_model()
+    reason = why_no_fit(data)
+    if reason:
+        return reason
+    return _fit(data, chosen, confidence)
+
+
+def fit_many(
+    levels: ArrayLike, yes: ArrayLike, shown: ArrayLike, model: Model | None = None, *, confidence: float = 0.95
+) -> list[PsychometricFit | str]:
+    """Fit many data sets with the same levels: `yes` and `shown` of shape (fits, levels)."""
+    right, total = np.atleast_2d(np.asarray(yes, float)), np.atleast_2d(np.asarray(shown, float))
+    pairs = zip(right, np.broadcast_to(total, right.shape), strict=True)
+    return [fit_psychometric(levels, one, of, model, confidence=confidence) for one, of in pairs]
+
+
+def _fit(data: Data, model: Model, confidence: float) -> PsychometricFit:
+    axis = model.sigmoid.axis(data.levels)
+    rates = [(model.lapse, LARGEST_LAPSE), (model.guess, LARGEST_GUESS)]
+    ranges = posterior_range(axis, data.yes, data.shown, model.sigmoid, rates, model.overdispersion)
+    grid = evaluate(axis, data.yes, data.shown, model.sigmoid, ranges, model.overdispersion)
+    threshold, width, lapse, guess, excess = (
+        _estimate(grid, place, confidence, name)
+        for place, name in enumerate(("threshold", "width", "lapse rate", "guess rate", "overdispersion"))
+    )
+    note = _caution(data)
+    return PsychometricFit(
+        data=data,
+        model=model,
+        threshold=_within_levels(threshold, axis, model.sigmoid, note),
+        width=_positive(width),
+        lapse=lapse,
+        guess=guess,
+        overdispersion=excess,
+        grid=grid,
+        confidence=confidence,
+        note=note,
+    )
+
+
+def _caution(data: Data) -> str:
+    share = data.yes / data.shown
+    if (data.yes == data.shown).all():
+        return "every answer at every level was right or “yes”: the threshold lies below the levels shown"
+    if (data.yes == 0).all():
+        return "no answer at any level was right or “yes”: the threshold lies above the levels shown"
+    weight = data.shown / data.shown.sum()
+    centred = data.levels - (weight * data.levels).sum()
+    if float((weight * centred * share).sum()) <= 0:
+        return "the share does not rise with the level; if it should fall, turn the sign of the levels"
+    return ""
+
+
+def _estimate(grid: Grid, place: int, confidence: float, name: str) -> Estimate:
+    """Posterior median and marginal interval of one axis of the grid."""
+    nodes, mass = grid.nodes[place], grid.marginals[place]
+    if len(nodes) == 1:
+        value = float(nodes[0])
+        return Estimate(value, Interval(value, value, confidence))
+    edges = OVERDISPERSION_EDGES if name == "overdispersion" else even_edges(nodes)
+    low, median, high = quantiles(edges, mass, ((1 - confidence) / 2, 0.5, (1 + confidence) / 2))
+    ends = (None if grid.open_ends[place][0] else low, None if grid.open_ends[place][1] else high)
+    note = f"the data leave the {name} open on one side" if None in ends else ""
+    return Estimate(median, Interval(*ends, confidence), note=note)
+
+
+def even_edges(nodes: FloatArray) -> FloatArray:
+    """Return the edges of the cells around evenly spaced nodes."""
+    step = nodes[1] - nodes[0]
+    return np.concatenate([[nodes[0] - step / 2], nodes + step / 2])
+
+
+def quantiles(edges: FloatArray, mass: FloatArray, shares: Sequence[float]) -> list[float]:
+    """Return quantiles of a distribution given by the mass between edges."""
+    cumulated = np.concatenate([[0.0], np.cumsum(mass)])
+    return [float(value) for value in np.interp(shares, cumulated / cumulated[-1], edges)]
+
+
+def _within_levels(found: Estimate, axis: FloatArray, sigmoid: Sigmoid, note: str) -> Estimate:
+    """The threshold in the unit of the levels; none where it lies outside them."""
+
+    def back(value: float | None) -> float | None:
+        return None if value is None else float(sigmoid.levels(np.array(value)))
+
+    low, high = found.interval.low, found.interval.high
+    interval = Interval(back(low), back(high), found.interval.confidence)
+    if note:
+        return Estimate(None, interval, "not estimable", note)
+    if found.value is None or not axis.min() <= found.value <= axis.max():
+        first, last = sigmoid.levels(axis.min()), sigmoid.levels(axis.max())
+        return Estimate(None, interval, "not reached", f"outside the levels shown ({first:g} to {last:g})")
+    return Estimate(back(found.value), interval, "reached", found.note)
+
+
+def _positive(found: Estimate) -> Estimate:
+    """The width from its logarithm."""
+
+    def back(value: float | None) -> float | None:
+        return None if value is None else math.exp(value)
+
+    interval = Interval(back(found.interval.low), back(found.interval.high), found.interval.confidence)
+    return Estimate(back(found.value), interval, found.status, found.note)
+
+
+def threshold_at(fit: PsychometricFit, share: float) -> Estimate:
+    """Return the level at which a share of the answers is "yes", guesses and lapses included.
+
+    Parameters
+    ----------
+    fit
+        From `fit_psychometric`.
+    share
+        Between 0 and 1; where part of the posterior never reaches it, the interval is open.
+    """
+    thresholds, widths, lapses, guesses = np.meshgrid(*fit.grid.nodes[:4], indexing="ij")
+    target = (share - guesses) / (1 - guesses - lapses)
+    check_share(share, "share")
+    sigmoid, mass = fit.model.sigmoid, fit.grid.density.sum(axis=4)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        place = thresholds + np.exp(widths) * (sigmoid.inverse(target) - sigmoid.half) / sigmoid.span
+    place = np.where(target <= 0, -np.inf, np.where(target >= 1, np.inf, place)).ravel()
+    order = np.argsort(place)
+    cumulated, ordered = np.cumsum(mass.ravel()[order]), place[order]
+    tails = ((1 - fit.confidence) / 2, 0.5, (1 + fit.confidence) / 2)
+    low, middle, high = ordered[np.minimum(np.searchsorted(cumulated, tails), len(ordered) - 1)]
+    ends = [None if edge or not np.isfinite(end) else float(sigmoid.levels(end))
+            for end, edge in zip((low, high), fit.grid.open_ends[0], strict=True)]  # fmt: skip
+    interval = Interval(ends[0], ends[1], fit.confidence)
+    axis = sigmoid.axis(fit.data.levels)
+    if fit.note or not axis.min() <= middle <= axis.max():
+        return Estimate(None, interval, "not reached", fit.note or f"{100 * share:g}% lies outside the levels shown")
+    return Estimate(float(sigmoid.levels(middle)), interval)
+
+
+def curve_of(fit: PsychometricFit, points: int = 101) -> list[tuple[float, float]]:
+    """Return the posterior mean of the psychometric function over the levels, for drawing: level, share."""
+    sigmoid = fit.model.sigmoid
+    axis = sigmoid.axis(fit.data.levels)
+    line = np.linspace(axis.min(), axis.max(), points)
+    thresholds, log_widths, lapses, guesses, _ = fit.grid.nodes
+    shape = sigmoid.at(line[:, None, None], thresholds[None, :, None], np.exp(log_widths)[None, None])
+    mass = fit.grid.density.sum(axis=4)
+    scale = 1 - lapses[:, None] - guesses[None]
+    rises = np.einsum("xtw,twlg,lg->x", shape, mass, scale, optimize=True)
+    floor = float((mass.sum(axis=(0, 1, 2)) * guesses).sum())
+    return [(float(x), float(y)) for x, y in zip(sigmoid.levels(line), floor + rises, strict=True)]

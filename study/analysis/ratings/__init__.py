@@ -1,0 +1,1 @@
+"""Rating studies: tables, comparisons, ratings of pairs."""

@@ -1,0 +1,1 @@
+"""Same-different studies: thresholds and sensitivity."""

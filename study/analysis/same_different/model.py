@@ -1,0 +1,290 @@
+"""The differencing model fitted to a group's answers: thresholds that false alarms and straight lines do not bend.
+
+Counts of a same-different task (`same_different.Counts`) come in; criterion, sensitivities, thresholds with intervals
+and tests go out (2004 section 5.1, corrected). What the model says stands in `differencing`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.analysis import estimates
+from study.analysis.same_different import fits as model
+from study.analysis.same_different.interpolation import FEWEST_FOR_INTERVAL, SIDES, Counts, Threshold
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """The differencing model fitted to all answers.
+
+    Attributes
+    ----------
+    criterion, lapse
+        Estimates, the first with a standard error that takes the participants as independent.
+    false_alarms
+        Share of "different" that the model gives to pairs with no difference.
+    slopes
+        d-prime a frame, by side.
+    level
+        Share at threshold in what follows, usually 0.75.
+    jnd
+        That share "different", by side.
+    corrected
+        The difference at which an observer with the best criterion is right in that share of the pairs, by side: what
+        the sensitivity allows, whatever the criterion.
+    guess_corrected
+        That share after Abbott's correction for the false alarms, by side.
+    equal_slopes
+        Tests of one slope for both sides: likelihood ratio (answers as independent), t (participants as independent).
+    fit_deviance, fit_degrees_of_freedom, fit_p_value
+        Against free percentages at each level; a small p-value says that the curve does not follow the data.
+    curve
+        Points (difference in frames, percent) for drawing.
+    log_likelihood
+        At the maximum, without binomial coefficients.
+    note
+        What to be careful about.
+    """
+
+    criterion: float
+    criterion_error: float | None
+    lapse: float
+    false_alarms: float
+    slopes: dict[str, float]
+    level: float
+    jnd: dict[str, Threshold]
+    corrected: dict[str, Threshold]
+    guess_corrected: dict[str, Threshold]
+    equal_slopes: dict[str, Any] | None
+    fit_deviance: float
+    fit_degrees_of_freedom: int
+    fit_p_value: float | None
+    curve: tuple[tuple[float, float], ...]
+    log_likelihood: float
+    note: str = ""
+
+
+def _frames_by_side(differences: FloatArray) -> FloatArray:
+    """Regressors of the model, shape (levels, 2): size of the difference where it is shorter, and where longer."""
+    return np.column_stack([np.maximum(-differences, 0.0), np.maximum(differences, 0.0)])
+
+
+def fit_model(
+    counts: Counts,
+    *,
+    level: float = 0.75,
+    confidence: float = 0.95,
+    largest_lapse: float = model.LARGEST_LAPSE,
+) -> ModelFit | str:
+    """Fit the differencing model; a sentence that says why where it can't be fitted.
+
+    Parameters
+    ----------
+    counts
+        Answers.
+    level
+        Share of "different", or of right answers, at threshold; above one half.
+    confidence
+        Of the intervals.
+    largest_lapse
+        Upper bound of the lapse rate.
+
+    Notes
+    -----
+    Maximum likelihood on the answers of all participants together, so the curve is that of the group. Standard errors
+    are the jackknife's over participants, intervals Student's on log thresholds (measured coverage: docs/analysis.md);
+    for one participant, that participant's answers as independent. Where participants differ much in sensitivity the
+    curve of the group is flatter than anybody's, and its threshold is that of the group, not the mean of theirs.
+    """
+    reason = why_no_fit(counts)
+    if reason:
+        return reason
+    present = np.flatnonzero(counts.shown.sum(axis=0) > 0)
+    differences, different, shown = counts.differences[present], counts.different[:, present], counts.shown[:, present]
+    both = _frames_by_side(differences)
+    sides = [index for index in range(2) if both[:, index].any()]
+    frames, total = both[:, sides], (different.sum(axis=0)[None], shown.sum(axis=0)[None])
+    best = model.fit(frames, *total, largest_lapse=largest_lapse)
+    spread = _spread_of(level, best, frames, different, shown, largest_lapse)
+    thresholds = {kind: _thresholds(best, spread, frames, sides, kind, confidence) for kind in model.KINDS}
+    deviance = max(2 * (_saturated_log_likelihood(*total) - float(best.log_likelihood[0])), 0.0)
+    freedom = len(differences) - 2 - len(sides)
+    line = np.linspace(differences.min(), differences.max(), 201)
+    curve = model.probability_different(_frames_by_side(line)[:, sides], best.criterion, best.lapse, best.slopes)[0]
+    alarms = model.probability_different(np.zeros((1, len(sides))), best.criterion, best.lapse, best.slopes)
+    return ModelFit(
+        criterion=float(best.criterion[0]),
+        criterion_error=spread.criterion_error(best),
+        lapse=float(best.lapse[0]),
+        false_alarms=float(alarms[0, 0]),
+        slopes={SIDES[side]: float(best.slopes[0, place]) for place, side in enumerate(sides)},
+        level=level,
+        jnd=thresholds["different"],
+        corrected=thresholds["criterion_free"],
+        guess_corrected=thresholds["guess_corrected"],
+        equal_slopes=_equal_slopes(best, spread, frames, total, largest_lapse) if len(sides) == 2 else None,
+        fit_deviance=deviance,
+        fit_degrees_of_freedom=freedom,
+        fit_p_value=estimates.chi_square_probability(deviance, freedom) if freedom > 0 else None,
+        curve=tuple((float(x), 100 * float(y)) for x, y in zip(line, curve, strict=True)),
+        log_likelihood=float(best.log_likelihood[0]),
+        note="; ".join(
+            filter(None, (_caution(best), NO_TEST if freedom <= 0 else "", ONE_SIDE if len(sides) < 2 else ""))
+        ),
+    )
+
+
+NO_TEST = "as many parameters as levels: how well the model fits can't be tested"
+ONE_SIDE = "differences on one side only: its slope can't be compared with another"
+
+
+@dataclass(frozen=True, eq=False)
+class _Spread:
+    """How far a fit scatters: fits with one participant left out at a time, or the covariance for one participant."""
+
+    participants: int
+    level: float
+    left_out: model.Fits | None
+    covariance: FloatArray
+
+    def log_threshold_error(self, best: model.Fits, kind: model.Kind, place: int) -> float | None:
+        """Standard error of the log threshold of one slope; None where it can't be told."""
+        if self.left_out is not None:
+            others = model.threshold_frames(self.left_out, kind, self.level)[:, place]
+            return estimates.jackknife_error(np.log(others)) if (others > 0).all() else None
+        gradient = model.log_threshold_gradient(best, kind, self.level)[place]
+        return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
+
+    def criterion_error(self, best: model.Fits) -> float | None:
+        """Standard error of the criterion."""
+        if self.left_out is not None:
+            return estimates.jackknife_error(self.left_out.criterion)
+        return estimates.finite(float(best.criterion[0]) * math.sqrt(max(float(self.covariance[0, 0]), 0.0)))
+
+
+def _spread_of(
+    level: float, best: model.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, largest_lapse: float
+) -> _Spread:
+    answered = shown.sum(axis=1) > 0
+    different, shown = different[answered], shown[answered]
+    count = len(shown)
+    if count < FEWEST_FOR_INTERVAL:
+        return _Spread(count, level, None, model.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
+    others = (different.sum(axis=0) - different, shown.sum(axis=0) - shown)
+    return _Spread(count, level, model.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
+
+
+def why_no_fit(counts: Counts) -> str:
+    """Return why the differencing model can't be fitted; empty where it can."""
+    shown, different = counts.shown.sum(axis=0), counts.different.sum(axis=0)
+    if not shown.any():
+        return "no answers"
+    if not shown[counts.differences == 0].any():
+        return "no pairs without a difference were answered, so the criterion can't be told from the sensitivity"
+    if not shown[counts.differences != 0].any():
+        return "no pairs with a difference were answered"
+    if different.sum() in (0, shown.sum()):
+        kind = "different" if different.any() else "same"
+        return f'every answer was "{kind}": neither criterion nor sensitivity can be estimated'
+    return ""
+
+
+def _caution(best: model.Fits) -> str:
+    notes = []
+    if best.held[0, 0]:
+        notes.append("the criterion stands at the bound of its range")
+    if best.held[0, 2:].any():
+        notes.append(
+            "a slope stands at the bound of its range: the answers show no effect of the difference, or no error"
+        )
+    if not best.settled[0]:
+        notes.append("the search for the maximum did not come to rest")
+    return "; ".join(notes)
+
+
+def _saturated_log_likelihood(different: FloatArray, shown: FloatArray) -> float:
+    from scipy.special import xlogy
+
+    share = different / shown
+    return float((xlogy(different, share) + xlogy(shown - different, 1 - share)).sum())
+
+
+def _thresholds(
+    best: model.Fits, spread: _Spread, frames: FloatArray, sides: Sequence[int], kind: model.Kind, confidence: float
+) -> dict[str, Threshold]:
+    """Thresholds of one kind on every side shown."""
+    result: dict[str, Threshold] = {}
+    for place, index in enumerate(sides):
+        result[SIDES[index]] = _threshold(best, spread, float(frames[:, place].max()), place, index, kind, confidence)
+    return result
+
+
+def _threshold(
+    best: model.Fits, spread: _Spread, largest: float, place: int, index: int, kind: model.Kind, confidence: float
+) -> Threshold:
+    """One threshold, with Student's interval of its logarithm."""
+    side, clustered = SIDES[index], spread.left_out is not None
+    who = "jackknife over participants" if clustered else "one participant, answers as independent"
+    method = f"differencing model; Student interval of the logarithm, {who}"
+    found = float(model.threshold_frames(best, kind, spread.level)[0, place])
+    interval = estimates.Interval(None, None, confidence)
+    if best.held[0, 2 + place]:
+        note = "the slope stands at the bound of its range"
+        return Threshold(side, None, None, interval, "not estimable", method, note)
+    if found <= 0:
+        note = f"above {100 * spread.level:g}% already where there is no difference"
+        return Threshold(side, None, None, interval, "above", method, note)
+    error = spread.log_threshold_error(best, kind, place) if math.isfinite(found) else None
+    if error is not None:
+        times = (
+            estimates.t_quantile(confidence, spread.participants - 1)
+            if clustered
+            else estimates.normal_quantile(confidence)
+        )
+        low, high = found * math.exp(-times * error), found * math.exp(min(times * error, 50.0))
+        interval = estimates.Interval(min(low, largest), high if high <= largest else None, confidence)
+    if found > largest:
+        note = f"not reached within the levels shown (largest {largest:g} frames)"
+        return Threshold(side, None, None, interval, "not reached", method, note)
+    note = "" if interval.high is not None else f"the interval reaches beyond the levels shown ({largest:g} frames)"
+    if error is None:
+        note = "hangs on single participants: no interval"
+    return Threshold(side, found, None if error is None else found * error, interval, "reached", method, note)
+
+
+def _equal_slopes(
+    best: model.Fits,
+    spread: _Spread,
+    frames: FloatArray,
+    total: tuple[FloatArray, FloatArray],
+    largest_lapse: float,
+) -> dict[str, Any]:
+    """Tests that shorter and longer blends are told apart equally well."""
+    one = model.fit(frames.sum(axis=1, keepdims=True), *total, largest_lapse=largest_lapse)
+    ratio = max(2 * float(best.log_likelihood[0] - one.log_likelihood[0]), 0.0)
+    difference = float(np.log(best.slopes[0, 1] / best.slopes[0, 0]))
+    error = None
+    if spread.left_out is not None:
+        error = estimates.jackknife_error(np.log(spread.left_out.slopes[:, 1] / spread.left_out.slopes[:, 0]))
+    statistic = difference / error if error is not None and error > 1e-9 else None
+    freedom = spread.participants - 1
+    return {
+        "likelihood_ratio": ratio,
+        "degrees_of_freedom": 1,
+        "p_value_answers_independent": estimates.chi_square_probability(ratio, 1),
+        "slope_ratio_longer_to_shorter": math.exp(difference),
+        "t": statistic,
+        "t_degrees_of_freedom": freedom if statistic is not None else None,
+        "p_value_participants_independent": (
+            estimates.t_probability(statistic, freedom) if statistic is not None else None
+        ),
+        "note": "" if statistic is not None else "participants' slopes don't spread so that they could be judged by",
+    }

@@ -1,0 +1,5 @@
+"""`python -m study.apps.cli`."""
+
+from study.apps.cli import main
+
+main()

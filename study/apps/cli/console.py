@@ -1,0 +1,97 @@
+"""What every verb shares: one JSON object on standard output, everything else on standard error, progress bars."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import click
+
+from study.apps.cli.streams import show
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def json_option(command: Command) -> Command:
+    """Adds `--json` to a verb."""
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")(command)
+
+
+def library_option(command: Command) -> Command:
+    """Adds `--library` to a verb."""
+    return click.option(
+        "--library",
+        metavar="NAME|FOLDER",
+        default=None,
+        help="Where motions come from: 'synthetic' (default), or a folder of .bvh or .asf/.amc files such as CMU's.",
+    )(command)
+
+
+def database_option(command: Command) -> Command:
+    """Adds `--database` to a verb."""
+    return click.option(
+        "--database",
+        metavar="FILE|URL",
+        envvar="SEGUE_DATABASE",
+        show_envvar=True,
+        help="Where answers are: a file, or postgresql+psycopg://USER@HOST/NAME; responses.sqlite in the results "
+        "folder unless given.",
+    )(command)
+
+
+def emit(result: Mapping[str, Any], as_json: bool, text: str) -> None:
+    """Prints a verb's result: the mapping as JSON (numbers that are not finite become null), or the text."""
+    from study.analysis.estimates import plain
+
+    show(json.dumps(plain(result), indent=2, allow_nan=False) if as_json else text, sys.stdout)
+
+
+def say(message: str) -> None:
+    """One line on standard error."""
+    show(message, sys.stderr)
+
+
+def columns(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
+    """Rows of cells as lines of text, the first row the headings; columns in `left` begin at the left."""
+    widths = [max(len(row[at]) for row in rows) for at in range(len(rows[0]))]
+    return [
+        "  ".join(
+            cell.ljust(width) if at in left else cell.rjust(width)
+            for at, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Callable[[float, str], None]]:
+    """A progress bar on standard error; gives a function of (the share that is done, a few words such as "3 of 7").
+
+    Where standard error is not a terminal, a line at each quarter takes the bar's place, so that logs stay short.
+    """
+    if not sys.stderr.isatty():
+        shown = -1
+
+        def report(share: float, words: str) -> None:
+            nonlocal shown
+            if int(4 * share) != shown:
+                shown = int(4 * share)
+                say(f"{label}: {words}")
+
+        yield report
+        return
+    words_now = [""]
+    steps = 1000
+    shown_bar: Any = click.progressbar(
+        length=steps, label=label, file=sys.stderr, show_eta=True, item_show_func=lambda _: words_now[0]
+    )
+    with shown_bar as bar:
+
+        def advance(share: float, words: str) -> None:
+            words_now[0] = words
+            bar.update(round(steps * share) - bar.pos)
+
+        yield advance

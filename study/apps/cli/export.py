@@ -1,0 +1,44 @@
+"""`segue export`: answers for other programs (CSV), and for archives (Psych-DS, BIDS)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from study.apps.cli.console import database_option, emit, json_option
+from study.counting import counted
+
+
+@click.command()
+@click.argument("results", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option(
+    "--to",
+    "kind",
+    type=click.Choice(["csv", "psych-ds", "bids"]),
+    default="csv",
+    show_default=True,
+    help="One table; or a folder in the form of Psych-DS or BIDS, described column by column.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="File (csv) or folder; RESULTS/answers.csv, RESULTS/psych-ds or RESULTS/bids unless given.",
+)
+@database_option
+@json_option
+def export(results: Path, kind: str, out: Path | None, database: str | None, as_json: bool) -> None:
+    """All answers for other programs and for archives."""
+    from study.experiment.protocol.whole import load_protocol
+    from study.experiment.stimuli.rendering import PROTOCOL
+    from study.experiment.store.export import export as export_folder
+    from study.experiment.store.responses import export_csv, open_answers
+
+    with open_answers(results, database) as responses:
+        if kind == "csv":
+            place = export_csv(responses, out or results / "answers.csv")
+            emit({"file": str(place)}, as_json, str(place))
+            return
+        place = export_folder(load_protocol(results / PROTOCOL), responses, kind, out or results / kind)
+    files = sum(1 for path in place.rglob("*") if path.is_file())
+    emit({"folder": str(place), "files": files}, as_json, f"{place}: {counted(files, 'file')}")

@@ -1,0 +1,221 @@
+"""`segue fit`: data that another program wrote, through the same analyses as our own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.cli.console import emit, json_option
+from study.counting import counted
+from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.analysis.foreign.answers import ForeignAnswers
+    from study.analysis.foreign.trials import Trials
+
+TASKS = ("2afc", "yes-no", "same-different", "preference", "rating")
+# What each task takes besides the columns that all have; any other of these options is refused with it.
+OWN = {
+    "2afc": ("level", "shown", "yes", "sigmoid", "choices", "lapse"),
+    "yes-no": ("level", "shown", "yes", "sigmoid", "guess", "lapse"),
+    "same-different": ("level", "shown", "yes", "order", "reference_first", "threshold"),
+    "preference": ("first", "second", "motion", "yes", "tie", "alpha"),
+    "rating": ("method", "motion", "item", "scale", "ends", "alpha"),
+}
+COLUMNS = ("level", "answer", "participant", "shown", "order", "first", "second", "method", "motion", "item")
+
+
+def read_table(path: Path, needed: tuple[str, ...], delimiter: str | None = None) -> pd.DataFrame:
+    """A table of texts from a file: delimited text, or trials in JSON.
+
+    Raises
+    ------
+    AnalysisError
+        When it can't be read as one.
+    """
+    from study.analysis.foreign.json_files import looks_like_json, parse_json
+    from study.analysis.foreign.text import decoded, parse_table
+
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise AnalysisError(f"expected a table, found a file that can't be read: {error}") from error
+    text = decoded(content)
+    return parse_json(text) if looks_like_json(text) else parse_table(text, needed, delimiter)
+
+
+def _scale(given: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
+    """Words of a scale and their points."""
+    found = []
+    for text in given:
+        word, equals, point = text.rpartition("=")
+        try:
+            found.append((word, float(point)))
+        except ValueError:
+            equals = ""
+        if not equals or not word.strip():
+            raise AnalysisError(f'expected --scale "WORD=POINT" as in "Agree=4", found {text!r}')
+    return tuple(found)
+
+
+def _pairs(where: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    found = []
+    for text in where:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip():
+            raise AnalysisError(f"expected --where COLUMN=VALUE, found {text!r}")
+        found.append((name.strip(), value))
+    return tuple(found)
+
+
+def _fit_function(trials: Trials, task: str, options: dict[str, Any]) -> dict[str, Any]:
+    """2AFC or yes-no."""
+    from study.analysis.psychometric.analyse import analyse_psychometric
+    from study.analysis.psychometric.posterior import make_model
+
+    settings = {name: options[name] for name in ("guess", "lapse")}
+    model = make_model(task, sigmoid=options["sigmoid"] or "normal", choices=options["choices"] or 2, **settings)
+    return analyse_psychometric(trials.table, model, confidence=options["confidence"], simulations=500)
+
+
+def _fit_pairs(trials: Trials, options: dict[str, Any]) -> dict[str, Any]:
+    """Same-different, through the analysis of our own studies."""
+    import numpy as np
+    import pandas as pd
+
+    from study.analysis.same_different.analyse import analyse_jnd
+
+    table = trials.table
+    parts = []
+    for column, answer in (("yes", "different"), ("no", "same")):
+        count = table["yes"] if column == "yes" else table["shown"] - table["yes"]
+        if (count % 1 != 0).any():
+            raise AnalysisError(f"expected whole numbers of answers, found {count[count % 1 != 0].iloc[0]:g}")
+        rows = table.loc[np.repeat(table.index.to_numpy(), count.to_numpy(dtype=int))]
+        parts.append(rows.assign(answer=answer))
+    answers = pd.concat(parts, ignore_index=True).rename(columns={"level": "difference_frames"})
+    answers["task"] = "same-different"
+    if options["order"]:
+        answers["reference_first"] = _reference_first(answers["order"], options)
+    level = options["threshold"] or 0.75
+    return analyse_jnd(answers, level=level, confidence=options["confidence"])
+
+
+def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Series[bool]:
+    """Whether the reference came first, from the column that says what did."""
+    named, column = options["reference_first"], options["order"]
+    seen = ", ".join(repr(value) for value in sorted(set(order))[:8])
+    if named is None:
+        raise AnalysisError(
+            f"expected --reference-first with --order: which of {seen} in {column!r} says that the reference was first"
+        )
+    first: pd.Series[bool] = order.str.lower() == named.strip().lower()
+    if not first.any() or (order == "").any():
+        raise AnalysisError(f"expected {named!r} and another word in every row of {column!r}, found {seen}")
+    return first
+
+
+def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
+    """Preferences and ratings, through the analysis of our own studies; `answer` in words."""
+    from study.analysis.analyse import analyse
+    from study.analysis.preference.analyse import strengths_in_words
+    from study.analysis.ratings.comparisons import anova_sentences
+
+    alpha = options["alpha"] or 0.05
+    result = analyse(found.table, confidence=options["confidence"], alpha=alpha)
+    said = [compared["answer"] for study in result["preference"].values() for compared in study]
+    said += [strengths_in_words(found) for found in result["bradley_terry"].values() if found]
+    for questions in result["rating_anova"].values():
+        said += anova_sentences(questions, alpha)
+    for row in (row for rows in result["ratings"].values() for row in rows):
+        said.append(f"{': '.join(filter(None, (row['item'], row['method'])))}: mean {row['mean']:.2f} over "
+                    f"{counted(row['participants'], 'participant')}")  # fmt: skip
+    return {**result, "answer": "\n".join(said)}
+
+
+@click.command()
+@click.argument("data", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--task", type=click.Choice(TASKS), required=True)
+@click.option("--answer", required=True, help="Column of the answer: right or wrong, yes or no, same or different, "
+              "first or second (or the method chosen), a rating.")  # fmt: skip
+@click.option("--level", help="Column of the stimulus level (same-different: the signed difference).")
+@click.option("--participant", help="Column that says who answered; one participant unless given.")
+@click.option("--shown", help="Column with the number of answers a row stands for; then --answer counts them.")
+@click.option("--yes", multiple=True, help="What counts as right, yes, different or first; may be repeated.")
+@click.option("--tie", multiple=True, help="Preference: what counts as neither; may be repeated.")
+@click.option("--where", multiple=True, help="COLUMN=VALUE: take only these rows; may be repeated.")
+@click.option("--order", help="Same-different: column that says which of a pair came first.")
+@click.option("--reference-first", help="Same-different: what it holds where the reference came first.")
+@click.option("--first", help="Preference: column of the method shown first.")
+@click.option("--second", help="Preference: column of the method shown second.")
+@click.option("--method", help="Rating: column of the method.")
+@click.option("--motion", help="Preference, rating: column of the motion.")
+@click.option("--item", help="Rating: column of the question.")
+@click.option("--scale", multiple=True, help="Rating: WORD=POINT, where words stand for points; once for each word.")
+@click.option("--ends", type=(float, float), help="Rating: lowest and highest point of the scale.")
+@click.option("--sigmoid", type=click.Choice(["normal", "logistic", "gumbel", "weibull"]), help="[default: normal]")
+@click.option("--choices", type=click.IntRange(min=2), help="2afc: of how many.  [default: 2]")
+@click.option("--guess", type=click.FloatRange(0, 1, max_open=True), help="Hold the guess rate (yes-no).")
+@click.option("--lapse", type=click.FloatRange(0, 1, max_open=True), help="Hold the lapse rate.")
+@click.option("--threshold", type=click.FloatRange(0.5, 1, True, True), help="Same-different.  [default: 0.75]")
+@click.option("--alpha", type=click.FloatRange(0, 1, True, True), help="Preference, rating.  [default: 0.05]")
+@click.option("--confidence", type=click.FloatRange(0.5, 1, True, True), default=0.95, show_default=True)
+@click.option(
+    "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "pipe", "space"]), help="Found out unless given."
+)
+@click.option("--decimal", type=click.Choice(["point", "comma"]), help="Found out unless given.")
+@json_option
+def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
+    """Analyse data that another program wrote (PsychoPy, jsPsych, Gorilla): CSV or JSON, with its columns named here.
+
+    Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
+    """
+    _refuse_others(task, options)
+    read = _read(data, task, options)
+    if task in ("preference", "rating"):
+        found = _analysed(read, options)  # type: ignore[arg-type]
+    elif task == "same-different":
+        found = _fit_pairs(read, options)  # type: ignore[arg-type]
+    else:
+        found = _fit_function(read, task, options)  # type: ignore[arg-type]
+    counts = {"rows": read.rows, "used": read.used, "blank": read.blank, "missed": read.missed}
+    people = read.table["participant"].nunique()
+    text = (
+        f"{data}: {read.used} of {counted(read.rows, 'row')} used ({read.blank} without a stimulus, "
+        f"{read.missed} without an answer), {counted(people, 'participant')}\n{found['answer']}"
+    )
+    emit({"file": data.name, "task": task, **found, **counts}, as_json, text)
+
+
+def _refuse_others(task: str, options: dict[str, Any]) -> None:
+    """An option that this task does not have would be passed over in silence."""
+    others = {name for names in OWN.values() for name in names} - set(OWN[task])
+    given = sorted(name for name in others if options[name] not in (None, ()))
+    if given:
+        raise AnalysisError(f"expected no --{given[0].replace('_', '-')} with --task {task}; leave it out")
+    if "level" in OWN[task] and options["level"] is None:
+        raise AnalysisError(f"expected --level with --task {task}: the column of the stimulus level")
+
+
+def _read(data: Path, task: str, options: dict[str, Any]) -> Trials | ForeignAnswers:
+    from study.analysis.foreign.answers import AnswerColumns, read_preferences, read_ratings
+    from study.analysis.foreign.trials import Columns, read_trials
+
+    shared = {name: options[name] for name in ("answer", "participant", "decimal")}
+    shared |= {"yes": tuple(options["yes"]), "where": _pairs(options["where"])}
+    needed = [options[name] for name in COLUMNS if options[name]] + [name for name, _ in shared["where"]]
+    try:
+        table = read_table(data, tuple(needed), options["delimiter"])
+        if task in ("preference", "rating"):
+            own = {name: options[name] for name in ("first", "second", "method", "motion", "item")}
+            rated = {"scale": _scale(options["scale"]), "ends": options["ends"]}
+            named = AnswerColumns(**shared, **own, **rated, tie=tuple(options["tie"]))
+            return (read_preferences if task == "preference" else read_ratings)(table, named)
+        levels = {name: options[name] for name in ("level", "shown", "order")}
+        return read_trials(table, Columns(**shared, **levels), task)
+    except AnalysisError as error:
+        raise AnalysisError(f"{data}: {error}") from error

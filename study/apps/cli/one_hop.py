@@ -1,0 +1,323 @@
+"""`segue one-hop` (build, show, play): optimal one-hop transitions, Koyama & Goto 2019."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.cli.clips import clips_options, find_entry, load_clip
+from study.apps.cli.console import emit, json_option, progress, say
+from study.counting import counted
+
+if TYPE_CHECKING:
+    from study.motion.clip import Clip
+    from study.transitions.one_hop.problem import OffsetArray, Settings, Switch
+    from study.transitions.one_hop.table import OneHopTable
+
+TABLE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.group("one-hop")
+def one_hop() -> None:
+    """Transitions by an intermediate clip, the best for every triggered frame (Koyama & Goto 2019)."""
+
+
+def load_clips(specs: tuple[str, ...], library: str | None, fps: float) -> tuple[Clip, ...]:
+    """Clips as `load_clip` takes them, on the body of the first, named by file or motion."""
+    from dataclasses import replace
+
+    from study.apps.cli.clips import on_body_of
+
+    names = [Path(spec).stem if Path(spec).is_file() else spec for spec in specs]
+    if len(set(names)) < len(names):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        raise click.UsageError(f"expected clips with names of their own, found {', '.join(twice)} more than once.")
+    clips = [replace(load_clip(spec, library, fps), name=name) for spec, name in zip(specs, names, strict=True)]
+    return tuple(on_body_of(clips[0], clip) for clip in clips)
+
+
+def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> list[tuple[int, int]]:
+    """Source and destination numbers; all ordered pairs where none is named."""
+    names = [clip.name for clip in clips]
+    for name in {name for pair in pairs for name in pair}:
+        if name not in names:
+            raise click.UsageError(f"expected --pair with names of the clips ({', '.join(names)}), found {name!r}.")
+    if pairs:
+        return [(names.index(source), names.index(destination)) for source, destination in pairs]
+    return [(a, b) for a in range(len(clips)) for b in range(len(clips)) if a != b]
+
+
+@one_hop.command()
+@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
+@clips_options
+@click.option(
+    "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.npz, or X.bin and X.json."
+)
+@click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Work at this rate.")
+@click.option(
+    "--pair", "pairs", type=(str, str), multiple=True, metavar="SRC DST", help="A transition; all unless given."
+)
+@click.option(
+    "--offset", type=int, help="Frame of SRC at which DST stands with its first frame (music); 0 unless given."
+)
+@click.option(
+    "--start", type=click.IntRange(min=0), help="Instead: the frame of DST that belongs to the triggered frame."
+)
+@click.option("--blend", type=click.IntRange(min=1), help="Frames of each blend; 0.5 s unless given.")
+@click.option("--stay", type=click.IntRange(min=0), help="Longest stay in source and hop, frames; 1 s unless given.")
+@click.option("--longest", type=click.IntRange(min=1), help="Longest transition, frames, both blends included.")
+@click.option("--weight", type=click.FloatRange(min=0), help="Cost a frame of stay; found as in Eq. 5 unless given.")
+@click.option("--times", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Multiply that weight.")
+@click.option("--seed", type=int, default=0, show_default=True, help="For the weight of Eq. 5.")
+@click.option("--distance", type=click.Choice(["pointcloud", "joint"]), default="pointcloud", show_default=True)
+@click.option("--adaptive", is_flag=True, help="Blend lengths by the geodesic method of 2004; needs --weight.")
+@click.option("--on-beat", is_flag=True, help="Keep beats on beats; they are found in the motions, or see --beats.")
+@click.option(
+    "--beats", type=(str, TABLE), multiple=True, metavar="CLIP FILE", help="Times of a clip's beats, seconds."
+)
+@click.option("--near-direct", type=click.IntRange(min=0), help="The hop is DST, at most so many frames out of place.")
+@click.option("--workers", type=click.IntRange(min=1), help="Threads; one a core unless given.")
+@click.option("--memory-gb", type=click.FloatRange(min=0.05), default=2.0, show_default=True, help="Work in so much.")
+@json_option
+def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as_json: bool, **options: Any) -> None:
+    """Find the best transition between CLIPs for every triggered frame, and keep them in a table.
+
+    Clips are motion files, or names of motions in --library. All of them may be hops. Interrupted work goes on from
+    where it was with the same command.
+    """
+    import numpy as np
+
+    from study.files import check_place
+    from study.transitions.one_hop.table import write_table
+
+    if out.suffix not in (".npz", ".bin", ".json"):
+        raise click.UsageError(f"expected --out as a name that ends in .npz, .bin or .json, found {str(out)!r}.")
+    loaded = load_clips(clips, library, fps)
+    check_place(out)
+    options["known_beats"] = known_beats(clips, library, loaded)
+    table = build_adaptive_table(loaded, options) if options["adaptive"] else build_fixed_table(loaded, out, options)
+    files = write_table(table, out)
+    both = np.isfinite(table.costs) & np.isfinite(table.direct_costs)
+    result = {
+        "files": [str(file) for file in files],
+        "transitions": len(table.rows),
+        "entries": len(table.entries),
+        "found": int((table.entries[:, 0] >= 0).sum()),
+        "bytes": int(table.entries.nbytes),
+        "weight": table.weight,
+        "mean_cost": float(table.costs[both].mean()) if both.any() else None,
+        "mean_direct_cost": float(table.direct_costs[both].mean()) if both.any() else None,
+    }
+    text = (
+        f"{', '.join(map(str, files))}: {counted(len(table.rows), 'transition')}, {result['found']} of "
+        f"{counted(len(table.entries), 'triggered frame')}, {counted(table.entries.nbytes, 'byte')}, weight "
+        f"{table.weight:.4g} a frame"
+    )
+    if both.any():
+        text += f"; mean cost {result['mean_cost']:.4g}, direct {result['mean_direct_cost']:.4g}"
+    emit(result, as_json, text)
+
+
+def switches_of(clips: tuple[Clip, ...], options: dict[str, Any]) -> tuple[Switch, ...]:
+    """The transitions that the options ask for."""
+    from study.transitions.one_hop.problem import Alignment, Switch
+
+    if options["offset"] is not None and options["start"] is not None:
+        raise click.UsageError("expected either --offset or --start; give one of them.")
+    offset = (options["offset"] or 0) if options["start"] is None else None
+    alignment = Alignment(offset, options["start"])
+    return tuple(Switch(a, b, alignment) for a, b in pairs_of(options["pairs"], clips))
+
+
+def settings_of(fps: float, options: dict[str, Any]) -> Settings:
+    """Blend and stays from the options."""
+    from study.transitions.one_hop.problem import Settings
+
+    usual = Settings.at(fps)
+    blend = options["blend"] or usual.blend_frames
+    stay = usual.longest_stay_source if options["stay"] is None else options["stay"]
+    longest = options["longest"]
+    if longest is not None and longest < 2 * blend:
+        raise click.UsageError(f"expected --longest of at least two blends, {2 * blend} frames, found {longest}.")
+    return Settings(blend, stay, stay, None if longest is None else longest - 2 * blend)
+
+
+def build_fixed_table(clips: tuple[Clip, ...], out: Path, options: dict[str, Any]) -> OneHopTable:
+    """The search of the paper, with the variants that leave its structure as it is."""
+    from numpy.random import default_rng
+
+    from study.transitions.one_hop.build import build_table
+    from study.transitions.one_hop.default_weight import default_weight
+    from study.transitions.one_hop.joint_distance import JointDistance
+    from study.transitions.one_hop.problem import Distance, PointCloudDistance, Problem, weight_in_counts
+
+    settings, memory = settings_of(clips[0].fps, options), int(options["memory_gb"] * 2**30)
+    distance: Distance = JointDistance() if options["distance"] == "joint" else PointCloudDistance()
+    switches = switches_of(clips, options)
+    offsets = beat_offsets(clips, switches, options)
+    weight = options["weight"]
+    if weight is None:
+        rng = default_rng(options["seed"])
+        found = default_weight(
+            clips, rng, settings=settings, distance=distance, workers=options["workers"], memory_bytes=memory
+        )
+        weight = found.weight
+        means = f"{found.without_stays:.4g} without stays, {found.with_stays:.4g} with"
+        say(f"weight of Eq. 5: {weight:.4g} a frame ({means})")
+    counts = weight_in_counts(weight * options["times"], distance)
+    problem = Problem(
+        clips, switches, settings, counts, distance, offsets=offsets, nearest_to_direct=options["near_direct"]
+    )
+    with progress("hops") as report:
+        return build_table(
+            problem,
+            workers=options["workers"],
+            memory_bytes=memory,
+            checkpoint=out.with_name(f"{out.stem}.unfinished.npz"),
+            progress=lambda done, total: report(done / total, f"{done} of {total}"),
+        )
+
+
+def build_adaptive_table(clips: tuple[Clip, ...], options: dict[str, Any]) -> OneHopTable:
+    """Blend lengths by the geodesic method."""
+    from study.transitions.one_hop.adaptive import build_adaptive
+    from study.transitions.one_hop.problem import Settings
+
+    if options["weight"] is None:
+        raise click.UsageError("expected --weight with --adaptive, squared radians a frame, such as 0.0005.")
+    for name in ("longest", "on_beat", "near_direct", "blend"):
+        if options[name]:
+            raise click.UsageError(
+                f"expected no --{name.replace('_', '-')} with --adaptive; it has no part in that search."
+            )
+    stay = Settings.at(clips[0].fps).longest_stay_source if options["stay"] is None else options["stay"]
+    weight = options["weight"] * options["times"]
+    return build_adaptive(clips, switches_of(clips, options), weight, settings=Settings(1, stay, stay))
+
+
+def known_beats(specs: tuple[str, ...], library: str | None, clips: tuple[Clip, ...]) -> list[OffsetArray]:
+    """The frames of each clip's beats as `library.toml` says them; empty where it says none."""
+    from study.transitions.one_hop.beats import beats_at
+
+    times = [find_entry(spec, library)[1].beats for spec in specs]
+    return [beats_at([t - clip.start_s for t in said], clip) for said, clip in zip(times, clips, strict=True)]
+
+
+def beat_offsets(
+    clips: tuple[Clip, ...], switches: tuple[Switch, ...], options: dict[str, Any]
+) -> dict[tuple[int, int], OffsetArray]:
+    """The offsets of a beat-aware search; none where it is not asked for."""
+    from study.transitions.one_hop.beats import all_beat_offsets, find_beats, read_beats
+
+    given = dict(options["beats"])
+    names = [clip.name for clip in clips]
+    if unknown := sorted(set(given) - set(names)):
+        raise click.UsageError(f"expected --beats for clips that are given ({', '.join(names)}), found {unknown[0]!r}.")
+    if not given and not options["on_beat"]:
+        return {}
+    known = options["known_beats"]
+    beats = {
+        number: read_beats(given[clip.name], clip)
+        if clip.name in given
+        else (known[number] if len(known[number]) else find_beats(clip))
+        for number, clip in enumerate(clips)
+    }
+    return all_beat_offsets(beats, [switch.source for switch in switches], range(len(clips)))
+
+
+@one_hop.command()
+@click.argument("table", type=TABLE)
+@click.option("--at", "places", type=(str, str, int), multiple=True, metavar="SRC DST FRAME", help="Show this entry.")
+@json_option
+def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -> None:
+    """What a table holds, and single entries of it."""
+    from study.transitions.one_hop.table import header, read_table
+
+    held = read_table(table)
+    entries = []
+    lines = [
+        f"{table}: {counted(len(held.entries), 'entry', 'entries')} of {', '.join(held.columns)}; "
+        f"{counted(len(held.clips), 'clip')} at "
+        f"{held.fps:g} fps, blends of {held.blend_frames or 'their own'} frames, weight {held.weight:.4g}",
+        *(
+            f"{held.clips[row.source]} to {held.clips[row.destination]}: frames {row.first_trigger} to "
+            f"{row.first_trigger + row.triggers - 1}"
+            for row in held.rows
+        ),
+    ]
+    for source, destination, frame in places:
+        a, b = held.number(source), held.number(destination)
+        entry, position = held.look_up(a, b, frame), held.position(a, b, frame)
+        said: dict[str, Any] = {"source": source, "destination": destination, "frame": frame, "hop": None}
+        if entry is None:
+            lines.append(f"{source} {frame} to {destination}: none fits in the clips")
+        else:
+            said |= {name: int(value) for name, value in zip(held.columns, held.entries[position], strict=True)}
+            said |= {"hop": held.clips[entry.hop], "cost": float(held.costs[position])}
+            said["direct_cost"] = float(held.direct_costs[position])
+            lines.append(
+                f"{source} {frame} to {destination}: stay {entry.stay_source}, hop {said['hop']} at offset "
+                f"{entry.offset}, stay {entry.stay_hop}; cost {said['cost']:.4g}, direct {said['direct_cost']:.4g}"
+            )
+        entries.append(said)
+    emit({**header(held), "shown": entries}, as_json, "\n".join(lines))
+
+
+@one_hop.command()
+@click.argument("table", type=TABLE)
+@click.argument("clips", metavar="[CLIP...]", nargs=-1)
+@clips_options
+@click.option("--first", metavar="CLIP", help="The state to start in; the first clip unless given.")
+@click.option("--trigger", "triggers", type=(int, str), multiple=True, metavar="FRAME DST", help="Go to DST then.")
+@click.option("--method", type=click.Choice(["one-hop", "direct"]), default="one-hop", show_default=True)
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png.")
+@json_option
+def play(
+    table: Path,
+    clips: tuple[str, ...],
+    library: str | None,
+    first: str | None,
+    triggers: tuple[tuple[int, str], ...],
+    method: str,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Play clips as the states of a machine, with transitions from a table, and write the motion.
+
+    CLIPs are the table's, in its order; where none are given, motions of --library by the table's names.
+    """
+    from study.motion.bvh import write_bvh
+    from study.motion.drawing import draw_clip
+    from study.transitions.one_hop.play import Trigger
+    from study.transitions.one_hop.play import play as play_machine
+    from study.transitions.one_hop.strip import draw_played
+    from study.transitions.one_hop.table import read_table
+
+    held = read_table(table)
+    loaded = load_clips(clips or held.clips, library, held.fps)
+    wishes = [Trigger(frame, held.number(name)) for frame, name in triggers]
+    start = 0 if first is None else held.number(first)
+    played = play_machine(loaded, held, wishes, first=start, method=method)
+    if out.suffix.lower() == ".bvh":
+        write_bvh(played.clip, out)
+    elif out.suffix.lower() == ".png":
+        draw_played(played, out)
+    else:
+        draw_clip(played.clip, out)
+    segments = [
+        {
+            "kind": part.kind,
+            "clip": held.clips[part.clip],
+            "start": part.start,
+            "stop": part.stop,
+            "clip_start": part.clip_start,
+        }
+        for part in played.segments
+    ]
+    lines = [
+        f"{part['start']:6} {part['kind']:6} {part['clip']} from its frame {part['clip_start']}" for part in segments
+    ]
+    result = {"file": str(out), "frames": played.clip.frames, "method": method, "segments": segments}
+    emit(result, as_json, "\n".join([f"{out}: {counted(played.clip.frames, 'frame')}", *lines]))

@@ -1,0 +1,188 @@
+"""The verb `segue play`: a participant's session in a window on this machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.cli.console import database_option, emit, json_option, library_option, say
+from study.apps.cli.study import OUT, check_database, load_for_people, prepare_stimuli, results_folder
+from study.counting import counted
+
+if TYPE_CHECKING:
+    from renderer.window import Window
+    from study.apps.player.loop import Outcome
+    from study.apps.player.pages import Look
+    from study.apps.player.store import Store
+    from study.experiment.plan import Plan
+    from study.experiment.protocol.whole import Protocol
+    from study.experiment.session import Session
+    from study.experiment.stimuli.stimulus import StimulusSet
+    from study.experiment.store.responses import Responses
+
+
+@click.command()
+@click.argument("protocol")
+@click.option("--participant", required=True, metavar="ID", help="Who takes part, such as p01; the same ID goes on.")
+@click.option("--group", type=click.IntRange(min=0), default=0, show_default=True, help="For orders by group.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of the trials' order, instead of the protocol's own.")
+@library_option
+@OUT
+@database_option
+@click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Whose full screen it takes.")
+@click.option("--windowed", is_flag=True, help="In a window, not on the full screen.")
+@click.option("--size", default="1280x800", show_default=True, metavar="WIDTHxHEIGHT", help="Of the window.")
+@click.option("--actual-size", is_flag=True, help="Show stimuli in the protocol's pixels, not as large as fits.")
+@click.option("--font", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="For other scripts.")
+@json_option
+def play(
+    protocol: str,
+    participant: str,
+    group: int,
+    seed: int | None,
+    library: str | None,
+    out: Path | None,
+    database: str | None,
+    monitor: int,
+    windowed: bool,
+    size: str,
+    actual_size: bool,
+    font: Path | None,
+    as_json: bool,
+) -> None:
+    """A session in a window: stimuli drawn live, every flip timed, every answer stored before the next trial.
+
+    Stopped or killed, the same command goes on where it was. Escape asks whether to stop.
+    """
+    from renderer.window import check_display
+    from study.experiment.stimuli.prepare import record
+    from study.experiment.store.responses import open_responses
+
+    pixels = _size(size)
+    check_display(monitor)
+    loaded = load_for_people(protocol)
+    stimuli = prepare_stimuli(loaded, library)
+    folder = results_folder(loaded, out)
+    check_database(database, stimuli)
+    record(stimuli, folder)
+    with open_responses(database or folder) as responses:
+        plan = the_plan(responses, loaded, stimuli, participant, seed, group)
+        place = Place(pixels if windowed else None, monitor, not actual_size, font)
+        outcome, window = _sit(responses, loaded, stimuli, plan, place)
+    where = {"folder": str(folder), "database": responses.place}
+    result = {**asdict(outcome), "participant": participant, **where, "window": window}
+    emit(
+        result,
+        as_json,
+        f"{participant}: {outcome.end}; {counted(outcome.answers, 'answer')} stored now, in {responses.place}",
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    wide, _, high = text.partition("x")
+    if not (wide.isdigit() and high.isdigit() and int(wide) >= 320 and int(high) >= 240):
+        raise click.UsageError(f"expected --size as WIDTHxHEIGHT of at least 320x240 pixels, found {text!r}.")
+    return int(wide), int(high)
+
+
+def the_plan(
+    responses: Responses, protocol: Protocol, stimuli: StimulusSet, participant: str, seed: int | None, group: int
+) -> Plan:
+    """The stored plan of a participant who was here before, else a new one: the same as `simulate` draws."""
+    from study.experiment.plan import draw_plan
+    from study.experiment.store.responses import find_session
+
+    known = find_session(responses, participant)
+    if known is None:
+        return draw_plan(protocol, stimuli.pairs, participant, seed, group=group)
+    if seed is not None and seed != known.plan.seed:
+        raise click.UsageError(
+            f"expected --seed {known.plan.seed}, under which {participant!r} began, found {seed}; leave it out."
+        )
+    return known.plan
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a session is shown: the size of a window, or None for the full screen of a monitor; how pictures fit it."""
+
+    window_size: tuple[int, int] | None
+    monitor: int
+    fill: bool
+    font: Path | None
+
+
+def _sit(
+    responses: Responses, protocol: Protocol, stimuli: StimulusSet, plan: Plan, place: Place
+) -> tuple[Outcome, dict[str, Any]]:
+    """Open the window and walk the session."""
+    from renderer.window import open_window
+    from study.apps.player.calm import take_precedence
+    from study.apps.player.loop import Outcome, play
+    from study.apps.player.store import ResponsesStore
+    from study.experiment.session import open_session
+
+    store = ResponsesStore(responses, protocol, plan, stimuli.library, stimuli.synthetic)
+    answers, passed, finished = store.before()
+    if finished:
+        say(f"{plan.participant} has finished before; there is nothing left to do.")
+        return Outcome("finished", 0, 0, 0), {}
+    session = open_session(
+        protocol, plan, answers, passed=passed, frames={record.id: record.frames for record in stimuli.records}
+    )
+    if answers:
+        say(f"{plan.participant} goes on after {counted(len(answers), 'answer')}.")
+    look, size = page_look(stimuli, session, place.font), place.window_size
+    take_precedence()
+    with open_window(
+        protocol.texts.title, full_screen=size is None, size=size or (1280, 800), monitor=place.monitor
+    ) as window:
+        _tell_of_timing(window)
+        window.when_lost(lambda: _leave_a_lost_display(store))
+        return play(window, session, stimuli.stimulus, store, look, fill=place.fill, say=say), window.describe()
+
+
+def _leave_a_lost_display(store: Store) -> None:
+    """Nothing can be shown or asked any more: say so, and end at once."""
+    with suppress(Exception):  # what can be written down is
+        store.event("display lost")
+    say("segue: The display is gone. Every answer that was given is stored; the same command goes on from there.")
+    os._exit(2)
+
+
+def page_look(stimuli: StimulusSet, session: Session, font: Path | None) -> Look:
+    """Pages in the colours of the stimuli's background, in fonts that have all letters of the session's texts."""
+    from study.apps.player.lettering import fonts_for
+    from study.apps.player.pages import Look
+
+    protocol = session.protocol
+    parts = protocol.model_dump(include={"consent", "form", "texts", "studies"})
+    texts = [*_strings(parts), *(step.text for step in session.steps)]
+    return Look(stimuli.stimuli[0].figure.background, fonts_for(texts, font))
+
+
+def _strings(data: Any) -> Iterator[str]:
+    """All texts in nested lists and tables."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict | list | tuple):
+        for one in data.values() if isinstance(data, dict) else data:
+            yield from _strings(one)
+
+
+def _tell_of_timing(window: Window) -> None:
+    pacing = window.pacing
+    if pacing.measured:
+        say(f"display: {pacing.refresh_hz:.2f} Hz; swaps wait for it")
+    else:
+        why = "reports no refresh rate" if pacing.reported_hz == 0 else "does not make swaps wait"
+        say(
+            f"display: it {why} (a virtual one?), so frames follow an own clock of {pacing.refresh_hz:g} Hz. "
+            "TIMING WAS NOT MEASURED in this session; its record says so."
+        )

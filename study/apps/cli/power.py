@@ -1,0 +1,261 @@
+"""`segue power`: participants that a protocol needs, by simulation through its real plan and the real analysis."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.cli.console import emit, json_option, library_option, progress
+from study.counting import counted, noun
+from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    from study.experiment.plan import Plan
+    from study.experiment.protocol.whole import Protocol, StudySpec
+    from study.power.curve import Power, Run
+    from study.power.design import Design
+
+AT_ONCE = 250
+"""Studies drawn and analysed together: enough to be fast, few enough for little memory."""
+
+
+def plans_of(protocol: Protocol, library: str | None, participants: int) -> tuple[Plan, ...]:
+    """The real plans of this many participants."""
+    from study.apps.cli.study import prepare_stimuli
+    from study.experiment.plan import draw_plan
+
+    pairs = prepare_stimuli(protocol, library).pairs
+    return tuple(draw_plan(protocol, pairs, f"power-{place:03}", group=place) for place in range(participants))
+
+
+def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
+    """The study asked for, or the only one.
+
+    Raises
+    ------
+    AnalysisError
+        When there is more than one to choose from, or none of that name.
+    """
+    names = ", ".join(study.name for study in protocol.studies)
+    if name is None:
+        if len(protocol.studies) > 1:
+            raise AnalysisError(f"{protocol.name}: expected --study with one of {names}")
+        return protocol.studies[0]
+    for study in protocol.studies:
+        if study.name == name:
+            return study
+    raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
+
+
+def planned(
+    protocol: Protocol, study: StudySpec, plans: tuple[Plan, ...], options: Mapping[str, Any]
+) -> tuple[Run, dict[str, Any]]:
+    """What is simulated, and in words and numbers what is looked for: `effect`, `icc`, `test`, `aim`."""
+    from study.analysis.exclusions import rules_of
+    from study.power import design as made
+
+    alpha, missed = protocol.analysis.alpha, options["missed"]
+    rules = rules_of(protocol.analysis.exclusions.model_dump())
+
+    def design(settings: Any) -> Design:
+        return made.Design(protocol, study, plans, settings, rules)
+
+    if study.task == "preference":
+        effect = {key: options[key] for key in ("share", "correlation", "order_bias")}
+        settings = made.preference_observer(study, **effect, missed=missed)
+        run = made.preference_study(design(settings), alpha, options["share"])
+        said = {
+            "icc": options["correlation"],
+            "test": f"Student's t over participants at {alpha:g}",
+            "aim": f"find a preference of {100 * options['share']:g}% at the level {alpha:g}",
+        }
+        verdict = _preference_verdict(study.name, options["share"], alpha)
+    elif study.task == "rating":
+        effect = {key: options[key] for key in ("difference", "correlation")}
+        settings = made.rating_observer(study, **effect, missed=missed)
+        run = made.rating_study(design(settings), alpha, options["difference"])
+        said = {
+            "icc": options["correlation"],
+            "test": f"Student's t of participants' {'mean scores' if study.paired else 'differences'} at {alpha:g}, "
+            "one question",
+            "aim": f"find a difference of {options['difference']:g} points in one question at the level {alpha:g}",
+        }
+        made_verdict = _pair_rating_verdict if study.paired else _rating_verdict
+        verdict = made_verdict(study, options["difference"], alpha)
+    else:
+        effect = {key: options[key] for key in ("shorter", "longer", "spread", "precision")}
+        settings = made.same_different_observer(options["shorter"], options["longer"], options["spread"], missed)
+        run = made.same_different_study(design(settings), options["precision"], protocol.analysis.threshold)
+        said = {
+            "icc": None,
+            "test": "width of the differencing model's 95% intervals",
+            "aim": f"tell both thresholds to ± {options['precision']:g} frames",
+        }
+        verdict = _threshold_verdict(study.name, options["precision"])
+    if options["sessions"]:
+        run = made.whole_sessions(design(settings), verdict)
+    return run, {"effect": {**effect, "missed": missed}, **said}
+
+
+def _preference_verdict(name: str, share: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        compared = result["preference"].get(name)
+        test = compared[0]["participants"] if compared else None
+        if test is None or test["p_value"] is None:
+            return False
+        return test["p_value"] < alpha and (share == 0.5 or (test["mean_percent"] > 50) == (share > 0.5))
+
+    return found
+
+
+def _rating_verdict(study: StudySpec, difference: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        questions = result["rating_anova"].get(study.name) or []
+        test = questions[0]["difference"] if questions else None
+        if test is None or test["p_value"] is None:
+            return False
+        # Differences are of the later method by name from the earlier; the effect is of the comparison.
+        sign = 1 if str(test["of"]).startswith(f"{study.comparison} minus") else -1
+        return test["p_value"] < alpha and (difference == 0 or (sign * test["mean"] > 0) == (difference > 0))
+
+    return found
+
+
+def _pair_rating_verdict(study: StudySpec, difference: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        questions = result["pair_ratings"].get(study.name) or []
+        test = questions[0]["participants"] if questions else None
+        if test is None or test["p_value"] is None:
+            return False
+        return test["p_value"] < alpha and (difference == 0 or (test["t"] > 0) == (difference > 0))
+
+    return found
+
+
+def _threshold_verdict(name: str, precision: float) -> Callable[[Mapping[str, Any]], bool]:
+    def found(result: Mapping[str, Any]) -> bool:
+        model = (result["jnd"].get(name) or {}).get("model")
+        ends = [threshold["interval"] for threshold in model["jnd"].values()] if model else []
+        known = [end for end in ends if end["low"] is not None and end["high"] is not None]
+        return bool(ends) and len(known) == len(ends) and all(e["high"] - e["low"] <= 2 * precision for e in known)
+
+    return found
+
+
+def _sizes(text: str) -> list[int]:
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError as error:
+        raise AnalysisError(f"expected --participants as numbers such as 10,20,40, found {text!r}") from error
+
+
+@click.command()
+@click.argument("protocol")
+@click.option("--study", "name", help="Name of the study; the only one unless given.")
+@click.option("--participants", default="8,12,16,24,35,50", show_default=True, help="Numbers to try.")
+@click.option("--target", type=click.FloatRange(0, 1, True, True), default=0.8, show_default=True, help="Power.")
+@click.option("--share", type=click.FloatRange(0, 1, True, True), default=0.65, show_default=True,
+              help="Preference: true share for the first method.")  # fmt: skip
+@click.option("--correlation", type=click.FloatRange(0, 0.9), default=0.1, show_default=True,
+              help="Preference, rating: intraclass correlation of a participant's answers.")  # fmt: skip
+@click.option("--order-bias", type=float, default=0.1, show_default=True, help="Preference: logits for the first.")
+@click.option("--difference", type=float, default=0.7, show_default=True,
+              help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
+@click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=8.0, show_default=True,
+              help="Same-different: true threshold, frames shorter.")  # fmt: skip
+@click.option("--longer", type=click.FloatRange(min=0, min_open=True), default=7.0, show_default=True,
+              help="Same-different: true threshold, frames longer.")  # fmt: skip
+@click.option("--spread", type=click.FloatRange(0, 1), default=0.15, show_default=True,
+              help="Same-different: how participants differ.")  # fmt: skip
+@click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
+              help="Same-different: half the width asked of the 95% intervals, frames.")  # fmt: skip
+@click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=0.005, show_default=True,
+              help="Share of answers missed by inattention, besides those that come too late.")  # fmt: skip
+@click.option("--studies", type=click.IntRange(min=10), help="Simulated studies.  [default: 1000; thresholds 200]")
+@click.option("--sessions", is_flag=True, help="Through whole sessions and the whole analysis: slow, and the same.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
+              help="Results folder that gets power_STUDY.json and .csv; its report shows them.")  # fmt: skip
+@library_option
+@json_option
+def power(
+    protocol: str,
+    name: str | None,
+    participants: str,
+    library: str | None,
+    out: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """How many participants a protocol needs, at stated effects, by simulation."""
+    from study.analysis.estimates import plain
+    from study.apps.cli.study import load
+    from study.files import check_place
+    from study.power.curve import power_curve
+
+    checked, sizes = load(protocol), _sizes(participants)
+    study = chosen_study(checked, name)
+    if out is not None:
+        check_place(out / f"power_{study.name}.json")
+    plans = plans_of(checked, library, max(sizes))
+    run, said = planned(checked, study, plans, options)
+    slow = options["sessions"] or study.task == "same-different"
+    studies = options["studies"] or (200 if slow else 1000)
+    with progress("studies") as report:
+        found = power_curve(
+            run,
+            sizes,
+            studies=studies,
+            target=options["target"],
+            seed=options["seed"],
+            at_once=10 if slow else AT_ONCE,
+            progress=lambda done, total: report(done / total, f"{done} of {total}"),
+        )
+    answers = sum(trial.study == study.name and trial.role == "trial" for trial in plans[0].trials)
+    through = "whole sessions" if options["sessions"] else "plan, observers, exclusions and default test"
+    named = {"protocol": checked.name, "study": study.name, "task": study.task}
+    made = {"simulations": studies, "through": through, "seed": options["seed"], "answers_per_participant": answers}
+    result = {**named, **said, **plain(found), **made}
+    if out is not None:
+        _write(out, result)
+    emit(result, as_json, _in_words(found, said["aim"], answers))
+
+
+def _write(folder: Path, result: Mapping[str, Any]) -> None:
+    """The result as JSON, and its curve as CSV."""
+    from study.files import write_whole
+
+    stem = folder / f"power_{result['study']}"
+    write_whole(stem.with_suffix(".json"), json.dumps(result, indent=1, ensure_ascii=False) + "\n")
+    rows = io.StringIO()
+    table = csv.writer(rows)
+    table.writerow(
+        ["study", "participants", "power", "low", "high", "simulations", "icc", "test", *result["effect"].keys()]
+    )
+    for point in result["points"]:
+        numbers = [point["participants"], point["power"], point["interval"]["low"], point["interval"]["high"]]
+        known = [result["simulations"], result["icc"], result["test"], *result["effect"].values()]
+        table.writerow([result["study"], *numbers, *known])
+    write_whole(stem.with_suffix(".csv"), rows.getvalue())
+
+
+def _in_words(found: Power, aim: str, answers: int) -> str:
+    """The curve as a table with bars, and the number."""
+    lines = [f"{'participants':>12}  power  95% interval"]
+    for point in found.points:
+        low, high = point.interval.low or 0.0, point.interval.high or 0.0
+        bar = "#" * round(30 * point.power)
+        lines.append(f"{point.participants:12}  {point.power:5.2f}  {low:.2f} to {high:.2f}   {bar}")
+    who = counted(found.needed, "participant") if found.needed else "no number tried"
+    asked = noun(answers, "answer")
+    lines.append(
+        f"To {aim} in {100 * found.target:g}% of studies, {answers} {asked} each: {who}"
+        + (f" ({found.note})." if found.note else ".")
+    )
+    return "\n".join(lines)

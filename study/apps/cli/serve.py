@@ -1,0 +1,123 @@
+"""The verb `serve`: sessions in the browser."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+
+from study.apps.cli.console import database_option, library_option, say
+from study.apps.cli.study import (
+    OUT,
+    WORKERS,
+    check_database,
+    load_for_people,
+    prepare_stimuli,
+    render_stimuli,
+    results_folder,
+)
+
+
+@click.command()
+@click.argument("protocol")
+@library_option
+@OUT
+@WORKERS
+@database_option
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0 for all.")
+@click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="0 for any free one.")
+@click.option("--participants", type=click.IntRange(min=1), help="No more than so many; drop-outs are given back.")
+@click.option(
+    "--groups", type=click.IntRange(min=1), help="Groups to fill evenly; what the protocol needs unless given."
+)
+@click.option("--parameter", "parameters", multiple=True, metavar="NAME", help="Keep this parameter of the link, too.")
+@click.option("--completion-code", default="", help="Shown at the end.")
+@click.option("--completion-url", default="", metavar="URL", help="Where the last button leads.")
+@click.option(
+    "--researcher-token", envvar="SEGUE_RESEARCHER_TOKEN", help="Made up unless given; 16 characters or more."
+)
+@click.option("--behind-proxy", is_flag=True, help="Believe the proxy on this machine about https and addresses.")
+@click.option(
+    "--public-url",
+    "public_urls",
+    multiple=True,
+    metavar="URL",
+    help="Address that participants open, where its name is not this machine's own, as behind a proxy.",
+)
+@click.option("--root-path", default="", metavar="PATH", help="Where the proxy shows this study, such as /study.")
+def serve(
+    protocol: str,
+    library: str | None,
+    out: Path | None,
+    workers: int | None,
+    database: str | None,
+    host: str,
+    port: int,
+    participants: int | None,
+    groups: int | None,
+    parameters: tuple[str, ...],
+    completion_code: str,
+    completion_url: str,
+    researcher_token: str | None,
+    behind_proxy: bool,
+    public_urls: tuple[str, ...],
+    root_path: str,
+) -> None:
+    """Sessions in the browser. What is not rendered yet is rendered first; ends with Ctrl-C, and goes on from there.
+
+    A results folder that is rendered whole is served as it is, without --library, on any machine.
+    """
+    from study.apps.server.names import own_names
+    from study.apps.server.running import run
+    from study.apps.server.settings import Settings
+    from study.experiment.stimuli.rendering import rendered_before
+    from study.experiment.store.participants import new_token
+
+    checked = load_for_people(protocol)
+    folder = results_folder(checked, out)
+    if completion_url and not completion_url.startswith(("https://", "http://")):
+        raise click.UsageError(f"expected a completion URL that starts with https://, found {completion_url!r}.")
+    if root_path and not re.fullmatch(r"(/[\w.~-]+)+", root_path, re.ASCII):
+        raise click.UsageError(f"expected a path such as /study, without a slash at its end, found {root_path!r}.")
+    own_names(host, public_urls)  # refuses what is no address, before anything is rendered
+    settings = Settings(
+        researcher_token=new_token() if researcher_token is None else researcher_token,
+        most_participants=participants,
+        groups=groups,
+        completion_code=completion_code,
+        completion_url=completion_url,
+        parameters=(*Settings.parameters, *parameters),
+    )
+    rendered = None if library is not None else rendered_before(checked, folder)
+    if rendered is None:
+        stimuli = prepare_stimuli(checked, library)
+        check_database(database, stimuli)
+        render_stimuli(stimuli, folder, workers)
+    else:
+        check_database(database, rendered)
+
+    def started(address: str, place: str) -> None:
+        say(f"participants  {address}/")
+        # What is printed ends up in logs: a token of the researcher's own is not repeated.
+        token = f"#{settings.researcher_token}" if researcher_token is None else "  (asks for your token)"
+        say(f"researcher    {address}/researcher{token}")
+        say(f"answers       {place}")
+        if behind_proxy and not public_urls:
+            say(
+                "Only localhost, this machine's name and IP addresses are answered: give the proxy's with --public-url."
+            )
+        say("Ctrl-C ends it; the same command goes on from there.")
+
+    run(
+        checked,
+        folder,
+        settings,
+        host=host,
+        port=port,
+        behind_proxy=behind_proxy,
+        root_path=root_path,
+        database=database,
+        public_urls=public_urls,
+        started=started,
+    )

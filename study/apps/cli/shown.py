@@ -1,0 +1,55 @@
+"""What a protocol will show, as a table for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from study.apps.cli.console import columns
+from study.counting import counted
+
+if TYPE_CHECKING:
+    from study.experiment.protocol.whole import Protocol, StudySpec
+    from study.experiment.stimuli.outlook import Outlook, Place, Row
+
+HEADINGS = (
+    *("transition", "source", "frame", "s", "in file", "destination", "frame", "s", "in file"),
+    *("k", "s", "blends", "trials", "films", "seconds"),
+)
+
+
+def table_of(protocol: Protocol, outlook: Outlook) -> Iterator[str]:
+    """The rows of each study under its name, and a blank line at the end of each."""
+    for study in protocol.studies:
+        rows = [row for row in outlook.rows if row.study == study.name]
+        if rows:
+            yield _heading(protocol, study)
+            yield from columns([HEADINGS, *map(_cells, rows)], left=(0, 1, 5, 11))
+            yield from (f"  {row.transition}: {note}" for row in rows for note in row.notes)
+            yield ""
+
+
+def _heading(protocol: Protocol, study: StudySpec) -> str:
+    besides = [counted(study.practice, "practice trial")] if study.practice else []
+    besides += [counted(study.attention_checks, "attention check")] if study.attention_checks else []
+    trials = ", ".join([counted(protocol.trials_of(study), "trial"), *besides])
+    return f"{study.name}: {study.task}, {' and '.join(study.methods)}; {trials}; frames at {protocol.fps:g} fps"
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    shortest, longest = (f"{seconds:.2f}" for seconds in row.film_s)
+    return (
+        row.transition,
+        *_point(row.source),
+        *_point(row.destination),
+        str(row.k_frames),
+        f"{row.k_s:.2f}",
+        "; ".join(f"{method} {' '.join(map(str, lengths))}" for method, lengths in row.lengths.items()),
+        "practice" if row.trials is None else str(row.trials),
+        str(row.films),
+        shortest if shortest == longest else f"{shortest}-{longest}",
+    )
+
+
+def _point(place: Place) -> tuple[str, str, str, str]:
+    return place.motion, str(place.frame), f"{place.s:.2f}", f"{place.file_frame:.5g}"

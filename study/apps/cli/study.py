@@ -1,0 +1,317 @@
+"""The verbs of a study's life: check, render, simulate, analyse, report, and demo, which does them all."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from study.apps.cli.console import database_option, emit, json_option, library_option, progress, say
+from study.apps.cli.shown import table_of
+from study.counting import counted
+
+if TYPE_CHECKING:
+    from study.experiment.protocol.whole import Protocol
+    from study.experiment.stimuli.rendering import Manifest
+    from study.experiment.stimuli.stimulus import StimulusSet
+
+RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
+OUT = click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=None,
+    help="Results folder; results/<name of the protocol> unless given.",
+)
+SHARE = click.FloatRange(0.0, 1.0)
+WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes; one a core unless given.")
+
+
+def load(protocol: str) -> Protocol:
+    """A protocol by path, or by the name of one that comes with Segue."""
+    from study.experiment.protocol.whole import find_protocol, load_protocol
+
+    return load_protocol(find_protocol(protocol))
+
+
+def load_for_people(protocol: str) -> Protocol:
+    """A protocol that people are about to read; what has still to be written in it is said on standard error."""
+    from study.experiment.protocol.proofreading import to_do
+
+    loaded = load(protocol)
+    for note in to_do(loaded):
+        say(f"to do: {note}")
+    return loaded
+
+
+def results_folder(protocol: Protocol, out: Path | None) -> Path:
+    """Where a run of a protocol goes."""
+    return out if out is not None else Path("results") / protocol.name
+
+
+def prepare_stimuli(protocol: Protocol, library: str | None) -> StimulusSet:
+    """All stimuli of a protocol, with progress on standard error."""
+    from study.experiment.stimuli.prepare import prepare
+    from study.motion.library import open_library
+
+    opened = open_library(library or "synthetic")
+    with progress("transitions") as report:
+        return prepare(protocol, opened, lambda done, total: report(done / total, f"{done} of {total}"))
+
+
+def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> dict[str, Any]:
+    """Render what is not rendered yet, with progress on standard error; the numbers for `--json`."""
+    from study.experiment.stimuli.rendering import render as render_all
+
+    with progress("videos") as report:
+        summary = render_all(
+            stimuli, folder, workers, lambda state: report(state.videos / max(state.videos_total, 1), str(state))
+        )
+    return {**asdict(summary), "folder": str(folder)}
+
+
+def check_database(database: str | None, stimuli: StimulusSet | Manifest) -> None:
+    """Refuse a database elsewhere that can't be opened, or is about other stimuli, before anything is rendered."""
+    from study.experiment.store.responses import open_responses, refuse_other_stimuli
+
+    if database is not None:
+        with open_responses(database) as responses:
+            refuse_other_stimuli(responses, [record.id for record in stimuli.records])
+
+
+def simulate_participants(
+    protocol: Protocol,
+    folder: Path,
+    participants: int,
+    seed: int | None = None,
+    database: str | None = None,
+    **goes_wrong: Any,
+) -> dict[str, Any]:
+    """Simulated sessions on the stimuli of a results folder; the numbers for `--json`.
+
+    `goes_wrong` are shares of the observers' settings, such as `missed`; the usual ones where they are left out.
+    """
+    from study.experiment.observers import default_observer
+    from study.experiment.observers import simulate as simulate_all
+    from study.experiment.stimuli.rendering import read_manifest
+    from study.experiment.store.responses import open_responses, refuse_other_stimuli
+
+    manifest = read_manifest(folder)
+    with open_responses(database or folder) as responses, progress("answers") as report:
+        refuse_other_stimuli(responses, [record.id for record in manifest.records])
+        summary = simulate_all(
+            protocol,
+            manifest,
+            responses,
+            participants,
+            protocol.seed if seed is None else seed,
+            lambda done, total: report(done / max(total, 1), f"{done} of {total}"),
+            settings=replace(default_observer(), **goes_wrong),
+        )
+    return {**asdict(summary), "folder": str(folder), "database": responses.place, "simulated": True}
+
+
+def analyse_results(folder: Path, database: str | None = None) -> dict[str, Any]:
+    """All analyses of a results folder, as its protocol decided."""
+    from study.analysis.analyse import analyse as analyse_all
+    from study.analysis.exclusions import rules_of
+    from study.experiment.protocol.whole import load_protocol
+    from study.experiment.stimuli.rendering import PROTOCOL
+    from study.experiment.store.responses import answers_frame, open_answers
+
+    protocol = load_protocol(folder / PROTOCOL)
+    settings = protocol.analysis
+    with open_answers(folder, database) as responses:
+        answers, checks = answers_frame(responses), answers_frame(responses, roles=("check",))
+    rules = rules_of(settings.exclusions.model_dump())
+    return analyse_all(
+        answers,
+        threshold=settings.threshold,
+        alpha=settings.alpha,
+        margin=settings.equivalence_points / 100.0,
+        family=settings.confirmatory or None,
+        rules=rules,
+        checks=checks,
+        scale_points=protocol.scale_points,
+    )
+
+
+def headlines(analysis: dict[str, Any]) -> list[str]:
+    """The answers of an analysis in sentences."""
+    from study.analysis.ratings.comparisons import anova_sentences
+    from study.analysis.ratings.pairs import pair_sentences
+
+    sentences = [study["answer"] for study in analysis["jnd"].values()]
+    sentences += [compared["answer"] for study in analysis["preference"].values() for compared in study]
+    for study in analysis["rating_anova"].values():
+        sentences += anova_sentences(study, analysis["alpha"])
+    for study in analysis["pair_ratings"].values():
+        sentences += pair_sentences(study, analysis["alpha"])
+    return sentences
+
+
+@click.command()
+@click.argument("protocol")
+@library_option
+@click.option("--texts", is_flag=True, help="Print all that participants read, too.")
+@json_option
+def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> None:
+    """Check a protocol before running it: what will be shown, every error, and any text that is still to be written.
+
+    Exit status 2 where something can't be shown.
+    """
+    from study.experiment.protocol.proofreading import to_do
+    from study.experiment.stimuli.outlook import look_ahead
+    from study.experiment.wording import all_texts
+    from study.motion.library import open_library
+
+    checked, opened = load(protocol), open_library(library or "synthetic")
+    found, notes = look_ahead(checked, opened), to_do(checked)
+    read = [asdict(one) for one in all_texts(checked, found.film_times)] if texts else []
+    lines = [f"{one['where']}\n    {one['text']}\n" for one in read]
+    lines += table_of(checked, found)
+    lines += found.problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]
+    lines.append(
+        f"A participant sees {counted(found.trials, 'trial')} made of {counted(found.films, 'film')} and takes about "
+        f"{counted(found.minutes, 'minute')}, {found.minutes_at_most} where every answer and every film takes its "
+        "longest; practice, breaks and reading are included."
+    )
+    lines += [f"Note: {note}" for note in found.notes]
+    lines += [f"To do: {note}" for note in notes]
+    result: dict[str, Any] = {"protocol": checked.name, "library": opened.name, "problems": found.problems}
+    result |= {"notes": [*found.notes, *notes], "minutes": found.minutes, "minutes_at_most": found.minutes_at_most}
+    result |= {"trials": found.trials, "films": found.films, "fps": checked.fps}
+    result |= {"shown": [asdict(row) for row in found.rows]} | ({"texts": read} if texts else {})
+    emit(result, as_json, "\n".join(lines))
+    if found.problems:
+        raise click.exceptions.Exit(2)
+
+
+@click.command()
+@click.argument("protocol")
+@library_option
+@OUT
+@WORKERS
+@json_option
+def render(protocol: str, library: str | None, out: Path | None, workers: int | None, as_json: bool) -> None:
+    """Render all stimuli of a protocol; what is rendered already is reused, so an interrupted run goes on."""
+    from study.experiment.stimuli.rendering import rendered_already
+    from study.motion.library import open_library
+
+    checked = load(protocol)
+    folder = results_folder(checked, out)
+    done = rendered_already(checked, open_library(library or "synthetic"), folder)
+    summary = (
+        {**asdict(done), "folder": str(folder)}
+        if done
+        else render_stimuli(prepare_stimuli(checked, library), folder, workers)
+    )
+    text = (
+        f"{summary['folder']}: {counted(summary['videos'], 'video')}, {counted(summary['frames'], 'frame')}, "
+        f"{summary['seconds']:.0f} s of motion; {summary['rendered']} rendered now, {summary['reused']} reused"
+    )
+    emit(summary, as_json, text)
+
+
+@click.command()
+@click.argument("protocol")
+@click.option("--participants", type=click.IntRange(min=1), help="How many in the end; the protocol's unless given.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of the observers' chance; the protocol's unless given.")
+@click.option(
+    "--missed", type=SHARE, default=0.005, show_default=True, help="Share of answers missed, slow ones apart."
+)
+@click.option("--badly-shown", type=SHARE, default=0.0, show_default=True, help="Share of showings that stall.")
+@click.option("--careless", type=SHARE, default=0.0, show_default=True, help="Share of participants who do not look.")
+@library_option
+@OUT
+@database_option
+@json_option
+def simulate(
+    protocol: str,
+    participants: int | None,
+    seed: int | None,
+    library: str | None,
+    out: Path | None,
+    database: str | None,
+    as_json: bool,
+    **goes_wrong: float,
+) -> None:
+    """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
+    from study.experiment.stimuli.rendering import MANIFEST, PROTOCOL, record
+    from study.files import read_text
+
+    checked = load(protocol)
+    folder, participants = results_folder(checked, out), participants or checked.participants
+    if participants is None:
+        raise click.UsageError("expected --participants, or participants in the protocol, found neither; give one.")
+    known = (folder / MANIFEST).exists() and read_text(folder / PROTOCOL, "a protocol file") == checked.text
+    if library is not None or not known:
+        stimuli = prepare_stimuli(checked, library)
+        check_database(database, stimuli)
+        record(stimuli, folder)
+    summary = simulate_participants(checked, folder, participants, seed, database, **goes_wrong)
+    text = (
+        f"{summary['folder']}: {counted(summary['participants'], 'simulated participant')}, "
+        f"{counted(summary['answers'], 'answer')} made now, {summary['found']} found"
+    )
+    emit(summary, as_json, text)
+
+
+@click.command()
+@click.argument("results", type=RESULTS)
+@database_option
+@json_option
+def analyse(results: Path, database: str | None, as_json: bool) -> None:
+    """Thresholds, preferences and ratings of a results folder."""
+    analysis = analyse_results(results, database)
+    emit(analysis, as_json, "\n".join(headlines(analysis)))
+
+
+@click.command()
+@click.argument("results", type=RESULTS)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the page, tables and figures; the results folder unless given.",
+)
+@database_option
+@json_option
+def report(results: Path, out: Path | None, database: str | None, as_json: bool) -> None:
+    """One self-contained HTML page, and its tables as CSV and JSON."""
+    from study.report.document import write_report
+
+    page = write_report(results, out=out, database=database)
+    emit({"report": str(page)}, as_json, str(page))
+
+
+@click.command()
+@OUT
+@WORKERS
+@click.option("--participants", type=click.IntRange(min=1), default=12, show_default=True, help="Simulated.")
+@json_option
+def demo(out: Path | None, workers: int | None, participants: int, as_json: bool) -> None:
+    """A small study end to end, with no screen and no network: stimuli, simulated observers, analysis, report."""
+    from study.report.document import write_report
+
+    protocol = load("demo")
+    folder = results_folder(protocol, out)
+    say("A small study on synthetic motions, answered by simulated observers; real ones take their place later.")
+    rendered = render_stimuli(prepare_stimuli(protocol, None), folder, workers)
+    simulated = simulate_participants(protocol, folder, participants)
+    analysis = analyse_results(folder)
+    page = write_report(folder)
+    lines = [
+        f"{counted(rendered['videos'], 'stimulus video')} ({counted(rendered['frames'], 'frame')}) in "
+        f"{folder / 'stimuli'}",
+        f"{counted(simulated['answers'] + simulated['found'], 'answer')} of "
+        f"{counted(participants, 'simulated participant')} "
+        f"in {folder / 'responses.sqlite'}",
+        *headlines(analysis),
+        f"The report: {page.resolve()}",
+    ]
+    emit(
+        {"render": rendered, "simulate": simulated, "analysis": analysis, "report": str(page)},
+        as_json,
+        "\n".join(lines),
+    )

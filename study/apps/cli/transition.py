@@ -1,0 +1,365 @@
+"""`segue blend-length` and `segue transition`: one transition between two clips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from study.apps.cli.clips import clip_pair, clips_options
+from study.apps.cli.console import emit, json_option
+from study.apps.cli.moments import in_words, moment
+from study.counting import counted
+
+if TYPE_CHECKING:
+    from study.motion.clip import Clip
+    from study.transitions.blend_length import BlendLength
+    from study.transitions.blending import Transition
+    from study.transitions.timewarp import WarpLength
+
+METHODS = ("fixed", "geodesic", "velocity", "timewarp")
+
+
+def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds the two clips, the frames that a transition joins, and the frame rate to a verb."""
+    for decorate in (
+        click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate."),
+        click.option("--end", type=click.IntRange(min=0), required=True, help="Last blended frame, in DST."),
+        click.option("--start", type=click.IntRange(min=0), required=True, help="First blended frame, in SRC."),
+        clips_options,
+        click.argument("destination", metavar="DST"),
+        click.argument("source", metavar="SRC"),
+    ):
+        command = decorate(command)
+    return command
+
+
+def weights_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds `--weights` to a verb."""
+    return click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)(
+        command
+    )
+
+
+def specification_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds `--specification` to a verb."""
+    return click.option(
+        "--specification",
+        type=click.Choice(["start-end", "centre", "left"]),
+        default="start-end",
+        show_default=True,
+        help="--start and --end are the blend's first and last frame, both its middle, or both its first.",
+    )(command)
+
+
+@click.command("blend-length")
+@clip_options
+@click.option("--method", type=click.Choice(METHODS), default="geodesic", show_default=True)
+@click.option("--fixed-frames", type=click.IntRange(min=1), help="For --method fixed; 0.33 s unless given.")
+@weights_option
+@specification_option
+@click.option("--printed-sum", is_flag=True, help="With timewarp: the undivided sum that Eqs. 5 and 6 print.")
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="X.png: the costs as a picture. X.csv: the costs as numbers.",
+)
+@json_option
+def blend_length(
+    source: str,
+    destination: str,
+    library: str | None,
+    start: int,
+    end: int,
+    fps: float,
+    method: str,
+    fixed_frames: int | None,
+    weights: str,
+    specification: str,
+    printed_sum: bool,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """How long to blend from frame --start of SRC to frame --end of DST (Wang & Bodenheimer 2004).
+
+    SRC and DST are motion files, or names of motions in --library.
+    """
+    from study.transitions.blend_length import blend_length as choose
+    from study.transitions.blend_length import major_joint_differences
+    from study.transitions.timewarp import warp_length
+
+    if out is not None and out.suffix.lower() not in (".png", ".csv"):
+        raise click.UsageError(f"expected --out as a name that ends in .png or .csv, found {str(out)!r}.")
+    first, second = clip_pair(source, destination, library, fps)
+    words = f"{source} frame {start} to {destination} frame {end}, {method}"
+    if method == "timewarp":
+        _check_timewarp(specification)
+        warped = warp_length(first, second, start, end, weights=weights, average=not printed_sum)
+        found: BlendLength | WarpLength = warped
+        windows = (warped.source_frames, warped.destination_frames)
+        result: dict[str, Any] = {"costs": warped.costs, "shortest": warped.shortest}
+        if out is not None:
+            show_warped(warped, fps, out, words)
+    else:
+        chosen = choose(
+            first,
+            second,
+            start,
+            end,
+            method=method,
+            fixed_frames=fixed_frames,
+            weights=weights,
+            specification=specification,
+        )
+        found, windows = chosen, (chosen.blend_frames, chosen.blend_frames)
+        result = {"costs": chosen.costs, "joint": chosen.joint, "unclipped_s": chosen.unclipped_s}
+        if out is not None:
+            show_lengths(first, second, (start, end), chosen, out, (weights, specification), words)
+    differences = major_joint_differences(first, second, start, end)
+    keys = {"blend_frames": found.blend_frames, "blend_s": found.blend_s, "cost": found.cost, "note": found.note}
+    keys |= {"source_frames": windows[0], "destination_frames": windows[1], "method": method, "fps": fps}
+    keys |= {**moment(first, start, "start"), **moment(second, end, "end")}
+    text = f"{counted(found.blend_frames, 'frame')} ({found.blend_s:.3f} s at {fps:g} fps), cost {found.cost:.5g}"
+    if windows[0] != windows[1]:
+        text += f", {windows[0]} of SRC over {windows[1]} of DST"
+    where = f"from {in_words(first, start, source)} to {in_words(second, end, destination)}"
+    lines = [f"{text}; {found.note}" if found.note else text, where]
+    lines += ["", "differences between the two frames, half angles:"]
+    lines += [f"  {role:12} {value:.4f}" for role, value in differences.items()]
+    result |= {**keys, "differences": differences, "file": None if out is None else str(out)}
+    emit(result, as_json, "\n".join(lines))
+
+
+def _check_timewarp(specification: str) -> None:
+    if specification != "start-end":
+        raise click.UsageError("expected --specification start-end with timewarp: its two windows differ in length.")
+
+
+@click.command()
+@clip_options
+@click.option("--method", type=click.Choice(METHODS), help="Choose the blend length by this method.")
+@click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
+@click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
+@specification_option
+@click.option(
+    "--joint", "joints", multiple=True, metavar="ROLE=FRAMES", help="Blend one joint shorter; can be repeated."
+)
+@click.option("--keep-slide", is_flag=True, help="Leave the feet as blending leaves them, sliding or not.")
+@click.option(
+    "--unit",
+    type=click.Choice(["m", "cm", "mm", "in"]),
+    help="Length unit of X.bvh; SRC's own unless given. Its frame rate is SRC's own, too, unless --fps is given.",
+)
+@click.option(
+    "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
+)
+@json_option
+def transition(
+    source: str,
+    destination: str,
+    library: str | None,
+    start: int,
+    end: int,
+    fps: float,
+    method: str | None,
+    frames: int | None,
+    weight: str,
+    specification: str,
+    joints: tuple[str, ...],
+    keep_slide: bool,
+    unit: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Blend from frame --start of SRC to frame --end of DST and write the result.
+
+    --start, --end and --frames are frames at --fps.
+    """
+    from study.motion.bvh import write_bvh
+    from study.motion.drawing import draw_clip
+    from study.motion.library_file import UNITS
+    from study.transitions.footskate import plant_feet
+    from study.transitions.rates import remade
+
+    if (method is None) == (frames is None):
+        raise click.UsageError("expected either --method or --frames; give one of them.")
+    first, second = clip_pair(source, destination, library, fps)
+    joined, found = join(first, second, (start, end), method, frames, weight, specification, joint_frames(joints))
+    points = {**moment(first, start, "start"), **moment(second, end, "end")}
+    where = f"from {in_words(first, start, source)} to {in_words(second, end, destination)}"
+    slide = {}
+    told = click.get_current_context().get_parameter_source("fps") is not ParameterSource.DEFAULT
+    if out.suffix.lower() == ".bvh" and not told and first.file_fps:
+        first, second = clip_pair(source, destination, library, first.file_fps, tell=False)
+        joined = remade(joined, first, second, weight=weight, joint_frames=joint_frames(joints))
+    if not keep_slide:
+        joined, planted = plant_feet(joined, first, second)
+        slide = {"slide_before_m": planted.slide_before_m, "slide_after_m": planted.slide_after_m}
+    if out.suffix.lower() == ".bvh":
+        write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
+    else:
+        draw_clip(joined.clip, out, blended=(joined.blend_start, joined.blend_stop))
+    rate = joined.clip.fps
+    result = {
+        "file": str(out),
+        "frames": joined.clip.frames,
+        "blend_frames": joined.blend_frames,
+        "blend_start": joined.blend_start,
+        "blend_stop": joined.blend_stop,
+        "blend_s": joined.blend_frames / rate,
+        "seconds": joined.clip.seconds,
+        "fps": rate,
+        **points,
+        "method": method,
+        "cost": None if found is None else found.cost,
+        "unclipped_s": getattr(found, "unclipped_s", None),
+        "note": "; ".join(filter(None, (joined.note, "" if found is None else found.note))),
+        "history": list(joined.clip.history),
+        **slide,
+    }
+    text = (
+        f"{out}: {counted(joined.clip.frames, 'frame')} ({joined.clip.seconds:.3f} s at {rate:g} fps), "
+        f"{joined.blend_frames} of them blended ({joined.blend_frames / rate:.3f} s), {where}; {result['note']}"
+    )
+    emit(result, as_json, text)
+
+
+def join(
+    source: Clip,
+    destination: Clip,
+    points: tuple[int, int],
+    method: str | None,
+    frames: int | None,
+    weight: str,
+    specification: str = "start-end",
+    shorter: dict[str, int] | None = None,
+) -> tuple[Transition, BlendLength | WarpLength | None]:
+    """The transition of so many frames, or as long as a method says, and what the method found.
+
+    `shorter` has blends of joints' own, by role.
+    """
+    from study.transitions.blend_length import blend_length as choose
+    from study.transitions.blending import blend
+    from study.transitions.timewarp import warp_length, warped_blend
+
+    if method == "timewarp":
+        _check_timewarp(specification)
+        if shorter:
+            raise click.UsageError("expected no --joint with timewarp: its joints share one warp.")
+        warped = warp_length(source, destination, *points)
+        windows = (warped.source_frames, warped.destination_frames)
+        return warped_blend(source, destination, *points, *windows, weight=weight), warped
+    chosen = None
+    if frames is None:
+        chosen = choose(source, destination, *points, method=method or "geodesic", specification=specification)
+        frames = chosen.blend_frames
+    made = blend(source, destination, *points, frames, weight=weight, specification=specification, joint_frames=shorter)
+    return made, chosen
+
+
+def joint_frames(given: Sequence[str]) -> dict[str, int]:
+    """`hip.L=5` and the like, as a mapping."""
+    from study.motion.joint_names import ROLES
+
+    found = {}
+    for text in given:
+        role, _, frames = text.partition("=")
+        if role not in ROLES or not frames.isdigit() or int(frames) < 1:
+            raise click.UsageError(
+                f"expected --joint as ROLE=FRAMES such as shoulder.L=6, found {text!r}; roles: {', '.join(ROLES)}."
+            )
+        found[role] = int(frames)
+    return found
+
+
+def show_lengths(
+    source: Clip,
+    destination: Clip,
+    points: tuple[int, int],
+    chosen: BlendLength,
+    out: Path,
+    options: tuple[str, str],
+    words: str,
+) -> None:
+    """The geodesic cost of each length, of all joints and of each (2004 Figures 2, 3, 5), as a picture or as CSV."""
+    import numpy as np
+
+    from study.transitions.blend_length import blend_length as choose
+    from study.transitions.blend_length import joint_costs
+    from study.transitions.distances import frame_distance
+    from study.transitions.weights import MAJOR_ROLES, joint_weights
+    from study.transitions.windows import window
+
+    weights, specification = options
+    longest = None if chosen.blend_frames <= 2 * source.fps else chosen.blend_frames
+    curve = choose(
+        source,
+        destination,
+        *points,
+        longest=longest,
+        weights=weights,
+        specification=specification,
+    )
+    if curve.lengths is None or curve.costs is None:
+        raise AssertionError("the geodesic method gives the cost of every length")
+    joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
+    by_joint = joint_costs(source, destination, *points, int(curve.lengths[-1]), joints, specification)
+    named = {role: row[curve.lengths - 1] for role, row in zip(MAJOR_ROLES, by_joint, strict=True)}
+    if out.suffix.lower() == ".csv":
+        columns = {"blend_frames": curve.lengths, "blend_s": curve.lengths / source.fps, "cost": curve.costs, **named}
+        _write_csv(out, columns)
+        return
+    from study.report.costs import curve_picture
+
+    span = window(*points, chosen.blend_frames, specification)
+    differences = frame_distance(
+        source.rotations[span.source_start : span.source_stop],
+        destination.rotations[span.destination_start : span.destination_stop],
+        joint_weights(source.skeleton, weights),
+    )
+    curve_picture(
+        curve.lengths,
+        curve.costs,
+        out,
+        chosen=chosen.blend_frames,
+        fps=source.fps,
+        joints=named,
+        frames=(differences, span.source_start),
+        words=words,
+    )
+
+
+def show_warped(found: WarpLength, fps: float, out: Path, words: str) -> None:
+    """The cost of each pair of lengths (2004 Eqs. 5, 6), as a picture or as CSV."""
+    import numpy as np
+
+    lengths = np.arange(found.shortest, found.shortest + len(found.costs))
+    if out.suffix.lower() == ".csv":
+        source, destination = np.meshgrid(lengths, lengths, indexing="ij")
+        frames = {"source_frames": source, "destination_frames": destination}
+        seconds = {"source_s": source / fps, "destination_s": destination / fps}
+        columns = {**frames, **seconds, "cost": found.costs}
+        _write_csv(out, {name: column.ravel() for name, column in columns.items()})
+        return
+    from study.report.costs import cost_picture
+
+    cost_picture(
+        found.costs,
+        out,
+        least=(found.source_frames, found.destination_frames),
+        span=(len(lengths), len(lengths)),
+        names=("source frames in the blend", "destination frames in the blend"),
+        label=f"cost; {words}",
+        first=found.shortest,
+    )
+
+
+def _write_csv(out: Path, columns: dict[str, Any]) -> None:
+    import pandas as pd
+
+    from study.files import write_whole
+
+    write_whole(out, pd.DataFrame(columns).to_csv(index=False))

@@ -1,0 +1,1 @@
+"""The protocol: a TOML file, its parts, its checks and its texts."""

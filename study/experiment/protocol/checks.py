@@ -1,0 +1,177 @@
+"""What has to fit together in a whole protocol: names, practice, points and the analysis.
+
+A protocol comes in whose parts are sound; nothing goes out, or a `KeyMismatchError` that names the key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import Protocol as Shape
+
+from pydantic import ValidationError
+
+from study.counting import counted
+from study.experiment.protocol.errors import KeyMismatchError, short
+from study.experiment.protocol.stimuli import Points, Timing, TransitionSpec
+from study.experiment.protocol.studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec, check_once, repeated
+from study.experiment.protocol.texts import LONGEST_NAME
+
+MOST_TRIALS = 100_000
+"""Of one participant in one study: far beyond what anybody could answer."""
+
+
+class Whole(Shape):
+    """What is looked at of a protocol (`protocol.Protocol`, which imports this module)."""
+
+    @property
+    def transitions(self) -> tuple[TransitionSpec, ...]:
+        """All transitions."""
+
+    @property
+    def studies(self) -> tuple[StudySpec, ...]:
+        """All studies."""
+
+    @property
+    def timing(self) -> Timing:
+        """Times of a trial."""
+
+    @property
+    def analysis(self) -> AnalysisSettings:
+        """Decisions about the analysis."""
+
+    def transitions_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
+        """The transitions of a study's trials."""
+
+    def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
+        """The transitions of its practice alone."""
+
+    def trials_of(self, study: StudySpec) -> int:
+        """How many trials it has."""
+
+    def points_for(self, study: StudySpec, transition: TransitionSpec) -> Points:
+        """The conditions for one transition in it."""
+
+
+def check_whole(protocol: Whole) -> None:
+    """Refuse a protocol whose parts contradict each other."""
+    _check_names(protocol)
+    places = {transition.name: index for index, transition in enumerate(protocol.transitions)}
+    for study in protocol.studies:
+        for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
+            _check_points(protocol, study, transition, places[transition.name])
+    _check_analysis(protocol)
+
+
+def _check_names(protocol: Whole) -> None:
+    """Refuse names that stand twice, and studies that name transitions that there are not."""
+    for kind in ("transitions", "studies", "form"):
+        names = [part.name for part in getattr(protocol, kind)]
+        if (index := repeated(names)) is not None:
+            message = f"expected each name in {kind} once, found {names[index]!r} twice; rename one"
+            raise KeyMismatchError(message, kind, index, "name")
+    known = [transition.name for transition in protocol.transitions]
+    for index, study in enumerate(protocol.studies):
+        for key in ("transitions", "practice_transitions"):
+            names = getattr(study, key)
+            _check_known(names, known, "transitions", "studies", index, key)
+            check_once(names, "transition", "studies", index, key)
+        _check_practice(protocol, study, index)
+        _check_lengths(protocol, study, index)
+
+
+def _check_known(names: Sequence[str], known: Sequence[str], what: str, *location: int | str) -> None:
+    """Refuse names of what there is not, with the nearest one."""
+    there = set(known)
+    if (name := next((name for name in names if name not in there), None)) is not None:
+        near = get_close_matches(name, known, n=1) if len(name) <= LONGEST_NAME else []
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+        raise KeyMismatchError(f"expected names of {what}, found {short(name)}; {hint}", *location)
+
+
+def _check_analysis(protocol: Whole) -> None:
+    """Refuse decisions about the analysis that the studies can't carry out."""
+    preferences = [study.name for study in protocol.studies if study.task == "preference"]
+    names = protocol.analysis.confirmatory
+    _check_known(names, preferences, "preference studies", "analysis", "confirmatory")
+    check_once(names, "study", "analysis", "confirmatory")
+    rules, where = protocol.analysis.exclusions, ("analysis", "exclusions")
+    if rules.most_failed_checks is not None and not any(study.attention_checks for study in protocol.studies):
+        raise KeyMismatchError(
+            "expected attention_checks in a study with this rule, found none; add some, or remove the rule",
+            *where,
+            "most_failed_checks",
+        )
+    timed = any(study.task != "rating" for study in protocol.studies)
+    if timed and rules.fastest_s is not None and rules.fastest_s >= protocol.timing.answer_s:
+        raise KeyMismatchError(
+            f"expected less than timing.answer_s, {protocol.timing.answer_s:g} s, found {rules.fastest_s:g}, which "
+            "leaves no answer; lower it",
+            *where,
+            "fastest_s",
+        )
+
+
+def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
+    """Refuse more practice, or more attention checks, than a study has trials."""
+    trials = protocol.trials_of(study)
+    if trials > MOST_TRIALS:
+        raise KeyMismatchError(
+            f"expected at most {counted(MOST_TRIALS, 'trial')} in {study.name!r}, found {trials:,}; lower repeats",
+            "studies",
+            index,
+        )
+    for key in ("practice", "attention_checks"):
+        found = getattr(study, key)
+        if found > trials:
+            raise KeyMismatchError(
+                f"expected no more than the {counted(trials, 'trial')} of {study.name!r}, found {found}; lower it",
+                "studies",
+                index,
+                key,
+            )
+
+
+def _check_practice(protocol: Whole, study: StudySpec, index: int) -> None:
+    """Refuse practice that shows what the study shows, and transitions for a practice that there is not."""
+    where = ("studies", index, "practice_transitions")
+    if study.practice_transitions and not study.practice:
+        raise KeyMismatchError("expected practice of one trial or more with them, found none; set practice", *where)
+    shown = protocol.transitions_of(study)
+    if not shown:
+        raise KeyMismatchError(f"expected a transition for the trials of {study.name!r}, found none but these", *where)
+    for transition in shown:
+        if transition.name in study.practice_transitions:
+            raise KeyMismatchError(
+                f"expected transitions that the trials do not show, found {transition.name!r}; name another", *where
+            )
+
+
+def _check_points(protocol: Whole, study: StudySpec, transition: TransitionSpec, index: int) -> None:
+    """Refuse merged conditions that leave nothing to choose."""
+    where = ("transitions", index)
+    who = f"for the transition {transition.name!r} in the study {study.name!r}"
+    try:
+        points = protocol.points_for(study, transition)
+    except ValidationError as error:
+        raise KeyMismatchError(f"contradicting conditions {who}: {error.errors()[0]['ctx']['error']}", *where) from None
+    if points.choose == "given" and study.reference in OPTIMUM_CUTS:
+        raise KeyMismatchError(
+            f"expected no given points {who}: {study.reference!r} finds its own; remove choose or change the method",
+            *where,
+        )
+    if points.choose == "given":
+        for end in ("source", "destination"):
+            given = [key for key in (f"{end}_s", f"{end}_frame") if getattr(points, key) is not None]
+            if len(given) != 1:
+                found = " and ".join(given) or "neither"
+                raise KeyMismatchError(
+                    f"expected one of {end}_s and {end}_frame {who}, found {found}; give one", *where
+                )
+    least = 1 - min((0, *study.differences_frames))
+    if points.longest_frames is not None and points.longest_frames < least:
+        raise KeyMismatchError(
+            f"a level below one frame {who}: at longest_frames = {points.longest_frames} the difference "
+            f"{min(study.differences_frames)} leaves no blend; expected longest_frames of {least} or more",
+            *where,
+        )

@@ -1,0 +1,95 @@
+"""The keys of a protocol as tables: the part of `docs/protocols.md` that says what each key is.
+
+Run as `python -m study.experiment.protocol.keys` to print them; a test keeps the page and the code the same.
+"""
+
+from __future__ import annotations
+
+import re
+import types
+import typing
+from collections.abc import Iterator
+from typing import Any, get_args, get_origin
+
+import annotated_types
+from pydantic.fields import FieldInfo
+
+from study.experiment.protocol.errors import model_at, parts
+from study.experiment.protocol.whole import Protocol
+
+_REPEATED = ("transitions", "studies", "studies.items", "form")
+_WORDS = {int: "whole number", float: "number", str: "text", bool: "true or false"}
+
+
+def key_tables() -> str:
+    """Markdown tables of all keys: key, type, unit, default, meaning."""
+    return "\n\n".join(_table(path) for path, _ in parts(Protocol) if not path.endswith(".points"))
+
+
+def _table(path: str) -> str:
+    model = model_at(Protocol, path.split(".")) if path else Protocol
+    if model is None:
+        raise AssertionError(f"{path} comes from the model itself")
+    title = f"`[[{path}]]`" if path in _REPEATED else f"`[{path}]`"
+    lines = [f"### {title if path else 'At the top of the file'}", ""]
+    lines += ["| key | type | unit | default | meaning |", "|---|---|---|---|---|"]
+    for name, field in model.model_fields.items():
+        cells = (f"`{name}`", _type(field), *_unit_and_words(field))
+        lines.append(f"| {cells[0]} | {cells[1]} | {cells[2]} | {_default(field)} | {cells[3]} |")
+    return "\n".join(lines)
+
+
+def _unit_and_words(field: FieldInfo) -> tuple[str, str]:
+    words = field.description or ""
+    if found := re.search(r"\s*\[([a-z ]+)\]$", words):
+        return found[1], words[: found.start()]
+    return "", words
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    value = field.default
+    if value is None or value in ((), ""):
+        return "–"
+    if isinstance(value, str):
+        return f"`{value}`"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    return f"`{value:g}`" if isinstance(value, (int, float)) else "its own"
+
+
+def _type(field: FieldInfo) -> str:
+    bounds = list(_bounds(field.metadata))
+    return _annotation(field.annotation) + (f", {', '.join(bounds)}" if bounds else "")
+
+
+def _bounds(metadata: list[Any]) -> Iterator[str]:
+    for bound in metadata:
+        if isinstance(bound, annotated_types.Ge):
+            yield f"≥ {bound.ge}"
+        elif isinstance(bound, annotated_types.Gt):
+            yield f"> {bound.gt}"
+        elif isinstance(bound, annotated_types.Le):
+            yield f"≤ {bound.le}"
+        elif isinstance(bound, annotated_types.Lt):
+            yield f"< {bound.lt}"
+
+
+def _annotation(annotation: Any) -> str:
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if origin is typing.Annotated:
+        return _annotation(inner[0])
+    if origin is typing.Literal:
+        return ", ".join(f"`{choice}`" for choice in inner)
+    if origin in (typing.Union, types.UnionType):
+        return _annotation(next(part for part in inner if part is not type(None)))
+    if origin is tuple:
+        if inner[-1] is not Ellipsis:
+            return "two numbers, 0 to 1"
+        return {"text": "list of texts", "whole number": "list of whole numbers"}.get(_annotation(inner[0]), "tables")
+    return _WORDS.get(annotation, "table")
+
+
+if __name__ == "__main__":
+    print(key_tables())

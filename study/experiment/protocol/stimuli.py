@@ -1,0 +1,156 @@
+"""The parts of a protocol that say what is shown and when: stimuli, times, transitions and their points.
+
+Pydantic models only; `protocol.Protocol` holds them.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.texts import Part, Slug
+
+LONGEST_CLIP_S, LONGEST_CLIP_FRAMES = 86_400, 86_400 * 240
+"""A day, and a day at the highest frame rate: no point of a motion lies further on."""
+
+Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Colours(Part):
+    """Colours of the picture; a key that is left out keeps the renderer's own."""
+
+    background: Colour | None = Field(default=None, description="Behind the figure, as #rrggbb.")
+    left: Colour | None = Field(default=None, description="Left limbs, as #rrggbb.")
+    right: Colour | None = Field(default=None, description="Right limbs, as #rrggbb.")
+    centre: Colour | None = Field(default=None, description="Head and trunk, as #rrggbb.")
+
+
+class StimulusSettings(Part):
+    """How every stimulus of the protocol is built and drawn."""
+
+    width: int = Field(default=640, ge=64, le=3840, multiple_of=2, description="Width of the video; even. [pixels]")
+    height: int = Field(default=480, ge=64, le=2160, multiple_of=2, description="Height of the video; even. [pixels]")
+    view: Literal["clearest", "front", "side", "three-quarter"] = Field(
+        default="clearest",
+        description="From where the fixed camera looks at the group's common heading; `clearest` is the view in which "
+        "the group's figures are large and their limbs move most in the picture.",
+    )
+    track_s: float | None = Field(
+        default=None,
+        gt=0,
+        le=60,
+        description="Let the camera travel with the figure, smoothed over so long, instead of staying fixed. [seconds]",
+    )
+    style: Literal["stick", "points", "mannequin"] = Field(default="stick", description="How the figure is drawn.")
+    floor: bool = Field(
+        default=False, description="Whether a ground plane with contact shadows is drawn (2004 section 4.1: none)."
+    )
+    camera_group: Literal["transition", "category", "study"] = Field(
+        default="transition",
+        description="Which stimuli share one camera (2004: groups of motions share a camera position).",
+    )
+    entry_s: float = Field(
+        default=2.0, ge=0, le=60, description="Source motion shown before the blend starts. [seconds]"
+    )
+    exit_s: float = Field(default=2.0, ge=0, le=60, description="Destination motion shown after the blend. [seconds]")
+    weight: Literal["linear", "sigmoid"] = Field(default="linear", description="How the blend weight runs from 0 to 1.")
+    specification: Literal["start-end"] = Field(
+        default="start-end",
+        description="What transition points mean: the first and last blended frame (2004 section 3).",
+    )
+    clean_feet: bool = Field(default=True, description="Whether sliding of planted feet is removed after blending.")
+    colours: Colours = Field(default=Colours(), description="Colours of the picture.")
+
+
+class Timing(Part):
+    """What a participant's time is spent on."""
+
+    gap_s: float = Field(default=1.0, ge=0, le=60, description="Blank between the two stimuli of a pair. [seconds]")
+    answer_s: float = Field(
+        default=5.0, gt=0, le=600, description="Time to answer; after it the answer is missed. [seconds]"
+    )
+    pause_s: float = Field(default=1.0, ge=0, le=60, description="Enforced pause after each answer. [seconds]")
+    show_again: int = Field(
+        default=1,
+        ge=0,
+        le=3,
+        description="How often a trial that was badly shown is shown again, at the end of its study.",
+    )
+    break_after: int = Field(
+        default=0, ge=0, le=1_000_000, description="A break after so many trials; 0 for none. [trials]"
+    )
+
+
+class Points(Part):
+    """How transition points are chosen: given, or drawn at random from the protocol's seed under conditions.
+
+    Every key may stand in `[points]`, in a study's `points` and in a transition's `points`; the nearer one wins.
+    """
+
+    choose: Literal["random", "given"] | None = Field(
+        default=None, description="`random` draws from the seed (2004 section 4.3); `given` takes the four keys below."
+    )
+    source_s: float | None = Field(
+        default=None, ge=0, le=LONGEST_CLIP_S, description="Start of the blend in the source, if given. [seconds]"
+    )
+    destination_s: float | None = Field(
+        default=None, ge=0, le=LONGEST_CLIP_S, description="End of the blend in the destination. [seconds]"
+    )
+    source_frame: int | None = Field(
+        default=None, ge=0, le=LONGEST_CLIP_FRAMES, description="The same as a frame at the protocol's fps. [frames]"
+    )
+    destination_frame: int | None = Field(
+        default=None, ge=0, le=LONGEST_CLIP_FRAMES, description="The same as a frame. [frames]"
+    )
+    shortest_frames: int | None = Field(
+        default=None, ge=1, le=600, description="Shortest optimal blend to accept. [frames]"
+    )
+    longest_frames: int | None = Field(
+        default=None, ge=1, le=600, description="Longest optimal blend to accept. [frames]"
+    )
+    avoid_frames: int | None = Field(
+        default=None, ge=1, le=600, description="A blend length to stay away from. [frames]"
+    )
+    avoid_within_frames: int | None = Field(
+        default=None, ge=0, le=600, description="No optimal blend this near to `avoid_frames` is accepted. [frames]"
+    )
+    least_warp_frames: int | None = Field(
+        default=None,
+        ge=0,
+        le=600,
+        description="A time-warped blend is accepted if its two windows differ by so much at least. [frames]",
+    )
+    source_within: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(
+        default=None, description="Part of the source clip in which its point is drawn, as two fractions of its length."
+    )
+    destination_within: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(
+        default=None,
+        description="The same for the destination; [0.0, 0.4] of a turning motion leaves the turn to be seen.",
+    )
+
+    @model_validator(mode="after")
+    def _ranges(self) -> Self:
+        if self.shortest_frames and self.longest_frames and self.shortest_frames > self.longest_frames:
+            raise KeyMismatchError(
+                f"expected shortest_frames <= longest_frames, found {self.shortest_frames} and {self.longest_frames}; "
+                "exchange them",
+                "shortest_frames",
+            )
+        for key in ("source_within", "destination_within"):
+            span = getattr(self, key)
+            if span is not None and span[0] >= span[1]:
+                raise KeyMismatchError(f"expected [from, to] with from < to, found {list(span)}; exchange them", key)
+        return self
+
+
+class TransitionSpec(Part):
+    """One transition: from a motion of the library to another."""
+
+    name: Slug = Field(description="What studies, plans and reports call it; unique.")
+    category: str = Field(min_length=1, description="Type of motion, such as walking; answers are grouped by it.")
+    source: str = Field(min_length=1, description="Motion of the library that it starts from.")
+    destination: str = Field(min_length=1, description="Motion of the library that it leads to.")
+    points: Points = Field(default=Points(), description="Conditions for this transition alone.")

@@ -1,0 +1,253 @@
+"""The parts of a protocol that say what is asked and how it is analysed: studies with their tasks, and decisions made
+before there is data.
+
+Pydantic models and what keeps one study consistent; `protocol_checks` looks at the whole protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.stimuli import Points
+from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
+
+Method = Literal[
+    "fixed", "geodesic", "velocity", "timewarp", "cut", "cut-lee2002", "cut-wang2003", "cut-pointcloud", "one-hop"
+]
+Task = Literal["same-different", "preference", "rating"]
+Order = Literal["both", "random", "balanced", "by-group"]
+Show = Literal["single", "pair"]
+Difference = Annotated[int, Field(ge=-600, le=600)]
+
+OPTIMUM_CUTS = {"cut-lee2002": "lee2002", "cut-wang2003": "wang2003", "cut-pointcloud": "pointcloud"}
+"""Methods that cut where a metric is least over both motions, and the metric of each (2003 section 4.2)."""
+
+
+class Item(Part):
+    """One question of a rating study, answered on a scale."""
+
+    name: Slug = Field(description="What the answers call it; unique in its study.")
+    question: str = Field(min_length=1, description="What the participant reads.")
+    low: str = Field(default="", description="Words at the lowest point of the scale.")
+    middle: str = Field(default="", description="Words at the middle of a scale with an odd number of points.")
+    high: str = Field(default="", description="Words at the highest point of the scale.")
+
+
+class OneHop(Part):
+    """How the method `one-hop` finds its hops (Koyama and Goto 2019)."""
+
+    hops: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+        default=(), description="Motions that may be hops; those of the study's transitions where it is left out."
+    )
+    stay_s: float = Field(
+        default=1.0, ge=0, le=10, description="Longest stay in the source and in the hop; 0 for none. [seconds]"
+    )
+    weight: float | None = Field(
+        default=None, ge=0, le=0.01, description="Cost of a frame of stay, square metres; that of Eq. 5 if left out."
+    )
+    weight_times: float = Field(default=1.0, ge=0, le=100, description="What the weight is multiplied by (Figure 11).")
+    conditions: int = Field(default=100, ge=1, le=10000, description="Transitions drawn for the weight of Eq. 5.")
+
+
+class StudySpec(Part):
+    """One study of the sitting: a task over transitions."""
+
+    name: Slug = Field(description="What plans, answers and reports call it; unique.")
+    title: str = Field(default="", description="Heading for reports; the name where it is left out.")
+    task: Task = Field(description="What the participant decides.")
+    transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+        default=(), description="Names of the transitions shown; all of them where it is left out."
+    )
+    reference: Method = Field(
+        default="geodesic",
+        description="Method behind the reference (same-different), method a (preference), or what is rated.",
+    )
+    comparison: Method | None = Field(
+        default=None, description="Method b of a preference study; a second one to rate in a rating study."
+    )
+    show: Show | None = Field(
+        default=None,
+        description="Rating: each transition by itself (`single`, as where it is left out), or both methods' "
+        "transitions as a `pair`, with items that compare the second with the first.",
+    )
+    differences_frames: Annotated[tuple[Difference, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+        default=(),
+        description="Same-different: comparison minus reference blend length, a pair each; 0 shows one twice. [frames]",
+    )
+    fixed_frames: int | None = Field(
+        default=None,
+        ge=1,
+        le=600,
+        description="Blend length of the method `fixed`, and of both blends of `one-hop`; 0.33 s where it is left out, "
+        "which are 10 frames at 30 fps. [frames]",
+    )
+    one_hop: OneHop = Field(default=OneHop(), description="How the method `one-hop` finds its hops.")
+    order: Order = Field(
+        default="random",
+        description="Order within pairs: `both` shows each pair in both, `random` draws, `balanced` draws half each "
+        "way, `by-group` rotates by the participant's group (2003).",
+    )
+    repeats: int = Field(default=1, ge=1, le=1000, description="How often the whole set is shown.")
+    question: str = Field(
+        default="{standard}", description="What the participant is asked after each pair or stimulus."
+    )
+    instructions: str = Field(
+        default="{standard}",
+        description="What the participant reads before the study; `{standard}` is the built-in text.",
+    )
+    example: bool = Field(default=True, description="Whether the instructions can show one stimulus as an example.")
+    practice: int = Field(
+        default=0, ge=0, le=100, description="Trials with feedback before the study; they count for nothing. [trials]"
+    )
+    practice_transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+        default=(),
+        description="Transitions for practice and the example alone, so that neither shows what the study shows; the "
+        "study's own where it is left out.",
+    )
+    attention_checks: int = Field(
+        default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
+    )
+    scale_points: int = Field(default=5, ge=2, le=11, description="Points of the rating scale, counted from 0.")
+    items: Annotated[tuple[Item, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+        default=(), description="Questions of a rating study."
+    )
+    points: Points = Field(default=Points(), description="Conditions for this study's transition points.")
+
+    @model_validator(mode="after")
+    def _fits_task(self) -> Self:
+        _check_task(self)
+        for key in ("question", "instructions"):
+            known_slots(getattr(self, key), key)
+        return self
+
+    @property
+    def methods(self) -> tuple[Method, ...]:
+        """The methods whose blend lengths this study shows."""
+        return (self.reference,) if self.comparison is None else (self.reference, self.comparison)
+
+    @property
+    def paired(self) -> bool:
+        """Whether a trial shows two stimuli, one after the other."""
+        return self.task != "rating" or self.show == "pair"
+
+    def levels_of(self, transition: str) -> tuple[int, ...]:
+        """The differences that are shown of a transition: all in trials, the plainest in practice."""
+        levels = self.differences_frames
+        if transition not in self.practice_transitions:
+            return levels
+        return tuple(level for level in levels if level in (0, min(levels), max(levels)))
+
+
+def _check_task(study: StudySpec) -> None:
+    """Refuse what doesn't fit between the task and the other keys of a study."""
+    who = f"the {study.task} study {study.name!r}"
+    if study.task == "same-different":
+        if not study.differences_frames:
+            raise KeyMismatchError(f"expected differences_frames in {who}, found none; write for example [-5, 0, 5]")
+        check_once(study.differences_frames, "difference", "differences_frames")
+        if study.comparison is not None:
+            raise KeyMismatchError(
+                f"expected no comparison in {who}: differences_frames says it; remove it", "comparison"
+            )
+        if study.reference.startswith("cut") or study.reference in ("one-hop", "timewarp"):
+            raise KeyMismatchError(
+                f"expected a reference with one blend length in {who}, found {study.reference!r}; change it",
+                "reference",
+            )
+    elif study.differences_frames:
+        raise KeyMismatchError(
+            f"expected this key in same-different studies only; remove it from {who}", "differences_frames"
+        )
+    if len({method in OPTIMUM_CUTS for method in study.methods}) > 1:
+        raise KeyMismatchError(
+            f"expected in {who} either cuts where a metric is least or methods at common points, found "
+            f"{study.reference!r} and {study.comparison!r}; change one",
+            "comparison",
+        )
+    if study.task != "same-different" and study.paired and study.comparison in (None, study.reference):
+        raise KeyMismatchError(f"expected a comparison other than {study.reference!r} in {who}; name one", "comparison")
+    if study.task == "rating":
+        if not study.items:
+            raise KeyMismatchError(f"expected at least one [[studies.items]] in {who}, found none; add one")
+        check_once([item.name for item in study.items], "item's name", "items")
+        if not study.paired and study.order in ("both", "balanced"):
+            raise KeyMismatchError(
+                f"expected 'random' or 'by-group' in {who}, where stimuli are shown singly, found {study.order!r}; "
+                'change it, or write show = "pair"',
+                "order",
+            )
+        if named := [item.name for item in study.items if item.middle and study.scale_points % 2 == 0]:
+            raise KeyMismatchError(
+                f"expected an odd number of scale_points in {who}, where {named[0]!r} has words for the middle, found "
+                f"{study.scale_points}; change it, or remove middle",
+                "scale_points",
+            )
+        return
+    for key in ("items", "show"):
+        if getattr(study, key):
+            raise KeyMismatchError(f"expected {key} in rating studies only; remove it from {who}", key)
+
+
+def check_once(values: Sequence[object], what: str, *location: int | str) -> None:
+    """Refuse what stands twice in a list."""
+    if (index := repeated(values)) is not None:
+        found = f"found {values[index]!r} twice"
+        raise KeyMismatchError(f"expected each {what} once, {found}; change or remove one", *location)
+
+
+def repeated(values: Sequence[object]) -> int | None:
+    """Where the first value stands that stood before in a list; None where all differ."""
+    seen: set[object] = set()
+    for index, value in enumerate(values):
+        if value in seen:
+            return index
+        seen.add(value)
+    return None
+
+
+class Exclusions(Part):
+    """What the analysis leaves out, stated before there is data; nothing where nothing is stated."""
+
+    fastest_s: float | None = Field(
+        default=None, gt=0, le=10, description="Leave out answers sooner than this. [seconds]"
+    )
+    badly_shown: bool = Field(
+        default=False, description="Leave out answers after a stimulus that stalled or was hidden."
+    )
+    most_missed: float | None = Field(
+        default=None, ge=0, lt=1, description="Leave out participants who missed a larger share of their trials."
+    )
+    most_failed_checks: float | None = Field(
+        default=None, ge=0, lt=1, description="Leave out participants who failed more of the attention checks."
+    )
+    most_too_fast: float | None = Field(
+        default=None,
+        ge=0,
+        lt=1,
+        description="Leave out participants with a larger share of answers sooner than `fastest_s`, or 0.2 s.",
+    )
+
+
+class AnalysisSettings(Part):
+    """What was decided about the analysis before there was data."""
+
+    threshold: float = Field(
+        default=0.75, gt=0, lt=1, description="Proportion that defines the just noticeable difference."
+    )
+    alpha: float = Field(default=0.01, gt=0, lt=1, description="Level of significance (2004 section 5.2).")
+    equivalence_points: float = Field(
+        default=10.0,
+        gt=0,
+        lt=50,
+        description="How far from an even split a preference may lie and count as none; 10 is 40 to 60%. [points]",
+    )
+    confirmatory: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+        default=(),
+        description="Studies whose tests are adjusted together (Holm) and decide; those with a preference where it is "
+        "left out. Tests of the others explore.",
+    )
+    exclusions: Exclusions = Field(default=Exclusions(), description="Who and what is left out.")

@@ -1,0 +1,1 @@
+"""From a protocol and a library to stimuli: points, films, cameras, rendering."""

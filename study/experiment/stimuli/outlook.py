@@ -1,0 +1,194 @@
+"""Outlook: what a protocol will show, before any of it is made: points, lengths, trials, films, and how long it takes.
+
+A protocol and a library come in; an `Outlook` goes out, for a person to look at before the films are rendered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from study.counting import counted, noun
+from study.experiment.protocol.whole import Protocol, StudySpec
+from study.experiment.stimuli.films import Planned, Showing, plan_all
+from study.experiment.stimuli.hops import METHOD as HOP_METHOD
+from study.experiment.stimuli.hops import Hops
+from study.experiment.stimuli.points import Supply
+from study.experiment.wording import Films, FilmTimes, duration_s, minutes
+from study.motion.clip import file_frame
+from study.transitions.advice import JND_LONGER_S, JND_SHORTER_S, just_noticeable
+from study.transitions.timewarp import WarpLength
+
+if TYPE_CHECKING:
+    from study.motion.library import Library
+
+
+@dataclass(frozen=True)
+class Place:
+    """A transition point: a frame of a motion at the protocol's rate, its time, and the frame of the motion's file."""
+
+    motion: str
+    frame: int
+    s: float
+    file_frame: float
+    file: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """One transition of one study.
+
+    Parameters
+    ----------
+    study, transition, role
+        `role` is `trial`, or `practice` for what practice alone shows.
+    source, destination
+        Where the blend starts and where it ends.
+    k_frames, k_s
+        The length that the reference method gives.
+    lengths
+        The blend lengths that are shown, in frames, by method; of a hop, from the first blended frame to the last.
+    lengths_s
+        The same in seconds.
+    trials
+        Of a participant, practice and attention checks apart; None for practice.
+    films, film_s
+        How many different films, and the shortest and the longest of them in seconds.
+    notes
+        What the methods gave up, and by which hop a film goes.
+    """
+
+    study: str
+    transition: str
+    role: str
+    source: Place
+    destination: Place
+    k_frames: int
+    k_s: float
+    lengths: Mapping[str, tuple[int, ...]]
+    lengths_s: Mapping[str, tuple[float, ...]]
+    trials: int | None
+    films: int
+    film_s: tuple[float, float]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What will be shown: rows, what can't be shown, what to think about, and totals of one participant.
+
+    `films` are different films of the whole protocol; `minutes` count films, gaps, answers, pauses, breaks, practice,
+    attention checks, the form and reading; `minutes_at_most` with every answer and every film at its longest.
+    `film_times` are what they rest on, for the texts that speak of minutes.
+    """
+
+    rows: tuple[Row, ...]
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+    trials: int
+    films: int
+    minutes: int
+    minutes_at_most: int
+    film_times: Films
+
+
+def look_ahead(protocol: Protocol, library: Library) -> Outlook:
+    """Plan all films of a protocol and describe them."""
+    planned, problems = plan_all(protocol, library, Hops(protocol, library))
+    times = {study.name: found for study in protocol.studies if (found := _times(study, protocol, planned))}
+    films = {film for each in planned for showing in each.showings for film in showing.films}
+    usual, longest = (minutes(duration_s(protocol, at_most=most, films=times)) for most in (False, True))
+    return Outlook(
+        tuple(_row(protocol, each) for each in planned),
+        tuple(problems),
+        tuple(_too_alike(protocol, planned)),
+        sum(protocol.trials_of(study) for study in protocol.studies),
+        len(films),
+        usual,
+        longest,
+        times,
+    )
+
+
+def _row(protocol: Protocol, planned: Planned) -> Row:
+    study, settled, fps = planned.study, planned.settled, protocol.fps
+    films = {film for showing in planned.showings for film in showing.films}
+    seconds = [film.frames(protocol) / fps for film in films]
+    lengths: dict[str, tuple[int, ...]] = {method: _lengths(planned.showings, method) for method in study.methods}
+    hops = [f"one-hop: {film.hop.words}" for film in films if film.hop is not None]
+    gave_up = [f"{method}: {settled.lengths[method].note}" for method in study.methods if settled.lengths[method].note]
+    k_frames = settled.lengths[study.reference].blend_frames
+    return Row(
+        study.name,
+        settled.transition.name,
+        "practice" if planned.for_practice else "trial",
+        _place(settled.source, settled.start_frame),
+        _place(settled.destination, settled.end_frame),
+        k_frames,
+        k_frames / fps,
+        lengths,
+        {method: tuple(round(frames / fps, 6) for frames in own_lengths) for method, own_lengths in lengths.items()},
+        None if planned.for_practice else protocol.trials_of(study) // len(protocol.transitions_of(study)),
+        len(films),
+        (min(seconds), max(seconds)),
+        (*gave_up, *hops),
+    )
+
+
+def _place(supply: Supply, frame: int) -> Place:
+    at = frame - supply.first
+    s = at / supply.clip.fps
+    return Place(supply.name, at, round(s, 6), round(file_frame(supply.clip, at), 3), supply.file)
+
+
+def _lengths(showings: Sequence[Showing], method: str) -> tuple[int, ...]:
+    """The lengths by one method, each once, the shortest first."""
+    seen = ((film, by) for each in showings for film, by in ((each.a, each.method_a), (each.b, each.method_b)))
+    films = {film for film, by in seen if film is not None and by == method}
+    return tuple(sorted({film.blend_frames if film.hop is None else film.hop.frames for film in films}))
+
+
+def _times(study: StudySpec, protocol: Protocol, planned: Sequence[Planned]) -> FilmTimes | None:
+    """Seconds of film in a trial and in a practice trial of a study; None where its films are not known."""
+    trials: list[float] = []
+    practice: list[float] = []
+    for each in planned:
+        if each.study is study:
+            own = practice if each.for_practice else trials
+            own += [sum(film.frames(protocol) for film in showing.films) / protocol.fps for showing in each.showings]
+    if not trials:
+        return None
+    mean = sum(trials) / len(trials)
+    return FilmTimes(mean, sum(practice) / len(practice) if practice else mean)
+
+
+def _too_alike(protocol: Protocol, planned: Sequence[Planned]) -> Iterator[str]:
+    """Studies whose two methods differ by less than people notice (2004 section 5.1), one sentence each."""
+    for study in protocol.studies:
+        if len(study.methods) < 2 or HOP_METHOD in study.methods or study.reference.startswith("cut-"):
+            continue
+        own = [each for each in planned if each.study is study and not each.for_practice]
+        apart = {each.settled.transition.name: _difference(each) for each in own}
+        named = [f"{name} {frames:+d}" for name, frames in apart.items() if just_noticeable(frames / protocol.fps) < 1]
+        if named:
+            longer, shorter = (round(s * protocol.fps) for s in (JND_LONGER_S, JND_SHORTER_S))
+            yield (
+                f"{study.name}: in {len(named)} of {counted(len(own), 'transition')} {study.reference} and "
+                f"{study.comparison} {noun(len(named), 'differs', 'differ')} by less than the just noticeable "
+                f"difference, {longer} frames longer or {shorter} shorter: {', '.join(named)} frames. People may see "
+                "no difference there; shortest_frames, avoid_frames and avoid_within_frames choose other points."
+            )
+
+
+def _difference(planned: Planned) -> int:
+    """Frames by which the comparison's windows are longer than the reference's, the one that differs most."""
+    study, lengths = planned.study, planned.settled.lengths
+    windows = [
+        (length.source_frames, length.destination_frames)
+        if isinstance(length := lengths[method], WarpLength)
+        else (length.blend_frames, length.blend_frames)
+        for method in study.methods
+    ]
+    apart: list[int] = [b - a for a, b in zip(*windows, strict=True)]
+    return max(apart, key=abs)

@@ -1,0 +1,1 @@
+"""The database of answers: tables, migrations, sessions, participants, export."""

@@ -1,0 +1,268 @@
+"""Exports for archives and other programs: the answers of a results folder in, a Psych-DS or BIDS data set out.
+
+Psych-DS: `data/*_data.csv`, and `dataset_description.json` in schema.org's words. BIDS: behavioural data without
+imaging (`sub-*/beh/*_beh.tsv`, a JSON file beside each). Both carry every showing and role, what participants said of
+themselves in the form, and the protocol; Psych-DS also how every stimulus was shown. Parameters of recruiting services,
+tokens and codes stay behind. Simulated answers are called so in title, readme and every row.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import study
+from study.counting import counted
+from study.errors import SessionError
+from study.experiment.store.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, Variable
+from study.files import whole_folder
+from study.spreadsheets import safe_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.experiment.protocol.whole import Protocol
+    from study.experiment.store.responses import Responses
+
+MADE_BY = "Segue"
+DESCRIPTION = "dataset_description.json"
+BIDS_VERSION = "1.10.0"
+ROLES = ("trial", "practice", "check")
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """What is exported: three tables whose columns `variables` tells, and words on the whole."""
+
+    protocol: Protocol
+    answers: pd.DataFrame
+    presentations: pd.DataFrame
+    participants: pd.DataFrame
+    variables: Mapping[str, Mapping[str, Variable]]
+
+    @property
+    def title(self) -> str:
+        """The protocol's title, and what everybody has to know before using the data."""
+        return f"{self.protocol.title} ({self.whose})" if self.whose else self.protocol.title
+
+    @property
+    def whose(self) -> str:
+        """Said where not all answers are people's."""
+        simulated = self.participants["simulated"].astype(bool)
+        if not simulated.any():
+            return ""
+        return "simulated answers, no people" if simulated.all() else "people's and simulated answers mixed"
+
+    @property
+    def words(self) -> str:
+        """A paragraph on the data set."""
+        size = f"{counted(len(self.answers), 'answer')} of {counted(len(self.participants), 'participant')}"
+        source = f" After {self.protocol.source}." if self.protocol.source else ""
+        whose = f" NOT PEOPLE'S ANSWERS ALONE: {self.whose}." if self.whose else ""
+        return (
+            f"{self.protocol.title}: {size} in {counted(len(self.protocol.studies), 'study', 'studies')} of "
+            f"motion transitions.{source}"
+            f"{whose} Collected under the protocol {self.protocol.name}, sha256 {self.protocol.sha256}. Exported by "
+            f"{MADE_BY} {study.__version__}."
+        )
+
+
+def gather(protocol: Protocol, responses: Responses) -> Shared:
+    """Read everything that is exported.
+
+    Raises
+    ------
+    SessionError
+        Where there is no answer.
+    """
+    import pandas as pd
+    import sqlalchemy as sa
+
+    from study.experiment.store import tables as stored
+    from study.experiment.store.responses import answers_frame, rows_of, session_table
+
+    answers = answers_frame(responses, all_attempts=True, roles=ROLES)
+    if answers.empty:
+        raise SessionError(f"{responses.place}: expected answers to export, found none; collect or simulate some first")
+    sessions = session_table(responses)
+    names = dict(zip(sessions["id"], sessions["participant"], strict=True))
+    wanted = [stored.presentations.c[name] for name in PRESENTATIONS if name != "participant"]
+    shown = rows_of(responses, sa.select(stored.presentations.c.session_id, *wanted))
+    form = rows_of(responses, sa.select(stored.form_values))
+    presentations = pd.DataFrame(
+        [{**row, "participant": names[row["session_id"]]} for row in shown], columns=list(PRESENTATIONS)
+    )
+    participants = sessions[list(PARTICIPANTS)].copy()
+    labels = {f"form_{field.name}": field.label for field in protocol.form}
+    for column in labels:
+        said = {row["session_id"]: row["value"] for row in form if f"form_{row['name']}" == column}
+        participants[column] = sessions["id"].map(said)
+    asked = {column: Variable(f"Asked in the form: {label}") for column, label in labels.items()}
+    tables = {"answers": ANSWERS, "presentations": PRESENTATIONS, "participants": {**PARTICIPANTS, **asked}}
+    return Shared(protocol, safe_table(answers), safe_table(presentations), safe_table(participants), tables)
+
+
+def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) -> Path:
+    """Write a data set as a folder; an earlier export of ours there is replaced.
+
+    Parameters
+    ----------
+    kind
+        `psych-ds` or `bids`.
+
+    Raises
+    ------
+    SessionError
+        Where there is no answer, or the folder holds anything that Segue did not export.
+    """
+    if folder.exists() and not _replaceable(folder):
+        raise SessionError(
+            f"{folder}: expected a new or empty folder, or an earlier export of Segue, found other files; name another"
+        )
+    shared = gather(protocol, responses)
+    with whole_folder(folder) as unfinished:
+        {"psych-ds": _write_psych_ds, "bids": _write_bids}[kind](shared, unfinished)
+    return folder
+
+
+def _replaceable(folder: Path) -> bool:
+    """Whether there is nothing in it but what `export` wrote."""
+    if not folder.is_dir():
+        return False
+    if not any(folder.iterdir()):
+        return True
+    try:
+        description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
+        makers = [*description.get("GeneratedBy", []), description.get("sdPublisher", {})]
+        return any(maker.get("name", maker.get("Name")) == MADE_BY for maker in makers)
+    except (OSError, ValueError, TypeError, AttributeError):  # none, or another program's
+        return False
+
+
+def label(name: str) -> str:
+    """Return a name as both standards want it: letters and digits only."""
+    return re.sub(r"[^A-Za-z0-9]", "", name) or "x"
+
+
+def labels(names: Sequence[str]) -> dict[str, str]:
+    """Return a label for each name, all different; a number tells names apart whose letters and digits are the same."""
+    found: dict[str, str] = {}
+    for name in names:
+        made, number = label(name), 2
+        while made in found.values():
+            made, number = f"{label(name)}x{number}", number + 1
+        found[name] = made
+    return found
+
+
+def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _by_study(shared: Shared) -> list[tuple[str, pd.DataFrame]]:
+    """Answers by study, with a label, in the protocol's order."""
+    names = labels([each.name for each in shared.protocol.studies])
+    parts = [
+        (names[each.name], shared.answers[shared.answers["study"] == each.name]) for each in shared.protocol.studies
+    ]
+    return [(name, part) for name, part in parts if len(part)]
+
+
+# Psych-DS
+
+
+def _write_psych_ds(shared: Shared, folder: Path) -> None:
+    data = folder / "data"
+    data.mkdir()
+    parts = [(f"task-{name}", part) for name, part in _by_study(shared)]
+    parts += [("description-participants", shared.participants), ("description-presentations", shared.presentations)]
+    for name, table in parts:
+        if len(table):
+            table.to_csv(data / f"{name}_data.csv", index=False, lineterminator="\n")
+    variables = {name: variable for table in shared.variables.values() for name, variable in table.items()}
+    description = {
+        "@context": "https://schema.org/",
+        "@type": "Dataset",
+        "name": shared.title,
+        "description": shared.words,
+        "sdPublisher": {"@type": "Organization", "name": MADE_BY},
+        "variableMeasured": [_property(name, variable) for name, variable in variables.items()],
+    }
+    _write_json(folder / DESCRIPTION, description)
+    (folder / "README.md").write_text(_readme(shared), encoding="utf-8")
+    (folder / "materials").mkdir()
+    (folder / "materials" / "protocol.toml").write_text(shared.protocol.text, encoding="utf-8")
+
+
+def _property(name: str, variable: Variable) -> dict[str, Any]:
+    """A column in schema.org's words."""
+    found: dict[str, Any] = {"@type": "PropertyValue", "name": name, "description": variable.description}
+    if variable.unit:
+        found["unitText"] = variable.unit
+    if variable.levels:
+        levels = variable.levels.items()
+        found["valueReference"] = [{"@type": "DefinedTerm", "name": name, "description": text} for name, text in levels]
+    return found
+
+
+def _readme(shared: Shared) -> str:
+    return (
+        f"# {shared.title}\n\n{shared.words}\n\nEmpty cells (n/a in BIDS): missed, or without a meaning for that task. "
+        "Rows whose `role` is not `trial` count in no analysis, nor does any but the last `attempt` of a trial.\n"
+    )
+
+
+# BIDS
+
+
+def _write_bids(shared: Shared, folder: Path) -> None:
+    subjects = labels([str(name) for name in shared.participants["participant"]])
+    generated = [{"Name": MADE_BY, "Version": study.__version__}]
+    _write_json(
+        folder / DESCRIPTION,
+        {"Name": shared.title, "BIDSVersion": BIDS_VERSION, "DatasetType": "raw", "GeneratedBy": generated},
+    )
+    (folder / "README.md").write_text(_readme(shared), encoding="utf-8")
+    (folder / "code").mkdir()
+    (folder / "code" / "protocol.toml").write_text(shared.protocol.text, encoding="utf-8")
+    people = shared.participants.rename(columns={"participant": "name"})
+    people.insert(0, "participant_id", [f"sub-{subjects[str(name)]}" for name in people["name"]])
+    _write_tsv(folder / "participants.tsv", people)
+    columns = {"participant_id": Variable("Label of the participant in this data set.")}
+    columns |= {"name": Variable("Name of the session in Segue's database.")}
+    columns |= {name: one for name, one in shared.variables["participants"].items() if name != "participant"}
+    _write_json(folder / "participants.json", {name: _sidecar(variable) for name, variable in columns.items()})
+    described = {name: _sidecar(variable) for name, variable in ANSWERS.items() if name not in ("participant", "study")}
+    for task, part in _by_study(shared):
+        title = next(each.title or each.name for each in shared.protocol.studies if each.name == part["study"].iloc[0])
+        about = {"TaskName": task, "TaskDescription": title}
+        for name, own in part.groupby("participant", sort=False):
+            beh = folder / f"sub-{subjects[str(name)]}" / "beh"
+            beh.mkdir(parents=True, exist_ok=True)
+            file = beh / f"sub-{subjects[str(name)]}_task-{task}_beh.tsv"
+            _write_tsv(file, own.drop(columns=["participant", "study"]))
+            _write_json(file.with_suffix(".json"), {**about, **described})
+
+
+def _sidecar(variable: Variable) -> dict[str, Any]:
+    """A column in BIDS's words."""
+    found: dict[str, Any] = {"Description": variable.description}
+    if variable.unit:
+        found["Units"] = variable.unit
+    if variable.levels:
+        found["Levels"] = dict(variable.levels)
+    return found
+
+
+def _write_tsv(path: Path, table: pd.DataFrame) -> None:
+    """Tabs, and n/a for what is missing; texts lose their tabs and line ends, for which the format has no escape."""
+    table.map(_one_line).to_csv(path, sep="\t", index=False, na_rep="n/a", lineterminator="\n", quoting=csv.QUOTE_NONE)
+
+
+def _one_line(value: Any) -> Any:
+    return re.sub(r"\s+", " ", value) or None if isinstance(value, str) else value

@@ -1,0 +1,1 @@
+"""How observers decide, as pure functions: numbers in, chances out."""

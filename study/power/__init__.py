@@ -1,0 +1,1 @@
+"""A protocol and effects in, the participants needed out."""

@@ -1,0 +1,127 @@
+"""What was shown, and to whom: manifest, sessions and data quality in; tables for the page out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.report import tables, words
+from study.report.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.experiment.stimuli.prepare import Manifest
+    from study.experiment.stimuli.stimulus import MotionUse
+
+Result = Mapping[str, Any]
+
+
+def stimulus_table(manifest: Manifest) -> Table:
+    """Return every stimulus: method, lengths, motions, hash."""
+    rows = [
+        {
+            "id": record.id,
+            "transition": words.readable(record.transition),
+            "category": record.category,
+            "method": record.method,
+            "optimal_frames": record.optimal_frames,
+            "difference_frames": record.difference_frames,
+            "blend_frames": record.blend_frames,
+            "frames": record.frames,
+            "source": _motion_in_words(record.source),
+            "destination": _motion_in_words(record.destination),
+            "notes": "; ".join(record.notes),
+        }
+        for record in manifest.records
+    ]
+    return tables.make(
+        "stimuli",
+        "Every stimulus, in frames. k is the length that the method gives; the blend is k and the difference.",
+        "transition category method optimal_frames difference_frames blend_frames frames:count source destination "
+        "notes id",
+        rows,
+        headings={"difference_frames": "difference", "frames": "in all", "source": "from"},
+        files_only="category notes id",
+    )
+
+
+def _motion_in_words(use: MotionUse) -> str:
+    """The motion and its trial; no folder of the machine that rendered it."""
+    return words.readable(use.motion) + (f" ({Path(use.file).stem})" if use.file else "")
+
+
+def motion_table(manifest: Manifest) -> Table:
+    """Return every motion that was used: its file, where it was blended, and by how much it was extended."""
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for record in manifest.records:
+        for role, use in (("from", record.source), ("to", record.destination)):
+            key = (record.transition, role, use.motion, use.file, use.frame, use.added_before, use.added_after)
+            rows[key] = {
+                "transition": words.readable(record.transition),
+                "role": role,
+                "motion": words.readable(use.motion),
+                "file": Path(use.file).name,
+                "frame": use.frame,
+                "frames": use.frames,
+                "added_before": use.added_before,
+                "added_after": use.added_after,
+                "changes": "; ".join(note for note in use.notes if note.startswith(("extended", "mirrored"))),
+                "notes": "; ".join(use.notes),
+            }
+    return tables.make(
+        "motions",
+        "Every motion, in frames of the study. Its file, the frame at which the blend starts or ends, its length, and "
+        "the frames that were added before and after it where it was too short.",
+        "transition role motion file frame frames:count added_before added_after changes notes",
+        list(rows.values()),
+        headings={"frames": "of", "notes": "all notes"},
+        files_only="notes" if any(row["changes"] for row in rows.values()) else "notes changes",
+    )
+
+
+def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
+    """Return one row a participant: when, how many answers, how fast, what was noticed."""
+    started = {}
+    if len(sessions) and "started_at" in sessions:
+        started = {str(row.participant): str(row.started_at)[:16] for row in sessions.itertuples()}
+    left_out = {row["participant"]: row["reason"] for row in analysis["exclusions"]["participants"]}
+    rows = [
+        {
+            **row,
+            "kind": "simulated" if row["simulated"] else "person",
+            "started": started.get(row["participant"], ""),
+            "left_out": left_out.get(row["participant"], ""),
+        }
+        for row in analysis["quality"]["table"]
+    ]
+    hidden = {
+        "kind": analysis["data"] != "mixed",
+        "left_out": not left_out,
+        "shown_badly": not any(row["shown_badly"] for row in rows),
+        "too_fast": not any(row["too_fast"] for row in rows),
+        "false_alarms same_pairs": not any(row["same_pairs"] for row in rows),
+    }
+    return tables.make(
+        "participants",
+        "Participants. Flags follow the rules above and leave nobody out."
+        + (" Who was left out, and why, stands in the last column." if left_out else ""),
+        "participant kind started trials answered missed median_response_s too_fast shown_badly false_alarms "
+        "same_pairs "
+        "flags left_out",
+        rows,
+        files_only=" ".join(keys for keys, hide in hidden.items() if hide),
+    )
+
+
+def known_truth(sessions: pd.DataFrame) -> dict[str, Any]:
+    """Return what is known of the simulated observers by study; empty where sessions disagree or people took part."""
+    if not len(sessions) or "truth_json" not in sessions or not sessions["simulated"].astype(bool).all():
+        return {}
+    texts = set(sessions["truth_json"].dropna())
+    if len(texts) != 1 or sessions["truth_json"].isna().any():
+        return {}
+    studies = json.loads(texts.pop()).get("studies", {})
+    return dict(studies)
