@@ -28,6 +28,10 @@ PREFERENCES = {
     # Nothing of what a test does leaves the machine.
     "browser.safebrowsing.update.enabled": False,
     "services.settings.server": "data:,none",
+    # Firefox decodes films in a process of its own and gives up on it for good if it has not started after 5 s, which
+    # happens on a busy machine: "Couldn't start RDD process", for every film from then on.
+    "media.rdd-process.startup_timeout_ms": 120_000,
+    "media.utility-process.startup_timeout_ms": 120_000,
     # As long as nobody has pressed a key, a page that asks before leaving is left unasked; tests want neither.
     "dom.disable_beforeunload": True,
 }
