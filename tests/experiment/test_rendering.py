@@ -18,7 +18,8 @@ from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
 from study.errors import FileError, StimulusError
 from study.experiment.protocol.whole import load_protocol, parse_protocol
-from study.experiment.stimuli.prepare import prepare, rendering
+from study.experiment.stimuli import rendering
+from study.experiment.stimuli.prepare import prepare
 from study.experiment.stimuli.rendering import (
     made_from,
     read_manifest,

@@ -80,7 +80,7 @@ ARRIVALS = """
 import sys
 sys.path.insert(0, "tests/experiment")
 import toys as c
-from study.experiment import participants as people
+from study.experiment.store import participants as people
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.store.responses import open_responses, record_answer, session_by_id
