@@ -7,11 +7,12 @@ const WATCH_MS = 100;
 const STOPPED_MS = 600; // between two looks of the watch: the page itself stood still, as under a closed lid
 const LATE_MS = 60; // what a browser may need to tell of the last frame, or of the end
 const GAP_FRAMES = 1.5; // a gap above it flags the trial
+const DRIFT_FRAMES = 2; // so does a film that took this much longer, or shorter, than it should
 
 export const hasFrameCallback = "requestVideoFrameCallback" in HTMLVideoElement.prototype;
 
 // The frames that the browser says it presented.
-class Frames {
+export class Frames {
   constructor(film, fps) {
     Object.assign(this, { film, fps, times: [], indices: [], presented: 0, latest: 0, gap: 0 });
   }
@@ -42,6 +43,12 @@ class Frames {
     return this.indices.at(-1) >= this.film.frames - 1;
   }
 
+  // By how many frames the film took longer than it should, or shorter; as with gaps, the first one does not count.
+  get drift() {
+    const lasted = ((this.times.at(-1) - this.times[1]) * this.fps) / 1000;
+    return this.times.length > 2 ? Math.abs(lasted - (this.indices.at(-1) - this.indices[1])) : 0;
+  }
+
   // How the film was shown; the last frame's time is the clock that answers run from.
   measured(endedAt) {
     if (!hasFrameCallback) {
@@ -53,7 +60,8 @@ class Frames {
       method: "requestVideoFrameCallback",
       frames_presented: this.presented,
       longest_gap_frames: Math.round(this.gap * 1000) / 1000,
-      shown_well: this.whole && this.presented === this.film.frames && this.gap <= GAP_FRAMES,
+      shown_well:
+        this.whole && this.presented === this.film.frames && this.gap <= GAP_FRAMES && this.drift <= DRIFT_FRAMES,
       times_ms: this.times.map((time) => Math.round(time * 100) / 100),
       frames: this.indices,
       last: this.times.at(-1) ?? endedAt,
