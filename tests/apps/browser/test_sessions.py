@@ -252,7 +252,9 @@ def test_reaction_times_are_those_of_the_keys(make_site, make_tab):
     site, tab = make_site(), make_tab()
     tab.open(site.address)
     pressed, handled = [], []
-    for _ in range(3):
+    # On a busy machine a key may overtake the timer, so that the page handles it before it is busy: then once more.
+    while sum(end - key > busy_s / 2 for key, end in zip(pressed, handled, strict=True)) < 3:
+        assert len(pressed) < 10, "hardly a key met a busy page"
         to_question(tab)
         option = tab.run("document.querySelector('button.answer').getAttribute('aria-keyshortcuts')")
         tab.run(busy)
@@ -264,7 +266,6 @@ def test_reaction_times_are_those_of_the_keys(make_site, make_tab):
     recorded = sorted(
         {(one["time_origin_ms"] + one["answer_ms"]) / 1000 for one in (row["detail"] for row in details(site))}
     )
-    assert len(recorded) == 3
+    assert len(recorded) == len(pressed)
     for key, end, at in zip(pressed, handled, recorded, strict=True):
-        assert end - key > busy_s / 2
-        assert key - 0.1 < at < end - busy_s / 2
+        assert key - 0.1 < at < (end - busy_s / 2 if end - key > busy_s / 2 else end + 0.1)
