@@ -302,7 +302,8 @@ def load(folder: Path, database: str, count: int, rounds: int) -> list[Key]:
 
 def lost(database: str, acknowledged: Sequence[Key]) -> int:
     """How many of the acknowledged answers are not in the database, or are there twice."""
-    from study.experiment.store.responses import answers_frame, open_responses
+    from study.experiment.store.frames import answers_frame
+    from study.experiment.store.responses import open_responses
 
     columns = ["participant", "trial", "item", "attempt", "answer"]
     with open_responses(database) as responses:

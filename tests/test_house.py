@@ -13,6 +13,13 @@ ROOT = Path(__file__).parents[1]
 FLOORS = ("motion", "models", "transitions", "tasks", "experiment", "analysis", "power", "report", "apps")
 # Analysis takes tables, so it needs nothing of the experiment that made them.
 FORBIDDEN = {("analysis", room) for room in ("experiment", "tasks", "motion", "transitions")} | {("models", "motion")}
+# The rooms of the experiment: what each imports nothing of.
+CLOSED = {
+    "procedures": ("protocol", "plan", "session", "stimuli", "store"),
+    "protocol": ("plan", "session", "stimuli", "store"),
+    "stimuli": ("session", "store"),
+    "store": ("stimuli",),
+}
 
 
 def imported_modules(path: Path) -> set[str]:
@@ -41,6 +48,15 @@ def test_a_module_imports_only_from_floors_above(path: Path) -> None:
         assert here is not None, f"{path}: study/ itself imports {module}"
         assert FLOORS.index(there) < FLOORS.index(here), f"{path} imports down the house: {module}"
         assert (here, there) not in FORBIDDEN, f"{path} imports {module}; analysis takes tables"
+
+
+@pytest.mark.parametrize("room", CLOSED)
+def test_the_rooms_of_the_experiment_keep_their_order(room: str) -> None:
+    for path in (ROOT / "study" / "experiment" / room).rglob("*.py"):
+        for module in imported_modules(path):
+            parts = module.split(".")
+            there = parts[2] if parts[:2] == ["study", "experiment"] and len(parts) > 2 else ""
+            assert there not in CLOSED[room], f"{path} imports {module}; {room} stands above {there}"
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "renderer").rglob("*.py")), ids=lambda p: str(p.relative_to(ROOT)))

@@ -15,6 +15,7 @@ import numpy as np
 
 from study.errors import SessionError
 from study.experiment import session as sitting
+from study.experiment.chance import generator
 from study.experiment.observer_models import (
     LEAST_CRITERION,
     ObserverSettings,
@@ -26,18 +27,11 @@ from study.experiment.observer_models import (
     probability_different,
     truth,
 )
-from study.experiment.plan import Pair, Plan, Trial, draw_plan, generator
+from study.experiment.plan import Pair, Plan, Trial, draw_plan
 from study.experiment.protocol.whole import Protocol
-from study.experiment.store.responses import (
-    Responses,
-    SessionRecord,
-    begin_session,
-    find_session,
-    has_event,
-    record_answer,
-    record_event,
-    stored_answers,
-)
+from study.experiment.store.answers import has_event, record_answer, record_event, stored_answers
+from study.experiment.store.responses import Responses
+from study.experiment.store.sessions import SessionRecord, begin_session, find_session
 
 __all__ = [
     "ObserverSettings",

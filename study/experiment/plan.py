@@ -7,7 +7,6 @@ both orders, the order of pairs and the order within a pair both at random.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from study.errors import SessionError
+from study.experiment.chance import generator
 from study.experiment.protocol.whole import Protocol, StudySpec
 
 PLAN_VERSION = 1
@@ -114,13 +114,6 @@ def plan_from_json(text: str) -> Plan:
         return Plan(**{**data, "trials": tuple(Trial(**trial) for trial in data["trials"])})
     except (ValueError, KeyError, TypeError) as error:
         raise SessionError(f"Expected a stored plan, found JSON that is none: {error}.") from error
-
-
-def generator(seed: int, *names: str | int) -> np.random.Generator:
-    """A generator that depends on a seed and on names alone, so that nothing depends on the order of drawing."""
-    digest = hashlib.sha256("\x1f".join(map(str, names)).encode()).digest()
-    words = np.frombuffer(digest, dtype="<u4")
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *map(int, words)])))
 
 
 def draw_plan(

@@ -61,9 +61,12 @@ def gather(folder: Path, database: str | None = None) -> Material:
     SegueError
         When a part of the folder is missing or can't be read.
     """
+    from study.experiment.folder import PROTOCOL
     from study.experiment.protocol.whole import load_protocol
-    from study.experiment.stimuli.rendering import PROTOCOL, read_manifest
-    from study.experiment.store.responses import answers_frame, open_answers, session_table
+    from study.experiment.stimuli.rendering import read_manifest
+    from study.experiment.store.frames import answers_frame
+    from study.experiment.store.responses import open_answers
+    from study.experiment.store.sessions import session_table
     from study.experiment.store.tables import presentations, withdrawals
 
     protocol, manifest = load_protocol(folder / PROTOCOL), read_manifest(folder)

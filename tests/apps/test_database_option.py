@@ -14,7 +14,8 @@ from postgres_server import PASSWORD, without_password
 from serving import PROTOCOL
 
 from study.apps.cli import run
-from study.experiment.store.responses import find_session, open_responses
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import find_session
 
 ROOT = Path(__file__).parents[2]
 

@@ -32,7 +32,9 @@ from study.experiment.protocol.whole import Protocol
 from study.experiment.session import advanced, answer_keys, answered, current, filled, open_session
 from study.experiment.stimuli.prepare import prepare
 from study.experiment.stimuli.rendering import Manifest
-from study.experiment.store.responses import ANSWER_COLUMNS, Responses, answers_frame, find_session, open_responses
+from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame
+from study.experiment.store.responses import Responses, open_responses
+from study.experiment.store.sessions import find_session
 from study.experiment.store.tables import presentations, sessions
 from study.motion.library import open_library
 

@@ -17,7 +17,8 @@ from serving import PROTOCOL, TOKEN, unfilmed
 from study.apps.cli import run
 from study.apps.server.running import listen
 from study.errors import SessionError
-from study.experiment.store.responses import find_session, open_responses
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import find_session
 
 ROOT = Path(__file__).parents[2]
 

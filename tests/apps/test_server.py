@@ -10,7 +10,10 @@ from serving import PROTOCOL, QUESTIONS, answer_to, protocol_of
 from study.apps.server import views
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.store.responses import answers_frame, open_responses, session_table, stored_form
+from study.experiment.store.answers import stored_form
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import session_table
 from study.experiment.store.tables import events, presentations
 
 

@@ -20,7 +20,8 @@ from pathlib import Path
 import pytest
 from serving import answer_to, free_port, unfilmed
 
-from study.experiment.store.responses import answers_frame, open_responses
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
 
 ROLES = ("trial", "practice", "check")
 CLIENTS = 3

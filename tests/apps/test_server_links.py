@@ -12,7 +12,7 @@ import pytest
 import sqlalchemy as sa
 
 from study.apps.server.links import filled_in
-from study.experiment.store.responses import session_table
+from study.experiment.store.sessions import session_table
 from study.experiment.store.tables import events
 
 SLOTS = [

@@ -12,7 +12,9 @@ from serving import QUESTIONS, TOKEN, Person, answer_to, make_host
 from starlette.testclient import TestClient
 
 from study.apps.server.web import make_app
-from study.experiment.store.responses import answers_frame, open_responses, session_table
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import session_table
 from study.experiment.store.tables import withdrawals
 
 

@@ -18,7 +18,8 @@ from study.apps.server.running import configuration
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
-from study.experiment.store.responses import answers_frame, stored_form
+from study.experiment.store.answers import stored_form
+from study.experiment.store.frames import answers_frame
 from study.experiment.store.tables import events
 
 

@@ -12,14 +12,9 @@ from study.errors import SegueError, SessionError
 from study.experiment.observers import simulate
 from study.experiment.store import databases
 from study.experiment.store.databases import may_pass, patiently, try_to_write
-from study.experiment.store.responses import (
-    all_sessions,
-    answers_frame,
-    open_answers,
-    open_responses,
-    rows_of,
-    session_table,
-)
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_answers, open_responses, rows_of
+from study.experiment.store.sessions import all_sessions, session_table
 from study.experiment.store.tables import metadata
 
 

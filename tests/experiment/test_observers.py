@@ -25,7 +25,10 @@ from study.experiment.observer_models import (
 from study.experiment.observers import ObserverSettings, default_observer, person, simulate
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import advanced, answered, current, missed, open_session
-from study.experiment.store.responses import all_sessions, answers_frame, has_event, open_responses
+from study.experiment.store.answers import has_event
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import all_sessions
 
 
 def alike(settings: ObserverSettings) -> ObserverSettings:

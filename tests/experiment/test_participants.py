@@ -13,17 +13,16 @@ import sqlalchemy as sa
 from study.experiment.plan import draw_plan
 from study.experiment.session import Answer
 from study.experiment.store import participants as people
-from study.experiment.store.responses import (
+from study.experiment.store.answers import (
     Presentation,
-    begin_session,
-    open_responses,
     record_answer,
     record_event,
     record_form,
-    session_by_id,
     stored_answers,
     stored_form,
 )
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import begin_session, session_by_id
 from study.experiment.store.tables import answers, metadata, presentations, sessions, withdrawals
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)

@@ -15,23 +15,18 @@ from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import Answer
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
-from study.experiment.store.responses import (
-    ANSWER_COLUMNS,
+from study.experiment.store.answers import (
     Presentation,
-    all_sessions,
-    answers_frame,
-    begin_session,
-    export_csv,
-    find_session,
     has_event,
-    open_responses,
     record_answer,
     record_event,
     record_form,
-    session_table,
     stored_answers,
     stored_form,
 )
+from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame, export_csv
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import all_sessions, begin_session, find_session, session_table
 
 
 @pytest.fixture

@@ -17,8 +17,10 @@ from study.experiment.session import Answer
 from study.experiment.store import databases
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
+from study.experiment.store.answers import record_answer, stored_answers
 from study.experiment.store.migrations import MIGRATIONS
-from study.experiment.store.responses import begin_session, find_session, open_responses, record_answer, stored_answers
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import begin_session, find_session
 
 ANSWER = Answer(1, "", 1, "same", 1.0)
 

@@ -21,9 +21,12 @@ from study.experiment.plan import draw_plan
 from study.experiment.session import Answer
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
+from study.experiment.store.answers import record_answer, stored_answers
 from study.experiment.store.databases import alone, patiently
+from study.experiment.store.frames import answers_frame
 from study.experiment.store.migrations import MIGRATIONS
-from study.experiment.store.responses import answers_frame, begin_session, open_responses, record_answer, stored_answers
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import begin_session
 
 WRITER = """
 import itertools, sys
@@ -31,7 +34,9 @@ sys.path.insert(0, "tests/experiment")
 import toys as c
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
-from study.experiment.store.responses import begin_session, open_responses, record_answer, stored_answers
+from study.experiment.store.answers import record_answer, stored_answers
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import begin_session
 from study.experiment.session import Answer
 protocol = parse_protocol(c.TOY_PROTOCOL)
 pairs = c.pairs_of(protocol)
@@ -83,7 +88,9 @@ import toys as c
 from study.experiment.store import participants as people
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
-from study.experiment.store.responses import open_responses, record_answer, session_by_id
+from study.experiment.store.answers import record_answer
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import session_by_id
 from study.experiment.session import Answer
 database, program, newcomers, groups, cap = sys.argv[1], *map(int, sys.argv[2:])
 protocol = parse_protocol(c.TOY_PROTOCOL)

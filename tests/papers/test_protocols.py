@@ -12,7 +12,8 @@ from study.experiment.plan import draw_plan
 from study.experiment.protocol.proofreading import to_do
 from study.experiment.protocol.whole import find_protocol, load_protocol, protocols_folder
 from study.experiment.stimuli.prepare import check, prepare
-from study.experiment.store.responses import answers_frame, open_responses
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
 from study.experiment.wording import all_texts
 from study.motion.library import open_library
 

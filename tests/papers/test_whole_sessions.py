@@ -13,7 +13,8 @@ from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import find_protocol, load_protocol
 from study.experiment.stimuli.prepare import check, prepare
-from study.experiment.store.responses import answers_frame, open_responses
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
 from study.motion.library import open_library
 from study.transitions.candidates import frame_costs
 

@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from study.experiment import session as sitting
+from study.experiment.folder import PROTOCOL
 from study.experiment.plan import Trial, draw_plan
 from study.experiment.protocol.whole import load_protocol
-from study.experiment.stimuli.rendering import PROTOCOL, read_manifest
-from study.experiment.store.responses import Presentation, begin_session, open_responses, record_answer, record_event
+from study.experiment.stimuli.rendering import read_manifest
+from study.experiment.store.answers import Presentation, record_answer, record_event
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import begin_session
 
 
 @dataclass(frozen=True)

@@ -29,10 +29,11 @@ from study.counting import counted
 @json_option
 def export(results: Path, kind: str, out: Path | None, database: str | None, as_json: bool) -> None:
     """All answers for other programs and for archives."""
+    from study.experiment.folder import PROTOCOL
     from study.experiment.protocol.whole import load_protocol
-    from study.experiment.stimuli.rendering import PROTOCOL
     from study.experiment.store.export import export as export_folder
-    from study.experiment.store.responses import export_csv, open_answers
+    from study.experiment.store.frames import export_csv
+    from study.experiment.store.responses import open_answers
 
     with open_answers(results, database) as responses:
         if kind == "csv":

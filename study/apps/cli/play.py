@@ -96,7 +96,7 @@ def the_plan(
 ) -> Plan:
     """The stored plan of a participant who was here before, else a new one: the same as `simulate` draws."""
     from study.experiment.plan import draw_plan
-    from study.experiment.store.responses import find_session
+    from study.experiment.store.sessions import find_session
 
     known = find_session(responses, participant)
     if known is None:

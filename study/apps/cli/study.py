@@ -73,7 +73,8 @@ def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> d
 
 def check_database(database: str | None, stimuli: StimulusSet | Manifest) -> None:
     """Refuse a database elsewhere that can't be opened, or is about other stimuli, before anything is rendered."""
-    from study.experiment.store.responses import open_responses, refuse_other_stimuli
+    from study.experiment.store.responses import open_responses
+    from study.experiment.store.sessions import refuse_other_stimuli
 
     if database is not None:
         with open_responses(database) as responses:
@@ -95,7 +96,8 @@ def simulate_participants(
     from study.experiment.observers import default_observer
     from study.experiment.observers import simulate as simulate_all
     from study.experiment.stimuli.rendering import read_manifest
-    from study.experiment.store.responses import open_responses, refuse_other_stimuli
+    from study.experiment.store.responses import open_responses
+    from study.experiment.store.sessions import refuse_other_stimuli
 
     manifest = read_manifest(folder)
     with open_responses(database or folder) as responses, progress("answers") as report:
@@ -116,9 +118,10 @@ def analyse_results(folder: Path, database: str | None = None) -> dict[str, Any]
     """All analyses of a results folder, as its protocol decided."""
     from study.analysis.analyse import analyse as analyse_all
     from study.analysis.exclusions import rules_of
+    from study.experiment.folder import PROTOCOL
     from study.experiment.protocol.whole import load_protocol
-    from study.experiment.stimuli.rendering import PROTOCOL
-    from study.experiment.store.responses import answers_frame, open_answers
+    from study.experiment.store.frames import answers_frame
+    from study.experiment.store.responses import open_answers
 
     protocol = load_protocol(folder / PROTOCOL)
     settings = protocol.analysis
@@ -238,7 +241,8 @@ def simulate(
     **goes_wrong: float,
 ) -> None:
     """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
-    from study.experiment.stimuli.rendering import MANIFEST, PROTOCOL, record
+    from study.experiment.folder import MANIFEST, PROTOCOL
+    from study.experiment.stimuli.rendering import record
     from study.files import read_text
 
     checked = load(protocol)

@@ -25,7 +25,7 @@ from study.apps.player.showing import Showing, find_rate, frame_at
 from study.apps.player.store import Store
 from study.experiment import session as sitting
 from study.experiment.stimuli.stimulus import Stimulus
-from study.experiment.store.responses import Presentation
+from study.experiment.store.answers import Presentation
 
 
 @dataclass(frozen=True)

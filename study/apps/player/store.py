@@ -14,19 +14,17 @@ from typing import Protocol as Shape
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Answer
-from study.experiment.store.databases import patiently
-from study.experiment.store.responses import (
+from study.experiment.store.answers import (
     Presentation,
-    Responses,
-    SessionRecord,
-    begin_session,
     event_counts,
-    find_session,
     record_answer,
     record_event,
     record_form,
     stored_answers,
 )
+from study.experiment.store.databases import patiently
+from study.experiment.store.responses import Responses
+from study.experiment.store.sessions import SessionRecord, begin_session, find_session
 
 
 class Store(Shape):

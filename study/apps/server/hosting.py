@@ -33,19 +33,18 @@ from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Answer, Session, Step
 from study.experiment.stimuli.rendering import Manifest
 from study.experiment.store import participants as people
-from study.experiment.store.databases import AWAY, in_words
-from study.experiment.store.participants import Participant
-from study.experiment.store.responses import (
+from study.experiment.store.answers import (
     Presentation,
-    Responses,
-    SessionRecord,
     answer_rows,
     event_counts,
     event_row,
     record_form,
-    session_by_id,
     stored_answers,
 )
+from study.experiment.store.databases import AWAY, in_words
+from study.experiment.store.participants import Participant
+from study.experiment.store.responses import Responses
+from study.experiment.store.sessions import SessionRecord, session_by_id
 
 TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""

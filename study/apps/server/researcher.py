@@ -20,7 +20,8 @@ from study.apps.server.hosting import Host, Sitting
 from study.experiment import session as flow
 from study.experiment.observers import questions
 from study.experiment.store import participants as people
-from study.experiment.store.responses import answers_frame, session_by_id
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.sessions import session_by_id
 from study.experiment.store.tables import events, form_values, participants, presentations, sessions, withdrawals
 from study.spreadsheets import safe_cell, safe_table
 

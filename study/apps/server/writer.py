@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
+from study.experiment.store.answers import Row, insert_rows
 from study.experiment.store.databases import AWAY
-from study.experiment.store.responses import Row, insert_rows
 
 LARGEST_GROUP = 256
 

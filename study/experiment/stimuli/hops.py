@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.errors import MotionError, StimulusError, TransitionError
-from study.experiment.plan import generator
+from study.experiment.chance import generator
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.motion.clip import Clip, retarget
 from study.transitions.blending import Transition, blend

@@ -17,7 +17,7 @@ import numpy as np
 
 from study.counting import counted, noun
 from study.errors import MotionError, StimulusError, TransitionError
-from study.experiment.plan import generator
+from study.experiment.chance import generator
 from study.experiment.protocol.whole import OPTIMUM_CUTS, Points, Protocol, StudySpec, TransitionSpec
 from study.motion.clip import Clip, resample, retarget
 from study.transitions.blend_length import BlendLength, blend_length

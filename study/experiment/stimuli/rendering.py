@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError
 
 from study.errors import StimulusError
+from study.experiment.folder import ANSWERS, MANIFEST, PROTOCOL, STIMULI
 from study.experiment.plan import Pair
 from study.experiment.stimuli.stimulus import Stimulus, StimulusRecord, StimulusSet
 from study.files import make_folder, read_text, refused, write_whole
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from study.motion.library import Library
 
 MANIFEST_VERSION = 1
-MANIFEST, PROTOCOL, STIMULI, ANSWERS = "manifest.json", "protocol.toml", "stimuli", "responses.sqlite"
 
 
 @dataclass(frozen=True)

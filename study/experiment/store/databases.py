@@ -19,7 +19,7 @@ import sqlalchemy as sa
 
 from renderer.files import scratch_folder
 from study.errors import SessionError
-from study.experiment.stimuli.rendering import ANSWERS
+from study.experiment.folder import ANSWERS
 from study.files import make_folder, refused
 
 BUSY_SECONDS = 10

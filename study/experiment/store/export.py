@@ -84,7 +84,9 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
     import sqlalchemy as sa
 
     from study.experiment.store import tables as stored
-    from study.experiment.store.responses import answers_frame, rows_of, session_table
+    from study.experiment.store.frames import answers_frame
+    from study.experiment.store.responses import rows_of
+    from study.experiment.store.sessions import session_table
 
     answers = answers_frame(responses, all_attempts=True, roles=ROLES)
     if answers.empty:

@@ -21,7 +21,8 @@ import sqlalchemy as sa
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol
 from study.experiment.store.databases import alone
-from study.experiment.store.responses import Clock, Responses, begin_session
+from study.experiment.store.responses import Clock, Responses
+from study.experiment.store.sessions import begin_session
 from study.experiment.store.tables import (
     answers,
     events,

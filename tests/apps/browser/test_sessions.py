@@ -25,7 +25,7 @@ from walking import (
     to_question,
 )
 
-from study.experiment.store.responses import answers_frame
+from study.experiment.store.frames import answers_frame
 from study.experiment.store.tables import presentations
 
 pytestmark = pytest.mark.gl

@@ -10,7 +10,7 @@ import pytest
 from serving import QUESTIONS
 from walking import END, LOOK, answers, details, go_on, press, read_on
 
-from study.experiment.store.responses import all_sessions
+from study.experiment.store.sessions import all_sessions
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 

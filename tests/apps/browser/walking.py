@@ -9,7 +9,7 @@ import pytest
 import sqlalchemy as sa
 from serving import PROTOCOL
 
-from study.experiment.store.responses import answers_frame
+from study.experiment.store.frames import answers_frame
 from study.experiment.store.tables import events, presentations
 
 SHORT = """\

@@ -15,7 +15,7 @@ from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import Answer
 from study.experiment.stimuli.prepare import prepare
 from study.experiment.stimuli.stimulus import StimulusSet
-from study.experiment.store.responses import Presentation
+from study.experiment.store.answers import Presentation
 from study.motion.library import open_library
 
 SMALL = """\

@@ -19,7 +19,9 @@ import sqlalchemy as sa
 from PIL import ImageGrab
 from playing import Playing
 
-from study.experiment.store.responses import find_session, has_event, open_responses, stored_answers
+from study.experiment.store.answers import has_event, stored_answers
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import find_session
 from study.experiment.store.tables import events, presentations
 
 Start = Callable[..., Playing]

@@ -15,7 +15,10 @@ import pytest
 from playing import Playing
 
 from study.experiment.plan import draw_plan, trial_table
-from study.experiment.store.responses import answers_frame, find_session, has_event, open_responses, stored_answers
+from study.experiment.store.answers import has_event, stored_answers
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import find_session
 
 Start = Callable[..., Playing]
 

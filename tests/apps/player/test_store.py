@@ -10,7 +10,10 @@ import pytest
 from study.apps.player.store import ResponsesStore
 from study.experiment.plan import draw_plan
 from study.experiment.session import Answer
-from study.experiment.store.responses import answers_frame, find_session, has_event, open_responses, stored_form
+from study.experiment.store.answers import has_event, stored_form
+from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import find_session
 
 
 def participant(responses: Any, small: Any, name: str) -> ResponsesStore:

@@ -1,0 +1,232 @@
+"""Answers: what happened in a session, on disk before the next trial shows.
+
+A stored session and an answer, a form or an event come in; rows go out, which are only ever appended.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import sqlalchemy as sa
+from pydantic_core import to_json
+
+from study.errors import SessionError
+from study.experiment.plan import Plan, Trial
+from study.experiment.session import Answer, right_answer
+from study.experiment.store.databases import (
+    alone,
+)
+from study.experiment.store.responses import Clock, Responses, rows_of, utc_now
+from study.experiment.store.sessions import SessionRecord, find_session
+from study.experiment.store.tables import (
+    answers,
+    events,
+    form_values,
+    presentations,
+)
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """How one stimulus of a trial was really shown.
+
+    Parameters
+    ----------
+    place
+        `first` or `second`.
+    method
+        What timed it: `requestVideoFrameCallback`, `swap`, or the name of a fallback, which measured nothing.
+    frames_expected, frames_presented, longest_gap_frames
+        Frames of the stimulus, frames that were seen to be presented, and the longest time between two of them in
+        frames (1 is perfect); None where it was not measured.
+    shown_well
+        Whether no gap was above one and a half frames, and no frame was missing.
+    detail
+        Anything else, such as the times of all frames in milliseconds.
+    """
+
+    trial: int
+    attempt: int
+    place: str
+    stimulus: str
+    method: str
+    frames_expected: int | None
+    frames_presented: int | None
+    longest_gap_frames: float | None
+    shown_well: bool
+    detail: Mapping[str, Any] | None = None
+
+
+def stored_answers(responses: Responses, session_id: int) -> tuple[Answer, ...]:
+    """A session's answers so far, for `session.open_session`."""
+    query = sa.select(answers).where(answers.c.session_id == session_id).order_by(answers.c.id)
+    rows = rows_of(responses, query)
+    return tuple(
+        Answer(row["trial"], row["item"], row["attempt"], row["answer"], row["response_s"], row["shown_well"])
+        for row in rows
+    )
+
+
+def record_answer(
+    responses: Responses,
+    record: SessionRecord,
+    answer: Answer,
+    shown: Sequence[Presentation] = (),
+    *,
+    clock: Clock = utc_now,
+) -> bool:
+    """Commit one answer, with how its stimuli were shown; it is on disk when this returns.
+
+    Returns
+    -------
+    bool
+        True where it is new; False where the very same answer was there already (sent twice, counted once).
+
+    Raises
+    ------
+    SessionError
+        Where another answer to the same showing of the same trial is there: answers are never overwritten.
+    """
+    try:
+        with responses.engine.begin() as connection:
+            insert_rows(connection, answer_rows(record, answer, shown, clock()))
+    except sa.exc.IntegrityError as error:
+        if answer in stored_answers(responses, record.id):
+            return False
+        if find_session(responses, record.participant) is None:
+            raise SessionError(
+                f"Expected the session of {record.participant!r}, found that it was withdrawn; nothing more is stored."
+            ) from error
+        raise SessionError(
+            f"Expected the first answer of {record.participant!r} to trial {answer.trial} (showing {answer.attempt}), "
+            f"found that one is stored already; {answer.value!r} was not. Open the session again to see what is due."
+        ) from error
+    return True
+
+
+Row = tuple[sa.Insert, dict[str, Any]]
+
+
+def answer_rows(record: SessionRecord, answer: Answer, shown: Sequence[Presentation], at: datetime) -> list[Row]:
+    """The rows of one answer, for a transaction of the caller's (`insert_rows`)."""
+    values = {**_trial_values(record.plan.trial(answer.trial)), **_answer_values(record.plan, answer)}
+    presented = [(_INSERT_PRESENTATION, {"session_id": record.id, "at": at, **_presentation_values(o)}) for o in shown]
+    return [(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values}), *presented]
+
+
+def insert_rows(connection: sa.Connection, rows: Sequence[Row]) -> None:
+    """Insert rows of any tables within a transaction; those of one table together, in their order."""
+    tables: dict[sa.Insert, list[dict[str, Any]]] = {}
+    for statement, row in rows:
+        tables.setdefault(statement, []).append(row)
+    for statement, together in tables.items():
+        text, bound = _compiled(statement, tuple(together[0]), connection.dialect)
+        connection.exec_driver_sql(text, [bound(row) for row in together])
+
+
+@lru_cache(maxsize=64)
+def _compiled(statement: sa.Insert, names: tuple[str, ...], dialect: sa.Dialect) -> tuple[str, Callable[..., Any]]:
+    """An insertion as the driver takes it, and how it takes a row: SQLAlchemy itself needs twice as long for each."""
+    compiled = statement.compile(dialect=dialect, column_keys=names)
+    columns = statement.table.c
+    made = [(name, columns[name].type.dialect_impl(dialect).bind_processor(dialect)) for name in names]
+    position = compiled.positiontup
+
+    def bound(row: Mapping[str, Any]) -> Any:
+        values = {name: row[name] if process is None else process(row[name]) for name, process in made}
+        return values if position is None else tuple([values[name] for name in position])
+
+    return str(compiled), bound
+
+
+_INSERT_ANSWER, _INSERT_PRESENTATION, _INSERT_EVENT = sa.insert(answers), sa.insert(presentations), sa.insert(events)
+
+
+def _presentation_values(shown: Presentation) -> dict[str, Any]:
+    # Not `asdict`: it copies the times of all frames one by one, which costs ten times all else of an answer.
+    values = dict(vars(shown))
+    detail = values.pop("detail")
+    return {**values, "detail_json": None if detail is None else to_json(detail).decode()}
+
+
+def record_form(
+    responses: Responses, record: SessionRecord, values: Mapping[str, str], *, clock: Clock = utc_now
+) -> None:
+    """Store what was filled into the form (`session.filled`), once; sent twice it is stored once."""
+    rows = [{"session_id": record.id, "name": name, "value": value, "at": clock()} for name, value in values.items()]
+    with alone(responses.engine) as connection:
+        if rows and not stored_form(responses, record.id, connection):
+            connection.execute(sa.insert(form_values), rows)
+        connection.execute(sa.insert(events).values(session_id=record.id, kind="form", at=clock()))
+
+
+def stored_form(responses: Responses, session_id: int, connection: sa.Connection | None = None) -> dict[str, str]:
+    """What a participant filled into the form, field by field."""
+    query = sa.select(form_values.c.name, form_values.c.value).where(form_values.c.session_id == session_id)
+    if connection is not None:
+        return {row.name: row.value for row in connection.execute(query)}
+    with responses.engine.connect() as own:
+        return {row.name: row.value for row in own.execute(query)}
+
+
+def event_counts(responses: Responses, record: SessionRecord) -> dict[str, int]:
+    """How often each kind of event happened in a session, such as `consent` and `form`, which front ends record."""
+    query = sa.select(events.c.kind, sa.func.count()).where(events.c.session_id == record.id).group_by(events.c.kind)
+    with responses.engine.connect() as connection:
+        return {row[0]: row[1] for row in connection.execute(query)}
+
+
+def has_event(responses: Responses, record: SessionRecord, kind: str) -> bool:
+    """Whether something happened in a session, such as `finished`."""
+    return kind in event_counts(responses, record)
+
+
+def record_event(
+    responses: Responses, record: SessionRecord, kind: str, detail: Mapping[str, Any] | None = None, *,
+    clock: Clock = utc_now,
+) -> None:  # fmt: skip
+    """Append what happened in a session besides answers (finished, faults, focus lost)."""
+    with responses.engine.begin() as connection:
+        insert_rows(connection, [event_row(record, kind, detail, clock())])
+
+
+def event_row(record: SessionRecord, kind: str, detail: Mapping[str, Any] | None, at: datetime) -> Row:
+    """The row of one event, for a transaction of the caller's."""
+    text = None if detail is None else json.dumps(detail, sort_keys=True)
+    return _INSERT_EVENT, {"session_id": record.id, "kind": kind, "at": at, "detail_json": text}
+
+
+_TRIAL_COLUMNS = tuple(column.name for column in answers.c if column.name in Trial.__dataclass_fields__)
+
+
+def _trial_values(trial: Trial) -> dict[str, Any]:
+    return {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
+
+
+def _answer_values(plan: Plan, answer: Answer) -> dict[str, Any]:
+    """The answer's own columns, with what it means: correct (same-different), method a chosen (preference)."""
+    trial = plan.trial(answer.trial)
+    correct = chose_a = None
+    right = right_answer(trial)
+    if answer.value is not None and right is not None:
+        correct = answer.value == right
+    if answer.value is not None and trial.task == "preference" and trial.role != "check":
+        chose_a = (answer.value == "first") == trial.a_first
+    return {
+        "item": answer.item,
+        "attempt": answer.attempt,
+        "answer": answer.value,
+        "missed": answer.missed,
+        "correct": correct,
+        "chose_a": chose_a,
+        "response_s": answer.response_s,
+        "shown_well": answer.shown_well,
+    }

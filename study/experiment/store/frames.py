@@ -1,0 +1,88 @@
+"""Tables of answers: one row an answer, for the analysis and for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import sqlalchemy as sa
+
+from study.errors import SessionError
+from study.experiment.store.responses import Responses, rows_of
+from study.experiment.store.tables import (
+    answers,
+    sessions,
+)
+from study.files import write_whole
+from study.spreadsheets import safe_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# The seam with the analysis: one row an answer.
+ANSWER_COLUMNS = (
+    "participant", "simulated", "study", "task", "trial", "attempt", "item", "repeat", "pair", "motion", "category",
+    "first", "second", "difference_frames", "reference_first", "method_a", "method_b", "a_first", "answer", "missed",
+    "correct", "chose_a", "response_s", "shown_well", "answered_at",
+    "role", "expected",
+)  # fmt: skip
+
+
+def answers_frame(
+    responses: Responses,
+    *,
+    all_attempts: bool = False,
+    roles: Sequence[str] = ("trial",),
+    protocol_sha256: str | None = None,
+) -> pd.DataFrame:
+    """All answers as one table, one row an answer, in `ANSWER_COLUMNS`.
+
+    Parameters
+    ----------
+    roles
+        Which trials: `trial`, and where asked for `practice` and `check`, which no analysis counts.
+    all_attempts
+        With it every showing of a trial; without, the last one of each.
+    protocol_sha256
+        Which protocol's answers, where a database was merged from several.
+
+    Raises
+    ------
+    SessionError
+        Where answers under different protocols would be mixed.
+    """
+    import pandas as pd
+
+    query = sa.select(answers, sessions.c.participant, sessions.c.simulated, sessions.c.protocol_sha256).join(
+        sessions, answers.c.session_id == sessions.c.id
+    )
+    if protocol_sha256 is not None:
+        query = query.where(sessions.c.protocol_sha256 == protocol_sha256)
+    query = query.where(answers.c.role.in_(roles))
+    rows = rows_of(responses, query.order_by(answers.c.session_id, answers.c.id))
+    hashes = sorted({row["protocol_sha256"] for row in rows})
+    if len(hashes) > 1:
+        raise SessionError(
+            f"{responses.place}: expected answers under one protocol, found {len(hashes)}: "
+            f"{', '.join(sha256[:12] for sha256 in hashes)}. Say which one by its sha256."
+        )
+    table = pd.DataFrame([dict(row) for row in rows], columns=[*ANSWER_COLUMNS, "session_id"])
+    if not all_attempts:
+        table = table.drop_duplicates(["session_id", "trial", "item"], keep="last")
+    table["answered_at"] = [at.isoformat() for at in table["answered_at"]]
+    # Answers without a meaning (missed, another task) stay empty rather than false.
+    for column in ("reference_first", "a_first", "correct", "chose_a"):
+        table[column] = table[column].astype("boolean")
+    for column in ("simulated", "missed", "shown_well"):
+        table[column] = table[column].astype(bool)
+    table["difference_frames"] = table["difference_frames"].astype("Int64")
+    table["response_s"] = table["response_s"].astype(float)
+    return table[list(ANSWER_COLUMNS)].reset_index(drop=True)
+
+
+def export_csv(responses: Responses, path: str | Path) -> Path:
+    """Write all answers, every showing and every role, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
+    table = answers_frame(responses, all_attempts=True, roles=("trial", "practice", "check"))
+    write_whole(path, safe_table(table).to_csv(index=False))
+    return Path(path)
