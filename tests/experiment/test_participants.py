@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sqlite3
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from study.experiment.store.answers import (
     stored_form,
 )
 from study.experiment.store.responses import open_responses
-from study.experiment.store.sessions import begin_session, session_by_id
+from study.experiment.store.sessions import session_by_id
 from study.experiment.store.tables import answers, metadata, presentations, sessions, withdrawals
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
@@ -140,24 +139,3 @@ def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(re
     assert enrol("next").id == leaves.id + 1
     with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:
         connection.execute(sa.delete(answers))
-
-
-def test_a_database_of_version_2_is_brought_up_to_date(tmp_path, toy_protocol, toy_stimuli):
-    """As Segue 0.1 wrote it: no roles, no participants."""
-    path = tmp_path / "responses.sqlite"
-    with open_responses(path) as responses:
-        record = begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01"))
-        record_answer(responses, record, Answer(1, "", 1, "same", 1.0))
-    with sqlite3.connect(path) as raw:
-        for (trigger,) in raw.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
-            raw.execute(f"DROP TRIGGER {trigger}")
-        for table in ("presentations", "form_values", "participants", "withdrawals"):
-            raw.execute(f"DROP TABLE {table}")
-        for column in ("role", "expected"):
-            raw.execute(f"ALTER TABLE answers DROP COLUMN {column}")
-        raw.execute("DELETE FROM schema_version WHERE version > 2")
-    raw.close()
-    with open_responses(path) as responses:
-        assert stored_answers(responses, record.id) == (Answer(1, "", 1, "same", 1.0),)
-        with responses.engine.connect() as connection:
-            assert connection.execute(sa.select(answers.c.role)).scalars().all() == ["trial"]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import builtins
-import sqlite3
-from contextlib import closing
 from datetime import UTC, datetime
 
 import pytest
@@ -17,8 +15,7 @@ from study.experiment.session import Answer
 from study.experiment.store import databases
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
-from study.experiment.store.answers import record_answer, stored_answers
-from study.experiment.store.migrations import MIGRATIONS
+from study.experiment.store.answers import record_answer
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session, find_session
 
@@ -79,36 +76,11 @@ def test_a_database_in_another_encoding_is_refused(postgres_server):
         open_responses(postgres_server.url("latin"))
 
 
-def test_an_old_database_is_brought_up_to_date_without_loss(tmp_path, toy_protocol, plan):
-    path = tmp_path / "responses.sqlite"
-    with open_responses(path) as responses:
-        record = begin_session(responses, toy_protocol, plan)
-        record_answer(responses, record, ANSWER)
-    with closing(sqlite3.connect(path)) as raw, raw:
-        raw.execute("DROP TRIGGER answers_no_update")
-        raw.execute("DROP TRIGGER answers_no_delete")
-        raw.execute("DELETE FROM schema_version WHERE version > 1")
-    with open_responses(path) as responses:
-        assert stored_answers(responses, record.id) == (ANSWER,)
-        with responses.engine.connect() as connection:
-            rows = connection.execute(sa.select(response_tables.schema_version)).all()
-        assert [row.version for row in rows] == list(range(1, len(MIGRATIONS) + 1))
-        with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:
-            connection.execute(sa.text("DELETE FROM answers"))
-
-
-def test_a_postgresql_database_of_version_5_is_brought_up_to_date(postgres_url, toy_protocol, plan):
-    """As Segue 0.1 wrote it: without triggers."""
-    with open_responses(postgres_url) as responses:
-        record = begin_session(responses, toy_protocol, plan)
-        record_answer(responses, record, ANSWER)
-        with responses.engine.begin() as connection:
-            connection.execute(sa.text("DROP FUNCTION segue_append_only() CASCADE"))
-            connection.execute(sa.text("DELETE FROM schema_version WHERE version > 5"))
-    with open_responses(postgres_url) as responses:
-        assert stored_answers(responses, record.id) == (ANSWER,)
-        with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:
-            connection.execute(sa.text("DELETE FROM answers"))
+def test_a_database_before_the_first_release_is_refused(database):
+    with open_responses(database) as responses, responses.engine.begin() as connection:
+        connection.execute(sa.update(response_tables.schema_version).values(version=5))
+    with pytest.raises(SessionError, match="version 6 or newer, found version 5, which was never released; export"):
+        open_responses(database)
 
 
 def test_a_newer_database_is_refused(database):

@@ -1,8 +1,8 @@
-"""Migrations of the responses database: small named functions that bring an older one up to date; append-only rules.
+"""Migrations of the responses database: one named function a version brings an older database up to date.
 
-A migration adds; it never drops data. The version stands in `schema_version`, one row for each migration that ran. The
-databases themselves, SQLite by triggers and PostgreSQL by triggers and a function, refuse to change what was recorded
-and to delete what nobody withdrew.
+A migration adds; it never drops data. The table `schema_version` has one row for each migration that ran. The
+databases themselves (SQLite by triggers, PostgreSQL by triggers and a function) refuse to change a recorded row, and
+to delete one whose session was not withdrawn.
 """
 
 from __future__ import annotations
@@ -27,58 +27,16 @@ from study.experiment.store.tables import (
 )
 
 
-def make_first_tables(connection: sa.Connection) -> None:
-    """Version 1: sessions, answers, events."""
-    metadata.create_all(connection, tables=[sessions, answers, events])
+def make_tables(connection: sa.Connection) -> None:
+    """Make the tables of a new database; from then on it accepts additions only, and no change to what is recorded."""
+    metadata.create_all(connection, tables=_FIRST_TABLES)
+    guard = _guard_sqlite if connection.dialect.name == "sqlite" else _guard_postgresql
+    guard(connection)
 
 
-def keep_answers_append_only(connection: sa.Connection) -> None:
-    """Version 2: SQLite itself refuses to change or delete an answer."""
-    if connection.dialect.name != "sqlite":
-        return
-    for action in ("UPDATE", "DELETE"):
-        connection.execute(
-            sa.text(
-                f"CREATE TRIGGER answers_no_{action.lower()} BEFORE {action} ON answers "
-                "BEGIN SELECT RAISE(ABORT, 'answers are append-only'); END"
-            )
-        )
-
-
-def tell_practice_and_checks_apart(connection: sa.Connection) -> None:
-    """Version 3: the role of each trial, and what an attention check asks for; all earlier ones were trials."""
-    there = {column["name"] for column in sa.inspect(connection).get_columns("answers")}
-    for name, default in (("role", "trial"), ("expected", "")):
-        if name not in there:
-            connection.execute(sa.text(f"ALTER TABLE answers ADD COLUMN {name} TEXT NOT NULL DEFAULT '{default}'"))
-
-
-def make_participant_tables(connection: sa.Connection) -> None:
-    """Version 4: how stimuli were shown, the form, participants in the browser, withdrawals."""
-    metadata.create_all(connection, tables=[presentations, form_values, participants, withdrawals])
-
-
-def let_participants_withdraw(connection: sa.Connection) -> None:
-    """Version 5: answers may be deleted after their withdrawal was written down, and only then."""
-    if connection.dialect.name != "sqlite":
-        return
-    connection.execute(sa.text("DROP TRIGGER IF EXISTS answers_no_delete"))
-    connection.execute(
-        sa.text(
-            "CREATE TRIGGER answers_no_delete BEFORE DELETE ON answers "
-            "WHEN NOT EXISTS (SELECT 1 FROM withdrawals WHERE session_id = OLD.session_id) "
-            "BEGIN SELECT RAISE(ABORT, 'answers are append-only'); END"
-        )
-    )
-
-
-def keep_all_records_append_only(connection: sa.Connection) -> None:
-    """Version 6: all that was recorded stays as it was, in PostgreSQL as in SQLite; a withdrawal's line for ever."""
-    make = _guard_sqlite if connection.dialect.name == "sqlite" else _guard_postgresql
-    make(connection)
-
-
-# Where each table keeps the session whose withdrawal allows to delete; participants also change (token, last seen).
+_FIRST_TABLES = [sessions, answers, events, presentations, form_values, participants, withdrawals]
+# The column that names the session whose withdrawal allows its rows to be deleted. Rows of participants also change
+# (token, last seen).
 _SESSION_OF = {
     "answers": "session_id",
     "events": "session_id",
@@ -94,10 +52,8 @@ def _guard_sqlite(connection: sa.Connection) -> None:
         unless = f"WHEN NOT EXISTS (SELECT 1 FROM withdrawals WHERE session_id = OLD.{column})" if column else ""
         rules = {"DELETE": unless} if table == "participants" else {"UPDATE": "", "DELETE": unless}
         for action, condition in rules.items():
-            name = f"{table}_no_{action.lower()}"
-            connection.exec_driver_sql(f"DROP TRIGGER IF EXISTS {name}")
             connection.exec_driver_sql(
-                f"CREATE TRIGGER {name} BEFORE {action} ON {table} {condition} "
+                f"CREATE TRIGGER {table}_no_{action.lower()} BEFORE {action} ON {table} {condition} "
                 f"BEGIN SELECT RAISE(ABORT, '{table} are append-only'); END"
             )
 
@@ -127,50 +83,52 @@ def _guard_postgresql(connection: sa.Connection) -> None:
             )
 
 
-MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (
-    make_first_tables,
-    keep_answers_append_only,
-    tell_practice_and_checks_apart,
-    make_participant_tables,
-    let_participants_withdraw,
-    keep_all_records_append_only,
-)
+# No database of a version below 6 was ever released.
+FIRST_VERSION = 6
+MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (make_tables,)
+VERSION = FIRST_VERSION + len(MIGRATIONS) - 1
 
 
 def migrate(engine: sa.Engine, place: str) -> None:
-    """Run the migrations that a database has not seen, all of them or none; two programs at once run them once.
+    """Run the migrations that a database has not had, all of them or none; two programs at once run them once.
 
     Raises
     ------
     SessionError
-        For a database of a newer Segue, and one whose tables another program made.
+        For a database of a newer Segue or of one before its first release, and for tables that another program made.
     """
     with engine.connect() as connection:
-        if _version(connection, place) == len(MIGRATIONS):
+        if _version(connection, place) == VERSION:
             return
-    # Asked again alone: another program may have made the tables in the meantime.
+    # Check again while nobody else may write: another program may have made the tables in the meantime.
     with alone(engine) as connection:
         found = _version(connection, place)
-        if found == 0:
+        if found is None:
             _refuse_strangers(connection, place)
         schema_version.create(connection, checkfirst=True)
-        for version, migration in enumerate(MIGRATIONS[found:], start=found + 1):
+        following = FIRST_VERSION if found is None else found + 1
+        for version, migration in enumerate(MIGRATIONS[following - FIRST_VERSION :], start=following):
             row = {"version": version, "migration": migration.__name__, "applied_at": datetime.now(UTC)}
             connection.execute(sa.insert(schema_version).values(row))
             migration(connection)
 
 
-def _version(connection: sa.Connection, place: str) -> int:
-    """How many migrations a database has seen; 0 for an empty one."""
+def _version(connection: sa.Connection, place: str) -> int | None:
+    """The newest migration that a database has had; None for a database without tables of Segue."""
     if not sa.inspect(connection).has_table(schema_version.name):
-        return 0
-    found = connection.execute(sa.select(sa.func.max(schema_version.c.version))).scalar() or 0
-    if found > len(MIGRATIONS):
+        return None
+    found = connection.execute(sa.select(sa.func.max(schema_version.c.version))).scalar()
+    if found is not None and found > VERSION:
         raise SessionError(
-            f"{place}: expected a database of version {len(MIGRATIONS)} or older, found version {found}; "
+            f"{place}: expected a database of version {VERSION} or older, found version {found}; "
             "open it with the newer Segue that wrote it."
         )
-    return int(found)
+    if found is not None and found < FIRST_VERSION:
+        raise SessionError(
+            f"{place}: expected a database of version {FIRST_VERSION} or newer, found version {found}, which was never "
+            "released; export its answers with the Segue that wrote it, and start a new database."
+        )
+    return found
 
 
 def _refuse_strangers(connection: sa.Connection, place: str) -> None:

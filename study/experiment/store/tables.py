@@ -1,4 +1,4 @@
-"""The tables of the responses database, typed alike in SQLite and PostgreSQL; `response_migrations` makes them."""
+"""The tables of the responses database, with the same types in SQLite and PostgreSQL; `migrations` makes them."""
 
 from __future__ import annotations
 
