@@ -17,24 +17,12 @@ from numpy.typing import NDArray
 
 from study.errors import SessionError
 from study.experiment.protocol.whole import Protocol, StudySpec
+from study.transitions.methods.registry import METHODS
 
 FloatArray = NDArray[np.float64]
 
 LEAST_CRITERION = 0.2
 """No participant's criterion lies below this: at 0 a person would say "different" always."""
-
-# By 2004 Table 2; of cuts at two optima, the distance that gives 2003's F of 6.39 in ratings.
-_PREFERENCE = {
-    "fixed": 0.0,
-    "velocity": 0.65,
-    "geodesic": 3.29,
-    "timewarp": 3.06,
-    "cut": -2.0,
-    "cut-lee2002": -2.6,
-    "cut-wang2003": -0.2,
-    "cut-pointcloud": -1.4,
-    "one-hop": 1.5,
-}
 
 
 @dataclass(frozen=True)
@@ -70,7 +58,7 @@ class PreferenceObserver:
     deviation over participants of their preference between methods. The default utilities give 2004 Table 2.
     """
 
-    utility: Mapping[str, float] = field(default_factory=lambda: dict(_PREFERENCE))
+    utility: Mapping[str, float] = field(default_factory=lambda: {one.name: one.utility for one in METHODS.values()})
     order_bias: float = 0.1
     lapse: float = 0.01
     participant_sd: float = 0.0
@@ -123,6 +111,15 @@ def default_observer(shorter_frames: float = 8.0, longer_frames: float = 7.0) ->
     crossing = _crossing(unit, 0.75, unit.d_prime_longer)
     shorter, longer = round(crossing / shorter_frames, 9), round(crossing / longer_frames, 9)
     return ObserverSettings(replace(unit, d_prime_shorter=shorter, d_prime_longer=longer))
+
+
+def knowing(settings: ObserverSettings, protocol: Protocol) -> ObserverSettings:
+    """The observer with the utilities that a protocol gives to methods of its own, where it has none for them."""
+    own = {method.name: method.utility for method in protocol.methods}
+    if not own:
+        return settings
+    preference = replace(settings.preference, utility={**own, **settings.preference.utility})
+    return replace(settings, preference=preference)
 
 
 def probability_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:

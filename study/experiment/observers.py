@@ -23,6 +23,7 @@ from study.experiment.observer_models import (
     RatingObserver,
     SameDifferentObserver,
     default_observer,
+    knowing,
     lean,
     probability_different,
     truth,
@@ -202,7 +203,7 @@ def simulate(
     """
     if participants < 1:
         raise SessionError(f"Expected one participant or more to simulate, found {participants}.")
-    settings = settings or default_observer()
+    settings = knowing(settings or default_observer(), protocol)
     known = {**truth(protocol, settings), "seed": seed}
     names = [f"sim-{number:03d}" for number in range(1, participants + 1)]
     plans = [draw_plan(protocol, stimuli.pairs, name, group=group) for group, name in enumerate(names)]

@@ -18,7 +18,6 @@ from study.experiment.protocol.languages import words
 if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol, StudySpec
 
-_BLEND_S = 1.0
 _ANSWER_S = 2.0
 _ITEM_S = 6.0
 _FIELD_S = 8.0
@@ -139,8 +138,8 @@ def duration_s(protocol: Protocol, *, at_most: bool = False, films: Films = NO_F
 
 def _estimated(protocol: Protocol, study: StudySpec) -> FilmTimes:
     stimuli = protocol.stimuli
-    hop_s = 2 * protocol.fixed_frames_of(study) / protocol.fps + study.one_hop.stay_s
-    film_s = stimuli.entry_s + stimuli.exit_s + (hop_s if "one-hop" in study.methods else _BLEND_S)
+    usual_s = (method.make.usual_s(method.length, protocol.fps) for method in protocol.methods_of(study).values())
+    film_s = stimuli.entry_s + stimuli.exit_s + max(usual_s)
     shown_s = (2 if study.paired else 1) * film_s
     return FilmTimes(shown_s, shown_s)
 

@@ -10,23 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 from study.counting import counted
 from study.report import words
+from study.transitions.methods.makes.blends import Blending
+from study.transitions.methods.method import WANG_2003, WANG_2004
+from study.transitions.methods.registry import METHODS
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from study.experiment.protocol.whole import Protocol, StudySpec
     from study.experiment.stimuli.prepare import Manifest
+    from study.transitions.methods.method import Method
 
 Result = Mapping[str, Any]
 
 REFERENCES = {
-    "2003": "Wang, J., & Bodenheimer, B. (2003). An evaluation of a cost metric for selecting transitions between "
-    "motion segments. Symposium on Computer Animation, 232–238.",
-    "2004": "Wang, J., & Bodenheimer, B. (2004). Computing the duration of motion transitions: An empirical approach. "
-    "Symposium on Computer Animation, 335–344.",
-    "2019": "Koyama, Y., & Goto, M. (2019). Precomputed optimal one-hop motion transition for responsive character "
-    "animation. The Visual Computer. doi:10.1007/s00371-019-01693-8",
-    "slerp": "Shoemake, K. (1985). Animating rotation with quaternion curves. SIGGRAPH, 245–254.",
     "fieller": "Fieller, E. C. (1954). Some problems in interval estimation. Journal of the Royal Statistical "
     "Society B, "
     "16, 175–185.",
@@ -50,18 +47,6 @@ REFERENCES = {
     "and rejecting the null hypothesis. Psychonomic Bulletin & Review, 16, 225–237.",
     "strengths": "Bradley, R. A., & Terry, M. E. (1952). Rank analysis of incomplete block designs. Biometrika, 39, "
     "324–345.",
-}
-
-BLENDS = {
-    "fixed": "blends of a fixed length",
-    "geodesic": "blends as long as the geodesic distance gives (2004)",
-    "velocity": "blends as long as joint velocities give (2004)",
-    "timewarp": "time-warped blends (2004)",
-    "cut": "cuts",
-    "cut-lee2002": "cuts of least cost under the weights of Lee et al. (2002)",
-    "cut-wang2003": "cuts of least cost under the optimised weights of 2003",
-    "cut-pointcloud": "cuts of least cost between point clouds",
-    "one-hop": "optimal one-hop transitions (2019)",
 }
 
 ORDERS = {
@@ -106,17 +91,20 @@ def methods_paragraphs(
 
 def references(protocol: Protocol, analysis: Result) -> list[str]:
     """Return the works that the methods rest on, by author; only those whose methods were used."""
-    methods = {method for study in protocol.studies for method in study.methods}
-    cuts = {method for method in methods if method.startswith("cut")}
-    used = {"slerp"} if methods - cuts else set()
-    used |= {"2003"} if cuts or analysis["ratings"] or analysis["pair_ratings"] else set()
-    used |= {"2004"} if methods & {"geodesic", "velocity", "timewarp", "fixed"} or analysis["jnd"] else set()
-    used |= {"2019"} if "one-hop" in methods else set()
+    works = {work for method in _methods(protocol).values() for work in method.sources}
+    works |= {WANG_2003} if analysis["ratings"] or analysis["pair_ratings"] else set()
+    works |= {WANG_2004} if analysis["jnd"] else set()
+    used: set[str] = set()
     used |= {"fieller", "differencing", "wilson"} if analysis["jnd"] else set()
     if analysis["preference"]:
         used |= {"wilson", "holm", "gee", "gee-small", "equivalence", "bayes"}
     used |= {"strengths"} if any(analysis["bradley_terry"].values()) else set()
-    return sorted(REFERENCES[key] for key in used)
+    return sorted({*works, *(REFERENCES[key] for key in used)})
+
+
+def _methods(protocol: Protocol) -> dict[str, Method]:
+    """The methods that the protocol's studies show, by name."""
+    return {name: method for study in protocol.studies for name, method in protocol.methods_of(study).items()}
 
 
 def _design(protocol: Protocol, analysis: Result, who: str) -> str:
@@ -159,8 +147,12 @@ def _against(protocol: Protocol, study: StudySpec) -> str:
 
 
 def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:
-    fixed = counted(protocol.fixed_frames_of(study), "frame")
-    return f"blends of {fixed}" if method == "fixed" else BLENDS[method]
+    used = protocol.methods_of(study)[method]
+    said = used.in_words(protocol.fps)
+    if method in METHODS:
+        return said
+    details = used.make.details()
+    return f"“{words.readable(method)}” ({said}{f'; {details}' if details else ''})"
 
 
 def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
@@ -172,11 +164,15 @@ def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
     cuts = len(manifest.records) - blended
     how, joint = "were cuts from a frame of the source to a frame of the destination.", "cut"
     if blended:
+        makes = [method.make for method in _methods(protocol).values() if isinstance(method.make, Blending)]
+        weights, feet = sorted({make.weight for make in makes}), {make.clean_feet for make in makes}
         how = (
-            f"were blended by spherical linear interpolation under a {shown.weight} weight, between a start frame in "
-            f"the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}."
+            f"were blended by spherical linear interpolation under a {' or '.join(weights)} weight, between a start "
+            f"frame in the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}."
         )
-        how += " Sliding of planted feet was removed after blending." if shown.clean_feet else ""
+        if True in feet:
+            where = ", where the method is said to do so" if False in feet else ""
+            how += f" Sliding of planted feet was removed after blending{where}."
         joint = "blend or the cut" if cuts else "blend"
     return (
         f"{counted(len(manifest.records), 'transition')} between {motions} {how} Each was rendered as a "

@@ -69,6 +69,11 @@ class BlendLength:
     unclipped_s: float | None = None
     note: str = ""
 
+    @property
+    def windows(self) -> tuple[int, int]:
+        """Frames of the source and of the destination in the blend, which are as many."""
+        return self.blend_frames, self.blend_frames
+
 
 def default_frames(fps: float, seconds: float) -> int:
     """A duration of the paper in whole frames, at least one."""

@@ -55,6 +55,11 @@ class WarpLength:
     shortest: int
     note: str = ""
 
+    @property
+    def windows(self) -> tuple[int, int]:
+        """Frames of the source and of the destination in the blend."""
+        return self.source_frames, self.destination_frames
+
 
 def warp_length(
     source: Clip,

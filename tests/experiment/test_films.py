@@ -10,10 +10,12 @@ from toys import ToyLibrary
 from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol, find_protocol, load_protocol, parse_protocol
 from study.experiment.stimuli.films import alike
-from study.experiment.stimuli.hops import Hops
 from study.experiment.stimuli.points import settle
 from study.experiment.stimuli.prepare import check, prepare
+from study.experiment.stimuli.ways import Ways
 from study.motion.library import open_library
+from study.transitions.methods.makes.blends import Blended
+from study.transitions.methods.makes.one_hop import Hop
 
 TEXT = """
 name = "pairs"
@@ -40,8 +42,8 @@ comparison = "fixed"
 
 def chosen(protocol: Protocol, library: object, again: bool) -> object:
     """The points of the first transition, with or without a look at whether the films differ."""
-    hops = Hops(protocol, library)  # type: ignore[arg-type]
-    look = (lambda study, settled: alike(study, settled, hops)) if again else None
+    ways = Ways(protocol, library)  # type: ignore[arg-type]
+    look = (lambda study, settled: alike(study, settled, ways)) if again else None
     return settle(protocol, protocol.studies[0], protocol.transitions[0], library, look)  # type: ignore[arg-type]
 
 
@@ -131,9 +133,9 @@ def test_no_captured_one_hop_transition_stands_beside_itself(mocap: Path) -> Non
     protocol = load_protocol(find_protocol("one_hop_vs_direct"))
     library = open_library(mocap / "cmu")
     transition = protocol.transition("tai_chi_dance")
-    study, hops = protocol.study("optimal"), Hops(protocol, library)
+    study, ways = protocol.study("optimal"), Ways(protocol, library)
     first = settle(protocol, study, transition, library)
-    assert hops.find(study, first).at_once
-    second = settle(protocol, study, transition, library, lambda one, points: alike(one, points, hops))
+    assert isinstance(ways.of(study, first, "one-hop"), Blended)
+    second = settle(protocol, study, transition, library, lambda one, points: alike(one, points, ways))
     assert second.tried > first.tried
-    assert not hops.find(study, second).at_once
+    assert isinstance(ways.of(study, second, "one-hop"), Hop)

@@ -7,10 +7,12 @@ import pytest
 
 from study.errors import ProtocolError, StimulusError
 from study.experiment.protocol.whole import Protocol, find_protocol, load_protocol, parse_protocol
-from study.experiment.stimuli.hops import Hops
+from study.experiment.stimuli.films import alike
 from study.experiment.stimuli.points import settle
 from study.experiment.stimuli.prepare import check, prepare
+from study.experiment.stimuli.ways import Ways
 from study.motion.library import Library, open_library
+from study.transitions.methods.makes.one_hop import Hop
 
 TEXT = """
 name = "hops"
@@ -75,15 +77,16 @@ def test_both_films_of_a_pair_show_the_same_span(protocol: Protocol, library: Li
 
 def test_the_hop_costs_no_more_than_direct_and_keeps_to_its_stays(protocol: Protocol, library: Library) -> None:
     (study,) = protocol.studies
-    hops = Hops(protocol, library)
+    ways = Ways(protocol, library)
     for transition in protocol.transitions:
         settled = settle(protocol, study, transition, library)
-        hop = hops.find(study, settled)
+        hop = ways.of(study, settled, "one-hop")
+        assert isinstance(hop, Hop)
         assert hop.cost <= hop.direct_cost
         assert 0 <= hop.stay_source <= 12
         assert 0 <= hop.stay_hop <= 12
         assert hop.weight > 0
-        made = hops.transition(study, settled)
+        made = hop.made(ways.place(study, settled))
         assert made.blend_stop == settled.start_frame + hop.frames
         before, after = made.clip.rotations[:-1], made.clip.rotations[1:]
         steps = 2 * np.arccos(np.clip(np.abs(np.sum(before * after, axis=-1)), 0, 1))
@@ -93,7 +96,11 @@ def test_the_hop_costs_no_more_than_direct_and_keeps_to_its_stays(protocol: Prot
 def test_without_stays_there_are_none(library: Library) -> None:
     protocol = parse_protocol(TEXT.replace("stay_s = 0.6", "stay_s = 0.0"))
     (study,) = protocol.studies
-    hop = Hops(protocol, library).find(study, settle(protocol, study, protocol.transitions[0], library))
+    ways = Ways(protocol, library)
+    # At points where the hop is worth it: where it isn't, the way is the direct blend.
+    settled = settle(protocol, study, protocol.transitions[0], library, lambda one, at: alike(one, at, ways))
+    hop = ways.of(study, settled, "one-hop")
+    assert isinstance(hop, Hop)
     assert (hop.stay_source, hop.stay_hop) == (0, 0)
 
 

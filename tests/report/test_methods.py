@@ -67,3 +67,18 @@ def test_works_whose_methods_were_not_used_are_not_cited(results_folder: MakeFol
     _, cited = paragraphs(gather(results_folder(2, videos=0, edit=edit)))
     assert not any(work.startswith(("Macmillan", "Fieller", "Koyama", "Bradley")) for work in cited)
     assert any(work.startswith("Schuirmann") for work in cited)
+
+
+def test_own_methods_are_described_by_their_parts_and_settings(results_folder: MakeFolder) -> None:
+    def edit(text: str) -> str:
+        own = (
+            '\n[[methods]]\nname = "eased_in"\nmake = "slerp"\nlength = "fixed"\nfixed_frames = 7\nweight = "sigmoid"\n'
+        )
+        return text.replace('comparison = "fixed"', 'comparison = "eased_in"') + own + "clean_feet = false\n"
+
+    told, cited = paragraphs(gather(results_folder(2, videos=0, edit=edit)))
+    words = "“eased in” (blends of 7 frames; sigmoid weight, sliding of planted feet left in)"
+    assert f"blends as long as the geodesic distance gives (2004) and {words}" in told["Participants and design"]
+    assert "under a linear or sigmoid weight" in told["Stimuli"]
+    assert "removed after blending, where the method is said to do so." in told["Stimuli"]
+    assert any(work.startswith("Shoemake") for work in cited)

@@ -13,6 +13,7 @@ from study.apps.cli.clips import clip_pair, clips_options
 from study.apps.cli.console import emit, json_option
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
+from study.transitions.methods.registry import METHODS
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     from study.transitions.blending import Transition
     from study.transitions.timewarp import WarpLength
 
-METHODS = ("fixed", "geodesic", "velocity", "timewarp")
+LENGTHS = {name: one.length for name, one in METHODS.items() if one.length.windows and not one.make.sets_span}
+"""Methods whose blend stands between two given frames, and the length of each."""
 
 
 def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -57,7 +59,7 @@ def specification_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command("blend-length")
 @clip_options
-@click.option("--method", type=click.Choice(METHODS), default="geodesic", show_default=True)
+@click.option("--method", type=click.Choice(list(LENGTHS)), default="geodesic", show_default=True)
 @click.option("--fixed-frames", type=click.IntRange(min=1), help="For --method fixed; 0.33 s unless given.")
 @weights_option
 @specification_option
@@ -95,16 +97,15 @@ def blend_length(
         raise click.UsageError(f"expected --out as a name that ends in .png or .csv, found {str(out)!r}.")
     first, second = clip_pair(source, destination, library, fps)
     words = f"{source} frame {start} to {destination} frame {end}, {method}"
-    if method == "timewarp":
-        _check_timewarp(specification)
-        warped = warp_length(first, second, start, end, weights=weights, average=not printed_sum)
-        found: BlendLength | WarpLength = warped
-        windows = (warped.source_frames, warped.destination_frames)
-        result: dict[str, Any] = {"costs": warped.costs, "shortest": warped.shortest}
+    found: BlendLength | WarpLength
+    if LENGTHS[method].windows == 2:
+        _check_two_windows(method, specification)
+        found = warp_length(first, second, start, end, weights=weights, average=not printed_sum)
+        result: dict[str, Any] = {"costs": found.costs, "shortest": found.shortest}
         if out is not None:
-            show_warped(warped, fps, out, words)
+            show_warped(found, fps, out, words)
     else:
-        chosen = choose(
+        found = choose(
             first,
             second,
             start,
@@ -114,10 +115,10 @@ def blend_length(
             weights=weights,
             specification=specification,
         )
-        found, windows = chosen, (chosen.blend_frames, chosen.blend_frames)
-        result = {"costs": chosen.costs, "joint": chosen.joint, "unclipped_s": chosen.unclipped_s}
+        result = {"costs": found.costs, "joint": found.joint, "unclipped_s": found.unclipped_s}
         if out is not None:
-            show_lengths(first, second, (start, end), chosen, out, (weights, specification), words)
+            show_lengths(first, second, (start, end), found, out, (weights, specification), words)
+    windows = found.windows
     differences = major_joint_differences(first, second, start, end)
     keys = {"blend_frames": found.blend_frames, "blend_s": found.blend_s, "cost": found.cost, "note": found.note}
     keys |= {"source_frames": windows[0], "destination_frames": windows[1], "method": method, "fps": fps}
@@ -133,14 +134,14 @@ def blend_length(
     emit(result, as_json, "\n".join(lines))
 
 
-def _check_timewarp(specification: str) -> None:
+def _check_two_windows(method: str, specification: str) -> None:
     if specification != "start-end":
-        raise click.UsageError("expected --specification start-end with timewarp: its two windows differ in length.")
+        raise click.UsageError(f"expected --specification start-end with {method}: its two windows differ in length.")
 
 
 @click.command()
 @clip_options
-@click.option("--method", type=click.Choice(METHODS), help="Choose the blend length by this method.")
+@click.option("--method", type=click.Choice(list(LENGTHS)), help="Choose the blend length by this method.")
 @click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
 @click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
 @specification_option
@@ -245,13 +246,12 @@ def join(
     from study.transitions.blending import blend
     from study.transitions.timewarp import warp_length, warped_blend
 
-    if method == "timewarp":
-        _check_timewarp(specification)
+    if method is not None and LENGTHS[method].windows == 2:
+        _check_two_windows(method, specification)
         if shorter:
-            raise click.UsageError("expected no --joint with timewarp: its joints share one warp.")
+            raise click.UsageError(f"expected no --joint with {method}: its joints share one warp.")
         warped = warp_length(source, destination, *points)
-        windows = (warped.source_frames, warped.destination_frames)
-        return warped_blend(source, destination, *points, *windows, weight=weight), warped
+        return warped_blend(source, destination, *points, *warped.windows, weight=weight), warped
     chosen = None
     if frames is None:
         chosen = choose(source, destination, *points, method=method or "geodesic", specification=specification)

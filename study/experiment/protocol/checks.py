@@ -14,8 +14,9 @@ from pydantic import ValidationError
 from study.counting import counted
 from study.experiment.protocol.errors import KeyMismatchError, short
 from study.experiment.protocol.stimuli import Points, Timing, TransitionSpec
-from study.experiment.protocol.studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec, check_once, repeated
+from study.experiment.protocol.studies import AnalysisSettings, StudySpec, check_once, repeated
 from study.experiment.protocol.texts import LONGEST_NAME
+from study.transitions.methods.method import Method
 
 MOST_TRIALS = 100_000
 """Of one participant in one study: far beyond what anybody could answer."""
@@ -39,6 +40,13 @@ class Whole(Shape):
     @property
     def analysis(self) -> AnalysisSettings:
         """Decisions about the analysis."""
+
+    @property
+    def method_names(self) -> tuple[str, ...]:
+        """The methods that studies can name."""
+
+    def methods_of(self, study: StudySpec) -> dict[str, Method]:
+        """The methods of a study."""
 
     def transitions_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
         """The transitions of a study's trials."""
@@ -65,7 +73,7 @@ def check_whole(protocol: Whole) -> None:
 
 def _check_names(protocol: Whole) -> None:
     """Refuse names that stand twice, and studies that name transitions that there are not."""
-    for kind in ("transitions", "studies", "form"):
+    for kind in ("transitions", "methods", "studies", "form"):
         names = [part.name for part in getattr(protocol, kind)]
         if (index := repeated(names)) is not None:
             message = f"expected each name in {kind} once, found {names[index]!r} twice; rename one"
@@ -76,8 +84,35 @@ def _check_names(protocol: Whole) -> None:
             names = getattr(study, key)
             _check_known(names, known, "transitions", "studies", index, key)
             check_once(names, "transition", "studies", index, key)
+        _check_methods(protocol, study, index)
         _check_practice(protocol, study, index)
         _check_lengths(protocol, study, index)
+
+
+def _check_methods(protocol: Whole, study: StudySpec, index: int) -> None:
+    """Refuse methods that there are not, and those that can't stand in a study of this kind, or side by side."""
+    where, who = ("studies", index), f"the {study.task} study {study.name!r}"
+    for key in ("reference", "comparison"):
+        if name := getattr(study, key):
+            _check_known([name], protocol.method_names, "methods", *where, key)
+    methods = protocol.methods_of(study)
+    if study.task == "same-different" and not methods[study.reference].make.levels:
+        raise KeyMismatchError(
+            f"expected a reference with one blend length in {who}, found {study.reference!r}; change it",
+            *where,
+            "reference",
+        )
+    if len({method.points.own for method in methods.values()}) > 1:
+        raise KeyMismatchError(
+            f"expected in {who} either cuts where a metric is least or methods at common points, found "
+            f"{study.reference!r} and {study.comparison!r}; change one",
+            *where,
+            "comparison",
+        )
+    for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
+        for method in methods.values():
+            if lacking := method.make.lacks(transition.name):
+                raise KeyMismatchError(f"the method {method.name!r} of {who}: {lacking}", *where)
 
 
 def _check_known(names: Sequence[str], known: Sequence[str], what: str, *location: int | str) -> None:
@@ -155,7 +190,7 @@ def _check_points(protocol: Whole, study: StudySpec, transition: TransitionSpec,
         points = protocol.points_for(study, transition)
     except ValidationError as error:
         raise KeyMismatchError(f"contradicting conditions {who}: {error.errors()[0]['ctx']['error']}", *where) from None
-    if points.choose == "given" and study.reference in OPTIMUM_CUTS:
+    if points.choose == "given" and protocol.methods_of(study)[study.reference].points.own:
         raise KeyMismatchError(
             f"expected no given points {who}: {study.reference!r} finds its own; remove choose or change the method",
             *where,

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from study.experiment.protocol.errors import model_at, parts
 from study.experiment.protocol.whole import Protocol
 
-_REPEATED = ("transitions", "studies", "studies.items", "form")
+_REPEATED = ("transitions", "studies", "studies.items", "methods", "form")
 _WORDS = {int: "whole number", float: "number", str: "text", bool: "true or false"}
 
 

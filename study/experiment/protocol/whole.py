@@ -22,14 +22,16 @@ from study.errors import FileError, ProtocolError
 from study.experiment.protocol.checks import check_whole
 from study.experiment.protocol.errors import explain, full_location, key_lines, line_of, telling
 from study.experiment.protocol.languages import with_words
+from study.experiment.protocol.methods import OwnMethod
 from study.experiment.protocol.stimuli import Points, StimulusSettings, Timing, TransitionSpec
-from study.experiment.protocol.studies import OPTIMUM_CUTS, AnalysisSettings, StudySpec
+from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
 from study.files import read_text
 from study.toml_text import LARGEST_TEXT, parse_toml
+from study.transitions.methods.method import Method
+from study.transitions.methods.registry import METHODS
 
 __all__ = [
-    "OPTIMUM_CUTS",
     "Points",
     "Protocol",
     "StimulusSettings",
@@ -79,6 +81,9 @@ class Protocol(Part):
     )
     studies: Annotated[tuple[StudySpec, ...], Field(strict=False, min_length=1, max_length=100)] = Field(
         description="The studies of the sitting, one `[[studies]]` each, in order."
+    )
+    methods: Annotated[tuple[OwnMethod, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+        default=(), description="Methods of the protocol's own, one `[[methods]]` each."
     )
 
     _text: str = PrivateAttr(default="")
@@ -133,6 +138,26 @@ class Protocol(Part):
         from study.transitions.blend_length import FIXED_S, default_frames
 
         return study.fixed_frames or default_frames(self.fps, FIXED_S)
+
+    @property
+    def method_names(self) -> tuple[str, ...]:
+        """The methods that studies can name: those built in, and the protocol's own."""
+        return (*METHODS, *(own.name for own in self.methods))
+
+    def methods_of(self, study: StudySpec) -> dict[str, Method]:
+        """The methods of a study by name, with their settings: the method's own, the study's, those of `[stimuli]`."""
+        hop = study.one_hop.model_dump()
+        settings = {key: getattr(self.stimuli, key) for key in ("weight", "clean_feet")}
+        settings |= {"hop_weight": hop.pop("weight"), **hop, "fixed_frames": self.fixed_frames_of(study)}
+        own = {one.name: one for one in self.methods}
+        return {
+            name: own[name].method(settings) if name in own else METHODS[name].with_settings(settings)
+            for name in study.methods
+        }
+
+    def path_of(self, file: str) -> Path:
+        """A file that the protocol names, from the folder of the protocol's own file."""
+        return (self._path.parent if self._path else Path()) / file
 
     @property
     def scale_points(self) -> dict[str, int]:

@@ -1,7 +1,7 @@
 """Films: which ones a study shows of a transition and how long they take, before any of them is made.
 
-A study, settled points and the hops come in; pairs of `Film`s go out. Two films that are equal look the same, so this
-is also where it shows that two methods would make one film.
+A study, settled points and the ways of its methods come in; pairs of `Film`s go out. Two films that are equal look the
+same, so this is also where it shows that two methods would make one film.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING
 
 from study.errors import SegueError
 from study.experiment.protocol.whole import Protocol, StudySpec
-from study.experiment.stimuli.hops import METHOD as HOP_METHOD
-from study.experiment.stimuli.hops import Hop, Hops
 from study.experiment.stimuli.points import Settled, settle
-from study.transitions.timewarp import WarpLength
+from study.experiment.stimuli.ways import Ways
+from study.transitions.methods.method import Way
 
 if TYPE_CHECKING:
     from study.motion.library import Library
@@ -23,35 +22,31 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Film:
-    """What makes two stimuli the same: transition, points, blend, and nothing else.
+    """What makes two stimuli the same: transition, points, the way it is made, and nothing else.
 
     Parameters
     ----------
-    transition, start_frame, end_frame, blend_frames
-        Which transition, where, and how long.
+    transition, start_frame, end_frame
+        Which transition, and where.
     added
         Frames that were added in front of the two motions.
-    hop
-        The way by another motion; None for a direct blend.
+    way
+        How it is made, with its length.
     frames_on
         How long the destination goes on, so that both films of a pair end together.
-    windows
-        Source and destination frames of a time-warped blend; None where they are as many.
     """
 
     transition: str
     start_frame: int
     end_frame: int
-    blend_frames: int
     added: tuple[int, int]
-    hop: Hop | None = None
+    way: Way
     frames_on: int = 0
-    windows: tuple[int, int] | None = None
 
     def frames(self, protocol: Protocol) -> int:
-        """Frames in all: entry, blend or hop, and exit."""
+        """Frames in all: entry, transition and exit."""
         entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
-        return entry + (self.blend_frames if self.hop is None else self.hop.frames) + self.frames_on + after
+        return entry + self.way.frames + self.frames_on + after
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +81,7 @@ class Planned:
 
 
 def plan_all(
-    protocol: Protocol, library: Library, hops: Hops, progress: Callable[[int, int], None] | None = None
+    protocol: Protocol, library: Library, ways: Ways, progress: Callable[[int, int], None] | None = None
 ) -> tuple[list[Planned], list[str]]:
     """What every study shows of every transition, and the problems of what can't be shown, one sentence each."""
     todo = [
@@ -98,8 +93,8 @@ def plan_all(
     problems: dict[str, None] = {}
     for done, (study, transition) in enumerate(todo, start=1):
         try:
-            settled = settle(protocol, study, transition, library, lambda one, points: alike(one, points, hops))
-            planned.append(Planned(study, settled, tuple(showings(study, settled, hops))))
+            settled = settle(protocol, study, transition, library, lambda one, points: alike(one, points, ways))
+            planned.append(Planned(study, settled, tuple(showings(study, settled, ways))))
         except SegueError as error:
             problems[str(error)] = None
         if progress:
@@ -107,44 +102,33 @@ def plan_all(
     return planned, list(problems)
 
 
-def showings(study: StudySpec, settled: Settled, hops: Hops) -> Iterator[Showing]:
+def showings(study: StudySpec, settled: Settled, ways: Ways) -> Iterator[Showing]:
     """The pairs of one transition in one study, or its single films where they are rated one by one."""
-    hop = hops.find(study, settled) if HOP_METHOD in study.methods else None
-    a = _film(settled, study.reference, 0, hop)
+    a = _film(study, settled, study.reference, 0, ways)
     if study.task == "same-different":
         for difference in study.levels_of(settled.transition.name):
-            other = _film(settled, study.reference, difference, hop)
+            other = _film(study, settled, study.reference, difference, ways)
             yield Showing(settled, a, other, study.reference, study.reference, difference)
     elif study.paired:
         method = study.comparison or study.reference
-        yield Showing(settled, a, _film(settled, method, 0, hop), study.reference, method, None)
+        yield Showing(settled, a, _film(study, settled, method, 0, ways), study.reference, method, None)
     else:
         for method in study.methods:
-            yield Showing(settled, _film(settled, method, 0, hop), None, method, method, None)
+            yield Showing(settled, _film(study, settled, method, 0, ways), None, method, method, None)
 
 
-def alike(study: StudySpec, settled: Settled, hops: Hops) -> bool:
+def alike(study: StudySpec, settled: Settled, ways: Ways) -> bool:
     """Whether the two methods of a study would show one film at these points."""
     if study.comparison is None:
         return False
-    hop = hops.find(study, settled) if HOP_METHOD in study.methods else None
-    return _film(settled, study.reference, 0, hop) == _film(settled, study.comparison, 0, hop)
+    a, b = (_film(study, settled, method, 0, ways) for method in (study.reference, study.comparison))
+    return a == b
 
 
-def _film(settled: Settled, method: str, difference: int, hop: Hop | None) -> Film:
-    own, length = settled.at(method), settled.lengths[method]
-    frames = length.blend_frames + difference
+def _film(study: StudySpec, settled: Settled, method: str, difference: int, ways: Ways) -> Film:
+    own, way = settled.at(method), ways.of(study, settled, method, difference)
     # What stands beside a one-hop transition is shown for as long as that one takes.
-    on = 0 if hop is None or method == HOP_METHOD else max(hop.frames - frames, 0)
-    return Film(
-        settled.transition.name,
-        own.start_frame,
-        own.end_frame,
-        frames,
-        (settled.source.added_before, settled.destination.added_before),
-        hop if hop is not None and method == HOP_METHOD and not hop.at_once else None,
-        on,
-        (length.source_frames, length.destination_frames)
-        if isinstance(length, WarpLength) and length.source_frames != length.destination_frames
-        else None,
-    )
+    spans = [name for name, each in ways.methods(study).items() if each.make.sets_span and name != method]
+    on = max((ways.of(study, settled, name).frames - way.frames for name in spans), default=0)
+    added = (settled.source.added_before, settled.destination.added_before)
+    return Film(settled.transition.name, own.start_frame, own.end_frame, added, way, max(on, 0))

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING
 
 from study.counting import counted, noun
 from study.experiment.protocol.whole import Protocol, StudySpec
-from study.experiment.stimuli.films import Planned, Showing, plan_all
-from study.experiment.stimuli.hops import METHOD as HOP_METHOD
-from study.experiment.stimuli.hops import Hops
-from study.experiment.stimuli.points import Supply
+from study.experiment.stimuli.films import Film, Planned, Showing, plan_all
+from study.experiment.stimuli.supply import Supply
+from study.experiment.stimuli.ways import Ways
 from study.experiment.wording import Films, FilmTimes, duration_s, minutes
 from study.motion.clip import file_frame
 from study.transitions.advice import JND_LONGER_S, JND_SHORTER_S, just_noticeable
-from study.transitions.timewarp import WarpLength
 
 if TYPE_CHECKING:
     from study.motion.library import Library
@@ -95,7 +93,7 @@ class Outlook:
 
 def look_ahead(protocol: Protocol, library: Library) -> Outlook:
     """Plan all films of a protocol and describe them."""
-    planned, problems = plan_all(protocol, library, Hops(protocol, library))
+    planned, problems = plan_all(protocol, library, Ways(protocol, library))
     times = {study.name: found for study in protocol.studies if (found := _times(study, protocol, planned))}
     films = {film for each in planned for showing in each.showings for film in showing.films}
     usual, longest = (minutes(duration_s(protocol, at_most=most, films=times)) for most in (False, True))
@@ -116,9 +114,9 @@ def _row(protocol: Protocol, planned: Planned) -> Row:
     films = {film for showing in planned.showings for film in showing.films}
     seconds = [film.frames(protocol) / fps for film in films]
     lengths: dict[str, tuple[int, ...]] = {method: _lengths(planned.showings, method) for method in study.methods}
-    hops = [f"one-hop: {film.hop.words}" for film in films if film.hop is not None]
+    made = dict.fromkeys(f"{by}: {film.way.note}" for film, by in _seen(planned.showings) if film.way.note)
     gave_up = [f"{method}: {settled.lengths[method].note}" for method in study.methods if settled.lengths[method].note]
-    k_frames = settled.lengths[study.reference].blend_frames
+    k_frames = planned.showings[0].a.way.blend_frames
     return Row(
         study.name,
         settled.transition.name,
@@ -132,7 +130,7 @@ def _row(protocol: Protocol, planned: Planned) -> Row:
         None if planned.for_practice else protocol.trials_of(study) // len(protocol.transitions_of(study)),
         len(films),
         (min(seconds), max(seconds)),
-        (*gave_up, *hops),
+        (*gave_up, *made),
     )
 
 
@@ -144,9 +142,15 @@ def _place(supply: Supply, frame: int) -> Place:
 
 def _lengths(showings: Sequence[Showing], method: str) -> tuple[int, ...]:
     """The lengths by one method, each once, the shortest first."""
-    seen = ((film, by) for each in showings for film, by in ((each.a, each.method_a), (each.b, each.method_b)))
-    films = {film for film, by in seen if film is not None and by == method}
-    return tuple(sorted({film.blend_frames if film.hop is None else film.hop.frames for film in films}))
+    return tuple(sorted({film.way.frames for film, by in _seen(showings) if by == method}))
+
+
+def _seen(showings: Sequence[Showing]) -> Iterator[tuple[Film, str]]:
+    """Each film with its method."""
+    for each in showings:
+        yield each.a, each.method_a
+        if each.b is not None:
+            yield each.b, each.method_b
 
 
 def _times(study: StudySpec, protocol: Protocol, planned: Sequence[Planned]) -> FilmTimes | None:
@@ -166,10 +170,8 @@ def _times(study: StudySpec, protocol: Protocol, planned: Sequence[Planned]) -> 
 def _too_alike(protocol: Protocol, planned: Sequence[Planned]) -> Iterator[str]:
     """Studies whose two methods differ by less than people notice (2004 section 5.1), one sentence each."""
     for study in protocol.studies:
-        if len(study.methods) < 2 or HOP_METHOD in study.methods or study.reference.startswith("cut-"):
-            continue
         own = [each for each in planned if each.study is study and not each.for_practice]
-        apart = {each.settled.transition.name: _difference(each) for each in own}
+        apart = {each.settled.transition.name: frames for each in own if (frames := _longer(each)) is not None}
         named = [f"{name} {frames:+d}" for name, frames in apart.items() if just_noticeable(frames / protocol.fps) < 1]
         if named:
             longer, shorter = (round(s * protocol.fps) for s in (JND_LONGER_S, JND_SHORTER_S))
@@ -181,14 +183,10 @@ def _too_alike(protocol: Protocol, planned: Sequence[Planned]) -> Iterator[str]:
             )
 
 
-def _difference(planned: Planned) -> int:
-    """Frames by which the comparison's windows are longer than the reference's, the one that differs most."""
-    study, lengths = planned.study, planned.settled.lengths
-    windows = [
-        (length.source_frames, length.destination_frames)
-        if isinstance(length := lengths[method], WarpLength)
-        else (length.blend_frames, length.blend_frames)
-        for method in study.methods
-    ]
-    apart: list[int] = [b - a for a, b in zip(*windows, strict=True)]
-    return max(apart, key=abs)
+def _longer(planned: Planned) -> int | None:
+    """Frames by which the comparison is longer than the reference, where they differ in length alone."""
+    films = {by: film for film, by in _seen(planned.showings)}
+    a, b = (films.get(name or "") for name in (planned.study.reference, planned.study.comparison))
+    if a is None or b is None or planned.settled.optima:
+        return None
+    return b.way.longer_than(a.way)

@@ -1,0 +1,107 @@
+"""Blends by spherical linear interpolation, plain or time-warped, and the cut, which is a blend of no frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Make, Place, Way, setting
+
+if TYPE_CHECKING:
+    from study.transitions.blending import Transition
+
+
+@dataclass(frozen=True)
+class Blended(Way):
+    """A blend of so many source and destination frames, under a weight, with feet planted or not; a cut of none."""
+
+    windows: tuple[int, int]
+    weight: str = "linear"
+    clean_feet: bool = False
+
+    @property
+    def frames(self) -> int:
+        """The longer of the two windows."""
+        return max(self.windows)
+
+    @property
+    def blend_frames(self) -> int:
+        """The longer of the two windows."""
+        return max(self.windows)
+
+    def made(self, place: Place) -> Transition:
+        """Cut, blend, or warp and blend; then plant the feet."""
+        from study.transitions.blending import blend, cut
+        from study.transitions.footskate import plant_feet
+        from study.transitions.timewarp import warped_blend
+
+        clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
+        if self.blend_frames == 0:
+            return cut(*clips, *points)
+        if self.windows[0] != self.windows[1]:
+            made = warped_blend(*clips, *points, *self.windows, weight=self.weight)
+        else:
+            made = blend(*clips, *points, self.blend_frames, weight=self.weight)
+        # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
+        return plant_feet(made, *clips)[0] if self.clean_feet else made
+
+    def longer_than(self, other: Way) -> int | None:
+        """The larger difference of the two windows; a cut differs from a blend in its length alone."""
+        if not isinstance(other, Blended):
+            return None
+        if self.blend_frames and other.blend_frames and replace(self, windows=other.windows) != other:
+            return None
+        return max((b - a for a, b in zip(other.windows, self.windows, strict=True)), key=abs)
+
+
+@dataclass(frozen=True)
+class Blending(Make):
+    """What all makes that blend can be told."""
+
+    weight: Literal["linear", "sigmoid"] = setting(
+        "linear", "How the blend weight runs from 0 to 1; as in `[stimuli]` where it is left out."
+    )
+    clean_feet: bool = setting(
+        True, "Whether sliding of planted feet is removed after blending; as in `[stimuli]` where it is left out."
+    )
+
+    def details(self) -> str:
+        """The weight and the feet."""
+        return f"{self.weight} weight, sliding of planted feet {'removed' if self.clean_feet else 'left in'}"
+
+
+class Slerp(Blending):
+    """A blend by spherical linear interpolation (2004 section 3)."""
+
+    name = "slerp"
+    words = "blends {length} {points}"
+    sources = (SHOEMAKE_1985,)
+    levels = True
+
+    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+        """A blend of that many frames."""
+        del place
+        return Blended(windows, self.weight, self.clean_feet)
+
+
+class Warped(Slerp):
+    """A blend of two windows of different length, the shorter one slowed (2004 section 3.1.4)."""
+
+    name = "timewarp"
+    words = "time-warped blends (2004) {points}"
+    windows = 2
+    levels = False
+
+
+class Cut(Make):
+    """From one frame to the next, without a blend (2003 section 4.2)."""
+
+    name = "cut"
+    words = "cuts {points}"
+    sources = (WANG_2003,)
+    windows = 0
+
+    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+        """No blended frames."""
+        del place
+        return Blended(windows)

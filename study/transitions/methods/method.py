@@ -1,0 +1,312 @@
+"""What a method is: the choice of where a transition stands, how long its blend takes, and how its frames are made.
+
+Three independent parts make a method: `Points`, `Length` and `Make`. Each member is a frozen dataclass in a module of
+its own; its fields are its settings, which are also the keys that a protocol's `[[methods]]` takes. The registry finds
+members by name. A make first decides a `Way`, which is cheap to compare, and the way makes the frames when asked.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy as np
+
+    from study.motion.clip import Clip
+    from study.transitions.blend_length import BlendLength
+    from study.transitions.blending import Transition
+    from study.transitions.timewarp import WarpLength
+
+CANDIDATES = 2000
+"""So many pairs of frames are tried before a transition is refused, unless a part takes long to try."""
+
+LONGEST_BLEND_S, USUAL_BLEND_S = 2.0, 1.0
+"""Longest blend that is looked for (2004: 0.03 to 2 s), and what a blend is taken to last before it is known."""
+
+WANG_2003 = (
+    "Wang, J., & Bodenheimer, B. (2003). An evaluation of a cost metric for selecting transitions between motion "
+    "segments. Symposium on Computer Animation, 232–238."
+)
+WANG_2004 = (
+    "Wang, J., & Bodenheimer, B. (2004). Computing the duration of motion transitions: An empirical approach. "
+    "Symposium on Computer Animation, 335–344."
+)
+SHOEMAKE_1985 = "Shoemake, K. (1985). Animating rotation with quaternion curves. SIGGRAPH, 245–254."
+
+Kept = TypeVar("Kept")
+
+
+def setting(default: Any, words: str) -> Any:
+    """A field of a part, with the words that explain it to who writes a protocol; `[unit]` may stand at their end."""
+    return field(default=default, metadata={"words": words})
+
+
+class Motions(Protocol):
+    """What a make may ask for beside the two clips that it joins."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The motions of the study."""
+
+    def clip(self, name: str, like: Clip) -> Clip:
+        """A motion of the library at the frame rate and on the skeleton of another."""
+
+    def path(self, file: str) -> Path:
+        """Where a file is that the protocol names."""
+
+    def generator(self, purpose: str) -> np.random.Generator:
+        """A generator that depends on the protocol's seed and on the purpose alone."""
+
+    def once(self, key: Hashable, find: Callable[[], Kept]) -> Kept:
+        """What was found before under a key, else what `find` returns, which is kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a transition is made.
+
+    Parameters
+    ----------
+    transition
+        Its name in the protocol.
+    names
+        The motions' names in the library.
+    source, destination
+        Clips of one rig at one frame rate.
+    start_frame, end_frame
+        First blended frame of the source, last blended frame of the destination.
+    motions
+        Other motions and files.
+    """
+
+    transition: str
+    names: tuple[str, str]
+    source: Clip
+    destination: Clip
+    start_frame: int
+    end_frame: int
+    motions: Motions
+
+
+@dataclass(frozen=True)
+class Room:
+    """Frames that a method needs around its points, besides entry and exit.
+
+    Parameters
+    ----------
+    blend
+        From the start point on and up to the end point, at least.
+    search
+        The same, where the motions have them, so that long blends can be found.
+    entry
+        Before the start point, at least.
+    stay, after
+        Beyond the blend in both motions, and beyond the exit in the destination.
+    """
+
+    blend: int = 1
+    search: int = 1
+    entry: int = 0
+    stay: int = 0
+    after: int = 0
+
+
+class Way(ABC):
+    """How the frames of one transition are made, decided and not yet made. Equal ways make equal frames."""
+
+    @property
+    @abstractmethod
+    def frames(self) -> int:
+        """Frames from the start point until the destination plays alone."""
+
+    @property
+    @abstractmethod
+    def blend_frames(self) -> int:
+        """The blend length, in frames; 0 for a cut."""
+
+    @property
+    def lead(self) -> int:
+        """Frames of the source alone between the start point and the blend."""
+        return 0
+
+    @property
+    def note(self) -> str:
+        """What a reader should know of it beside its length."""
+        return ""
+
+    @abstractmethod
+    def made(self, place: Place) -> Transition:
+        """Make the frames."""
+
+    def lacking(self, entry: int, after: int) -> str:
+        """What is missing for so many frames before and after, in words; empty where the two clips supply them."""
+        del entry, after
+        return ""
+
+    def longer_than(self, other: Way) -> int | None:
+        """By how many frames the blend is longer, where that is all that differs; None where the make differs."""
+        del other
+        return None
+
+
+@dataclass(frozen=True)
+class MethodPart(ABC):
+    """What the three kinds of parts share: a name, words for a report, the works that it comes from, and settings."""
+
+    name: ClassVar[str]
+    words: ClassVar[str]
+    sources: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def setting_names(cls) -> tuple[str, ...]:
+        """Names of the settings."""
+        return tuple(one.name for one in fields(cls))
+
+    def with_settings(self, settings: Mapping[str, Any]) -> Self:
+        """The same part with those of the settings that it takes."""
+        return replace(self, **{key: settings[key] for key in self.setting_names() if key in settings})
+
+    def in_words(self, fps: float) -> str:
+        """What a Methods section says of the part, at a frame rate."""
+        del fps
+        return self.words
+
+
+class Points(MethodPart):
+    """Where a transition stands: at points that all methods of a study share, or at points of the method's own."""
+
+    own: ClassVar[bool] = False
+
+    def best(
+        self, source: Clip, destination: Clip, windows: tuple[tuple[int, int], tuple[int, int]], shift: int | None
+    ) -> tuple[int, int]:
+        """The start and the end frame, for points of the method's own.
+
+        Parameters
+        ----------
+        source, destination
+            Clips of one rig at one frame rate.
+        windows
+            The frames of each clip that may be chosen, as slices count them.
+        shift
+            Where both clips show one motion, the destination's frame number of the source's frame 0; else None.
+        """
+        raise NotImplementedError(f"{self.name} has no points of its own")
+
+
+class Length(MethodPart):
+    """How long a blend takes.
+
+    `windows` counts the lengths that it gives: none (a cut), one for both motions, or two. `follows` says whether the
+    length depends on the points, so that a protocol's conditions on points are about it; `draws` how many points may
+    be tried.
+    """
+
+    windows: ClassVar[int] = 1
+    follows: ClassVar[bool] = True
+    draws: ClassVar[int] = CANDIDATES
+
+    @abstractmethod
+    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> BlendLength | WarpLength:
+        """The length at two points.
+
+        Raises
+        ------
+        TransitionError
+            Where the clips do not supply it.
+        """
+
+    def room(self, fps: float, longest_frames: int | None) -> Room:
+        """What it needs around its points, where no blend beyond a length is wanted."""
+        search = round(LONGEST_BLEND_S * fps)
+        return Room(min(longest_frames or search, search), search)
+
+
+class Make(MethodPart):
+    """How the frames of a transition are made.
+
+    `windows` is what it takes of a length (see `Length.windows`). `levels` says whether its blend can be lengthened and
+    shortened in a same-different study, `sets_span` whether what stands beside it in a pair is shown for as long, and
+    `draws` how many points may be tried where it makes what the other method makes. In `words`, `{length}` and
+    `{points}` are replaced by those of the other parts.
+    """
+
+    windows: ClassVar[int] = 1
+    levels: ClassVar[bool] = False
+    sets_span: ClassVar[bool] = False
+    draws: ClassVar[int] = CANDIDATES
+
+    @abstractmethod
+    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+        """Decide how a transition is made over so many frames of the source and of the destination.
+
+        Raises
+        ------
+        TransitionError, MotionError
+            Where it can't be made.
+        """
+
+    def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
+        """What the make needs around the points; by default what the length needs."""
+        return length.room(fps, longest_frames)
+
+    def usual_s(self, length: Length, fps: float) -> float:
+        """Seconds that it takes, as far as can be told before points are known."""
+        del length, fps
+        return USUAL_BLEND_S
+
+    def details(self) -> str:
+        """The settings in words, for methods of a protocol's own."""
+        return ""
+
+    def files(self) -> tuple[str, ...]:
+        """The files that it reads, as the protocol names them."""
+        return ()
+
+    def lacks(self, transition: str) -> str:
+        """What its settings lack to make a transition of the protocol, in words; empty where they lack nothing."""
+        del transition
+        return ""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method: a name, its three parts, and how natural simulated observers find its transitions.
+
+    `utility` are log-odds of being chosen over a blend of fixed length.
+    """
+
+    name: str
+    points: Points
+    length: Length
+    make: Make
+    utility: float = 0.0
+
+    def with_settings(self, settings: Mapping[str, Any]) -> Method:
+        """The same method with those of the settings that its parts take."""
+        return replace(
+            self,
+            points=self.points.with_settings(settings),
+            length=self.length.with_settings(settings),
+            make=self.make.with_settings(settings),
+        )
+
+    def in_words(self, fps: float) -> str:
+        """What a Methods section calls its transitions, at a frame rate."""
+        length, points = self.length.in_words(fps), self.points.in_words(fps)
+        said = self.make.in_words(fps).format(length=length, points=points)
+        return " ".join(said.split())
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The works that it rests on, as references."""
+        return tuple(dict.fromkeys((*self.points.sources, *self.length.sources, *self.make.sources)))
+
+    def room(self, fps: float, longest_frames: int | None) -> Room:
+        """What it needs around its points."""
+        return self.make.room(self.length, fps, longest_frames)

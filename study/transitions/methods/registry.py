@@ -1,0 +1,38 @@
+"""Every member of the three parts by name, and the methods of the papers, which are built in.
+
+A new part is one module and one line here; a new method is one more triple. Everything else asks this registry: points,
+stimuli, protocol, reports, simulated observers and the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from study.transitions.methods.lengths.none import NoLength
+from study.transitions.methods.lengths.one_window import Fixed, Geodesic, Velocity
+from study.transitions.methods.lengths.two_windows import Timewarp
+from study.transitions.methods.makes.blends import Cut, Slerp, Warped
+from study.transitions.methods.makes.one_hop import OneHop
+from study.transitions.methods.method import Length, Make, Method, Points
+from study.transitions.methods.points.least_cost import LeastCost
+from study.transitions.methods.points.shared import Shared
+
+POINTS: Mapping[str, type[Points]] = {part.name: part for part in (Shared, LeastCost)}
+LENGTHS: Mapping[str, type[Length]] = {part.name: part for part in (Fixed, Geodesic, Velocity, Timewarp, NoLength)}
+MAKES: Mapping[str, type[Make]] = {part.name: part for part in (Slerp, Warped, Cut, OneHop)}
+
+# Utilities by 2004 Table 2; of cuts at two optima, the distance that gives 2003's F of 6.39 in ratings.
+METHODS: Mapping[str, Method] = {
+    method.name: method
+    for method in (
+        Method("fixed", Shared(), Fixed(), Slerp(), 0.0),
+        Method("velocity", Shared(), Velocity(), Slerp(), 0.65),
+        Method("geodesic", Shared(), Geodesic(), Slerp(), 3.29),
+        Method("timewarp", Shared(), Timewarp(), Warped(), 3.06),
+        Method("cut", Shared(), NoLength(), Cut(), -2.0),
+        Method("cut-lee2002", LeastCost("lee2002"), NoLength(), Cut(), -2.6),
+        Method("cut-wang2003", LeastCost("wang2003"), NoLength(), Cut(), -0.2),
+        Method("cut-pointcloud", LeastCost("pointcloud"), NoLength(), Cut(), -1.4),
+        Method("one-hop", Shared(), Fixed(), OneHop(), 1.5),
+    )
+}
