@@ -188,7 +188,7 @@ def _next(view: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     """The sound message that follows a view."""
     if view["kind"] == "trial":
         shown = [
-            {"place": film["place"], "method": "none", "frames_presented": 30, "longest_gap_frames": 1.0,
+            {"slot": film["slot"], "method": "none", "frames_presented": 30, "longest_gap_frames": 1.0,
              "shown_well": True, "times_ms": [1.5, 2.5], "frames": [0, 1]}
             for film in view["films"]
         ]  # fmt: skip

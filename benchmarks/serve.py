@@ -154,7 +154,7 @@ def answer_to(view: dict[str, Any], value: str) -> dict[str, Any]:
     start = random.uniform(1e4, 1e6)
     times = [round(start + 1000 * i / 30 + random.random(), 3) for i in range(FRAMES)]
     shown = [
-        {"place": film["place"], "method": "requestVideoFrameCallback", "frames_presented": FRAMES,
+        {"slot": film["slot"], "method": "requestVideoFrameCallback", "frames_presented": FRAMES,
          "longest_gap_frames": 1.003, "shown_well": True, "times_ms": times, "frames": list(range(FRAMES))}
         for film in view["films"]
     ]  # fmt: skip

@@ -28,11 +28,14 @@ from study.experiment.observer_models import (
     probability_different,
     truth,
 )
-from study.experiment.plan import Pair, Plan, Trial, draw_plan
+from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol
+from study.experiment.steps import Step
 from study.experiment.store.answers import has_event, record_answer, record_event, stored_answers
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
+from study.tasks.answer import Answer
+from study.tasks.trial import Pair, Trial
 
 __all__ = [
     "ObserverSettings",
@@ -88,7 +91,7 @@ _CARELESS_S = 0.25
 """Median response time of those who do not look."""
 
 
-def shown_well(who: Person, trial: Trial, step: sitting.Step) -> bool:
+def shown_well(who: Person, trial: Trial, step: Step) -> bool:
     """Whether a showing went well; by chance that depends on person, trial and attempt alone."""
     if not who.settings.badly_shown:
         return True
@@ -96,7 +99,7 @@ def shown_well(who: Person, trial: Trial, step: sitting.Step) -> bool:
     return bool(rng.random() >= who.settings.badly_shown)
 
 
-def respond(who: Person, trial: Trial, step: sitting.Step) -> tuple[str | None, float | None]:
+def respond(who: Person, trial: Trial, step: Step) -> tuple[str | None, float | None]:
     """A participant's answer and response time in seconds; None twice where the answer is missed.
 
     Chance depends on person, trial, item and attempt alone, so a session that was interrupted goes on as it would
@@ -113,7 +116,7 @@ def respond(who: Person, trial: Trial, step: sitting.Step) -> tuple[str | None, 
     return value, round(response_s, 4)
 
 
-def _judge(who: Person, trial: Trial, step: sitting.Step, rng: np.random.Generator) -> tuple[str, float]:
+def _judge(who: Person, trial: Trial, step: Step, rng: np.random.Generator) -> tuple[str, float]:
     """The answer, and how easy it was from 0 to 1."""
     if who.careless:
         return str(rng.choice(step.legal)), 1.0
@@ -126,22 +129,22 @@ def _judge(who: Person, trial: Trial, step: sitting.Step, rng: np.random.Generat
         from scipy.special import expit
 
         preference = who.settings.preference
-        leaning = lean(preference, trial.method_a, trial.method_b) + who.lean
+        leaning = lean(preference, *trial.methods) + who.lean
         towards_first = (leaning if trial.a_first else -leaning) + preference.order_bias
         chance = preference.lapse / 2 + (1 - preference.lapse) * float(expit(towards_first))
         return ("first" if rng.random() < chance else "second"), abs(2 * chance - 1)
     rating = who.settings.rating
     higher = rating.utility_weight * _rated(who.settings.preference, trial) + who.leniency
-    middle = (len(step.legal) - 1) / 2 + (higher if trial.a_first is not False else -higher)
+    middle = (len(step.legal) - 1) / 2 + (higher if trial.a_first else -higher)
     point = int(np.clip(round(middle + rating.noise_sd * float(rng.standard_normal())), 0, len(step.legal) - 1))
     return step.legal[point], 0.5
 
 
 def _rated(preference: PreferenceObserver, trial: Trial) -> float:
     """Utility of what is rated: of the one stimulus, or of method b over method a."""
-    if trial.second:
-        return lean(preference, trial.method_b, trial.method_a)
-    return preference.utility.get(trial.method_a, 0.0)
+    if len(trial.methods) > 1:
+        return lean(preference, trial.methods[1], trial.methods[0])
+    return preference.utility.get(trial.methods[0], 0.0)
 
 
 class StimulusSource(Shape):
@@ -256,9 +259,7 @@ def _open(
     )
 
 
-def _answer(
-    state: sitting.Session, who: Person, trial: Trial, step: sitting.Step
-) -> tuple[sitting.Session, sitting.Answer]:
+def _answer(state: sitting.Session, who: Person, trial: Trial, step: Step) -> tuple[sitting.Session, Answer]:
     value, response_s = respond(who, trial, step)
     well = shown_well(who, trial, step)
     if value is None or response_s is None:

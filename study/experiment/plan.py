@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,66 +18,9 @@ import numpy as np
 from study.errors import SessionError
 from study.experiment.chance import generator
 from study.experiment.protocol.whole import Protocol, StudySpec
+from study.tasks.trial import Pair, Trial, trial_from_json, trial_of
 
-PLAN_VERSION = 1
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two stimuli to compare, or one to rate.
-
-    Parameters
-    ----------
-    name
-        Unique in the protocol: `jnd/walking/+5`.
-    study, task, motion, category
-        The study, its task, the transition's name and its type of motion.
-    a, b
-        Stimulus ids: reference and comparison (same-different), methods a and b (preference, rating of a pair); `b` is
-        empty where one stimulus is rated.
-    method_a, method_b
-        How the blend lengths were found.
-    difference_frames
-        Comparison minus reference, signed; None outside same-different studies.
-    """
-
-    name: str
-    study: str
-    task: str
-    motion: str
-    category: str
-    a: str
-    b: str
-    method_a: str
-    method_b: str
-    difference_frames: int | None = None
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One trial: what is shown first and second, and what the answer will mean.
-
-    `trial` counts from 1 over the whole sitting, `repeat` from 1. `reference_first` is None outside same-different
-    studies, `a_first` but where two methods are compared, and `second` is empty where one stimulus is rated. `role` is
-    `trial`, `practice` (counts for nothing) or `check` (asks for `expected`, whatever is shown).
-    """
-
-    trial: int
-    study: str
-    task: str
-    repeat: int
-    pair: str
-    motion: str
-    category: str
-    first: str
-    second: str
-    difference_frames: int | None
-    reference_first: bool | None
-    method_a: str
-    method_b: str
-    a_first: bool | None
-    role: str = "trial"
-    expected: str = ""
+PLAN_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -107,11 +50,11 @@ def plan_from_json(text: str) -> Plan:
     try:
         data: dict[str, Any] = json.loads(text)
         version = data.pop("version")
-        if version != PLAN_VERSION:
+        if version not in range(1, PLAN_VERSION + 1):
             raise SessionError(
-                f"Expected a plan of version {PLAN_VERSION}, found {version}; use the Segue that wrote it."
+                f"Expected a plan of version {PLAN_VERSION} or older, found {version}; use the Segue that wrote it."
             )
-        return Plan(**{**data, "trials": tuple(Trial(**trial) for trial in data["trials"])})
+        return Plan(**{**data, "trials": tuple(trial_from_json(trial, version) for trial in data["trials"])})
     except (ValueError, KeyError, TypeError) as error:
         raise SessionError(f"Expected a stored plan, found JSON that is none: {error}.") from error
 
@@ -176,8 +119,8 @@ def _draw_set(
     if not study.paired:
         if study.order == "by-group":
             turn = group % count
-            return [_single(pair, repeat) for pair in [*pairs[turn:], *pairs[:turn]]]
-        return [_single(pairs[i], repeat) for i in rng.permutation(count)]
+            return [trial_of(pair, (0,), repeat) for pair in [*pairs[turn:], *pairs[:turn]]]
+        return [trial_of(pairs[i], (0,), repeat) for i in rng.permutation(count)]
     if study.order == "both":
         shown = [(pair, a_first) for pair in pairs for a_first in (True, False)]
     elif study.order == "random":
@@ -188,7 +131,7 @@ def _draw_set(
         shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.permutation(halves), strict=True)]
     else:
         shown = [(pair, group % 2 == 0) for pair in pairs]
-    return [_both(shown[i][0], shown[i][1], repeat) for i in rng.permutation(len(shown))]
+    return [trial_of(shown[i][0], _both(shown[i][1]), repeat) for i in rng.permutation(len(shown))]
 
 
 def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Generator) -> list[Trial]:
@@ -207,9 +150,9 @@ def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Gener
     order = rng.permutation(study.practice)
     sides = rng.integers(0, 2, study.practice)
     if study.paired:
-        trials = [_both(chosen[i], bool(sides[i]), 0) for i in order]
+        trials = [trial_of(chosen[i], _both(bool(sides[i])), 0) for i in order]
     else:
-        trials = [_single(chosen[i], 0) for i in order]
+        trials = [trial_of(chosen[i], (0,), 0) for i in order]
     return [replace(trial, role="practice") for trial in trials]
 
 
@@ -243,40 +186,6 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
     return groups
 
 
-def _both(pair: Pair, a_first: bool, repeat: int) -> Trial:
-    first, second = (pair.a, pair.b) if a_first else (pair.b, pair.a)
-    same_different = pair.task == "same-different"
-    return replace(
-        _single(pair, repeat),
-        first=first,
-        second=second,
-        reference_first=a_first if same_different else None,
-        a_first=None if same_different else a_first,
-    )
-
-
-def _single(pair: Pair, repeat: int) -> Trial:
-    return Trial(
-        trial=0,
-        study=pair.study,
-        task=pair.task,
-        repeat=repeat,
-        pair=pair.name,
-        motion=pair.motion,
-        category=pair.category,
-        first=pair.a,
-        second=pair.b,
-        difference_frames=pair.difference_frames,
-        reference_first=None,
-        method_a=pair.method_a,
-        method_b=pair.method_b,
-        a_first=None,
-    )
-
-
-def trial_table(plan: Plan) -> list[dict[str, Any]]:
-    """The trial table, one mapping a trial, keys in `Trial`'s order."""
-    return [asdict(trial) for trial in plan.trials]
-
-
-TRIAL_COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Trial))
+def _both(a_first: bool) -> tuple[int, int]:
+    """The members of a pair in their slots, where both are shown."""
+    return (0, 1) if a_first else (1, 0)

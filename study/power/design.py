@@ -25,12 +25,14 @@ from study.experiment.observer_models import (
 )
 from study.experiment.observers import person, respond
 from study.power.curve import Run, logit_normal
+from study.tasks.answer import answer_columns
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from study.experiment.plan import Plan, Trial
+    from study.experiment.plan import Plan
     from study.experiment.protocol.whole import Protocol, StudySpec
+    from study.tasks.trial import Trial
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -141,7 +143,7 @@ def rating_study(design: Design, alpha: float, difference: float) -> Run:
     if design.study.paired:
         return _pair_rating_study(design, alpha, difference)
     trials, rating = design.trials(), design.settings.rating
-    sides = np.array([[1.0 if trial.method_a == design.study.comparison else 0.0 for trial in own] for own in trials])
+    sides = np.array([[1.0 if trial.methods[0] == design.study.comparison else 0.0 for trial in own] for own in trials])
     points = design.study.scale_points
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
@@ -328,18 +330,11 @@ def _sitting(design: Design, plan: Plan, seed: int) -> pd.DataFrame:
             continue
         trial = state.plan.trial(step.trial)
         value, response_s = respond(who, trial, step)
-        state = (sitting.missed(state) if value is None else sitting.answered(state, value, response_s or 0.0))[0]
-        chosen = value is not None and trial.task == "preference"
-        chose_a = (value == "first") == trial.a_first if chosen else None
-        rows.append(
-            {
-                "participant": plan.participant, "task": trial.task, "study": trial.study, "role": trial.role,
-                "trial": trial.trial, "item": step.item, "motion": trial.motion, "expected": trial.expected,
-                "method_a": trial.method_a, "method_b": trial.method_b, "a_first": trial.a_first,
-                "difference_frames": trial.difference_frames, "reference_first": trial.reference_first,
-                "answer": value, "chose_a": chose_a, "response_s": response_s,
-            }
-        )  # fmt: skip
+        if value is None or response_s is None:
+            state, answer = sitting.missed(state)
+        else:
+            state, answer = sitting.answered(state, value, response_s)
+        rows.append({"participant": plan.participant, **answer_columns(trial, answer)})
     return pd.DataFrame(rows)
 
 

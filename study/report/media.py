@@ -112,13 +112,14 @@ def shown_pairs(manifest: Manifest) -> list[tuple[Any, Any]]:
     rated: dict[tuple[str, str], list[Any]] = {}
     for pair in manifest.pairs:
         key = (pair.study, pair.motion)
-        if not pair.b:
-            rated.setdefault(key, []).append(manifest.record(pair.a))
+        if len(pair.stimuli) == 1:
+            rated.setdefault(key, []).append(manifest.record(pair.stimuli[0]))
             continue
         if key not in best or (pair.difference_frames or 0) > (best[key].difference_frames or 0):
             best[key] = pair
     singly = [(records[0], records[1] if len(records) > 1 else None) for records in rated.values()]
-    return [*((manifest.record(pair.a), manifest.record(pair.b)) for pair in best.values()), *singly]
+    compared = [pair.stimuli[:2] for pair in best.values()]
+    return [*((manifest.record(a), manifest.record(b)) for a, b in compared), *singly]
 
 
 def embed_videos(manifest: Manifest, most_bytes: int = MOST_VIDEO_BYTES) -> list[list[Preview]]:

@@ -234,7 +234,7 @@ def answer_to(view: dict[str, Any], value: str | None = "", **more: Any) -> dict
         "response_s": 0.5,
         "shown_well": True,
         "shown": [
-            {"place": film["place"], "method": "none", "frames_presented": 20, "longest_gap_frames": 1.0,
+            {"slot": film["slot"], "method": "none", "frames_presented": 20, "longest_gap_frames": 1.0,
              "shown_well": True, "times_ms": [1.5, 2.5], "frames": [0, 1]}
             for film in view["films"]
         ],

@@ -27,9 +27,10 @@ from study.apps.player.scripted import Act, ScriptedWindow, press
 from study.apps.player.store import ResponsesStore
 from study.apps.server.web import make_app
 from study.experiment.observers import simulate
-from study.experiment.plan import Plan, draw_plan, trial_table
+from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import advanced, answer_keys, answered, current, filled, open_session
+from study.experiment.session import advanced, answered, current, filled, open_session
+from study.experiment.steps import answer_keys
 from study.experiment.stimuli.prepare import prepare
 from study.experiment.stimuli.rendering import Manifest
 from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame
@@ -144,17 +145,15 @@ def test_window_browser_and_simulation_have_the_same_trials(
         stimuli = {where: shown(place) for where, place in places.items()}
 
     # The stored plans, trial by trial: order, stimuli, which comes first, block, group.
-    plans = {
-        where: [(one.plan.group, trial_table(one.plan)) for one in found if one] for where, found in records.items()
-    }
+    plans = {where: [(one.plan.group, one.plan.trials) for one in found if one] for where, found in records.items()}
     assert plans["window"] == plans["browser"] == plans["simulation"]
     assert [group for group, _ in plans["window"]] == [0, 1]
-    tasks = {trial["task"] for _, trials in plans["window"] for trial in trials}
+    tasks = {trial.task for _, trials in plans["window"] for trial in trials}
     assert tasks == {"same-different", "preference", "rating"}
     # A pair is rated after both its films, in the order of the group.
-    compared = [trial for _, trials in plans["window"] for trial in trials if trial["study"] == "compared"]
-    assert [trial["a_first"] for trial in compared] == [True, False]
-    assert all(trial["second"] for trial in compared)
+    compared = [trial for _, trials in plans["window"] for trial in trials if trial.study == "compared"]
+    assert [trial.a_first for trial in compared] == [True, False]
+    assert all(len(trial.stimuli) == 2 for trial in compared)
 
     # The tables of answers: the same columns of the same types, the same rows, but for answers and marks.
     assert {tuple(one.columns) for one in tables.values()} == {ANSWER_COLUMNS}
@@ -183,6 +182,6 @@ def test_another_participant_or_another_seed_has_other_trials() -> None:
     """So that the test above could fail."""
     protocol, other = protocol_of(), protocol_of(PROTOCOL.replace("seed = 5", "seed = 6"))
     pairs = prepare(protocol, open_library("synthetic")).pairs
-    own = trial_table(draw_plan(protocol, pairs, "sim-001"))
-    assert own != trial_table(draw_plan(protocol, pairs, "sim-002"))
-    assert own != trial_table(draw_plan(other, pairs, "sim-001"))
+    own = draw_plan(protocol, pairs, "sim-001").trials
+    assert own != draw_plan(protocol, pairs, "sim-002").trials
+    assert own != draw_plan(other, pairs, "sim-001").trials

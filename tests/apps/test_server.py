@@ -224,7 +224,7 @@ def test_a_page_may_load_the_films_of_this_trial_and_of_the_next_and_no_others(s
     person = serving.person()
     person.until(person.begin(), "trial")
     (sitting,) = serving.host.sittings.values()
-    showings = [step for step in sitting.state.steps if step.kind in ("first", "second") and step.role != "practice"]
+    showings = [step for step in sitting.state.steps if step.slot and step.role != "practice"]
     due = [step.trial for step in views.films_due(sitting.state)]
     assert len(set(due)) == 2
     assert due == [trial for trial in dict.fromkeys(due) for _ in range(2)]
@@ -239,7 +239,7 @@ def test_identical_films_look_different_from_outside(serve, stimuli):
     person = serve().person()
     view = person.until(person.begin(parameters={"participant": "p01"}), "trial")
     plan = draw_plan(protocol_of(), stimuli.pairs, "p01")
-    while plan.trial(view["trial"]).first != plan.trial(view["trial"]).second:
+    while plan.trial(view["trial"]).stimuli[0] != plan.trial(view["trial"]).stimuli[1]:
         view = person.until(person.step(view), "trial")
     heads = [person.client.head(film["url"]).headers for film in view["films"]]
     heads = heads if heads[0].get("etag") else [person.client.get(film["url"]).headers for film in view["films"]]
@@ -250,7 +250,7 @@ def test_identical_films_look_different_from_outside(serve, stimuli):
 def test_a_damaged_film_is_a_fault_on_record(serve, stimuli, responses):
     person = serve().person()
     view = person.until(person.begin(), "trial")
-    stimulus = draw_plan(protocol_of(), stimuli.pairs, session_table(responses)["participant"][0]).trial(1).first
+    stimulus = draw_plan(protocol_of(), stimuli.pairs, session_table(responses)["participant"][0]).trial(1).stimuli[0]
     file = stimuli.video(stimulus)
     whole = file.read_bytes()
     try:

@@ -12,12 +12,12 @@ import pytest
 from study.errors import SessionError
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.session import Answer
 from study.experiment.store.answers import Presentation, record_answer, record_form
 from study.experiment.store.export import export, label, labels
 from study.experiment.store.frames import export_csv
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session
+from study.tasks.answer import Answer
 
 
 @pytest.fixture

@@ -60,7 +60,7 @@ def test_points_at_which_both_methods_make_one_film_are_drawn_again(kind: str) -
     assert second.tried > first.tried  # type: ignore[attr-defined]
     assert len({length.blend_frames for length in second.lengths.values()}) == 2  # type: ignore[attr-defined]
     pairs = prepare(protocol, library).pairs
-    assert len({name for pair in pairs for name in (pair.a, pair.b) if name}) == 2
+    assert len({name for pair in pairs for name in pair.stimuli}) == 2
 
 
 def test_given_points_at_which_both_methods_make_one_film_are_refused() -> None:
@@ -82,7 +82,7 @@ def test_a_time_warped_blend_without_a_warp_is_the_geodesic_one(toy_library: Toy
     text = TEXT.replace('"walk"', '"slow"').replace('"run"', '"quick"').replace('"fixed"', '"timewarp"')
     for seed in range(6):
         made = prepare(parse_protocol(text.replace("seed = 52", f"seed = {seed}")), toy_library)
-        assert all(pair.a != pair.b for pair in made.pairs)
+        assert all(len(set(pair.stimuli)) == 2 for pair in made.pairs)
 
 
 def test_methods_that_always_make_one_film_are_refused(toy_library: ToyLibrary) -> None:

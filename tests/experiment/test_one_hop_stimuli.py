@@ -64,7 +64,7 @@ def test_both_films_of_a_pair_show_the_same_span(protocol: Protocol, library: Li
     made = prepare(protocol, library)
     assert len(made.pairs) == 2
     for pair in made.pairs:
-        hop, direct = made.stimulus(pair.a), made.stimulus(pair.b)
+        hop, direct = made.stimulus(pair.stimuli[0]), made.stimulus(pair.stimuli[1])
         assert (hop.record.method, direct.record.method) == ("one-hop", "fixed")
         assert hop.record.frames == direct.record.frames
         assert np.allclose(hop.positions[:10], direct.positions[:10], atol=2e-4)  # entry

@@ -29,7 +29,7 @@ def test_the_rows_are_what_is_prepared(protocol: Protocol, toy_library: ToyLibra
     ]
     for row in ahead.rows:
         pairs = [pair for pair in made.pairs if (pair.study, pair.motion) == (row.study, row.transition)]
-        records = {name: made.stimulus(name).record for pair in pairs for name in (pair.a, pair.b)}
+        records = {name: made.stimulus(name).record for pair in pairs for name in pair.stimuli}
         assert row.films == len(records)
         assert row.film_s == pytest.approx(
             (min(r.frames for r in records.values()) / 30, max(r.frames for r in records.values()) / 30)
@@ -39,7 +39,7 @@ def test_the_rows_are_what_is_prepared(protocol: Protocol, toy_library: ToyLibra
         for place, use in ((row.source, "source"), (row.destination, "destination")):
             assert {getattr(record, use).frame for record in records.values()} == {place.frame}
             assert place.s == pytest.approx(place.frame / 30)
-        assert row.k_frames == made.stimulus(pairs[0].a).record.optimal_frames
+        assert row.k_frames == made.stimulus(pairs[0].stimuli[0]).record.optimal_frames
         assert row.k_s == pytest.approx(row.k_frames / 30)
 
 
@@ -51,7 +51,7 @@ def test_the_minutes_are_those_of_the_films(protocol: Protocol, toy_library: Toy
     ahead, made = look_ahead(longer, toy_library), prepare(longer, toy_library)
     plan = draw_plan(longer, made.pairs, "p01")
     frames = {record.id: record.frames for record in made.records}
-    seconds = sum(frames[trial.first] + frames[trial.second] for trial in plan.trials) / 30 + 4 * len(plan.trials)
+    seconds = sum(frames[name] for trial in plan.trials for name in trial.stimuli) / 30 + 4 * len(plan.trials)
     assert ahead.minutes == pytest.approx(seconds / 60, abs=5)
     assert ahead.minutes < ahead.minutes_at_most
     welcome = next(step.text for step in open_session(longer, plan, frames=frames).steps if "minutes" in step.text)

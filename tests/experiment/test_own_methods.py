@@ -53,7 +53,8 @@ def both(text: str, library: ToyLibrary) -> tuple[Stimulus, Stimulus]:
     """The two stimuli of the only pair."""
     made = prepare(parse_protocol(text), library)
     (pair,) = made.pairs
-    return made.stimulus(pair.a), made.stimulus(pair.b)
+    a, b = pair.stimuli
+    return made.stimulus(a), made.stimulus(b)
 
 
 def method_of(text: str) -> tuple[Protocol, str]:
@@ -186,8 +187,8 @@ def test_a_same_different_study_needs_a_blend_that_can_be_lengthened(toy_library
         parse_protocol(own('make = "cut"\n').replace(old, study))
     text = own('make = "slerp"\nlength = "fixed"\nweight = "sigmoid"\n').replace(old, study)
     made = prepare(parse_protocol(text), toy_library)
-    assert [made.stimulus(pair.b).record.blend_frames for pair in made.pairs] == [8, 10, 14]
-    assert {made.stimulus(pair.b).record.optimal_frames for pair in made.pairs} == {10}
+    assert [made.stimulus(pair.stimuli[1]).record.blend_frames for pair in made.pairs] == [8, 10, 14]
+    assert {made.stimulus(pair.stimuli[1]).record.optimal_frames for pair in made.pairs} == {10}
 
 
 def test_one_hop_with_stays_of_its_own() -> None:

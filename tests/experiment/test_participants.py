@@ -10,7 +10,6 @@ import pytest
 import sqlalchemy as sa
 
 from study.experiment.plan import draw_plan
-from study.experiment.session import Answer
 from study.experiment.store import participants as people
 from study.experiment.store.answers import (
     Presentation,
@@ -23,6 +22,7 @@ from study.experiment.store.answers import (
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import session_by_id
 from study.experiment.store.tables import answers, metadata, presentations, sessions, withdrawals
+from study.tasks.answer import Answer
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 

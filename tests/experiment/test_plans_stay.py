@@ -11,8 +11,10 @@ import json
 import pytest
 from toys import TOY_PAIR_RATING, TOY_PROTOCOL, TOY_RATING, pairs_of
 
-from study.experiment.plan import Trial, draw_plan
+from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
+from study.tasks.answer import Answer, answer_columns
+from study.tasks.trial import Trial
 
 THIRD = """
 [[transitions]]
@@ -46,9 +48,10 @@ def with_keys(study: str, keys: str) -> Protocol:
 
 def drawn(trial: Trial) -> list[object]:
     """All that a plan says of a trial."""
-    meaning = [trial.difference_frames, trial.reference_first, trial.method_a, trial.method_b, trial.a_first]
-    whose = [trial.trial, trial.study, trial.task, trial.repeat, trial.pair, trial.motion, trial.category]
-    return [*whose, trial.first, trial.second, *meaning, trial.role, trial.expected]
+    columns = answer_columns(trial, Answer(trial.trial, "", 1, None, None))
+    whose = ("trial", "study", "task", "repeat", "pair", "motion", "category", "first", "second")
+    meaning = ("difference_frames", "reference_first", "method_a", "method_b", "a_first", "role", "expected")
+    return [columns[name] for name in (*whose, *meaning)]
 
 
 KEYS = {

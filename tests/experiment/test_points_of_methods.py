@@ -50,7 +50,7 @@ question = "How good?"
 def test_a_time_warped_blend_stands_beside_the_geodesic_one(toy_library):
     prepared = prepare(parse_protocol(HEAD + WARPED), toy_library)
     (pair,) = prepared.pairs
-    plain, warped = (prepared.stimulus(name).record for name in (pair.a, pair.b))
+    plain, warped = (prepared.stimulus(name).record for name in pair.stimuli)
     assert (plain.source.frame, plain.destination.frame) == (warped.source.frame, warped.destination.frame)
     own = warp_length(
         toy_library.clip("slow", fps=30.0),
@@ -73,7 +73,7 @@ def test_a_warp_that_no_point_has_is_explained(toy_library):
 
 def test_each_cut_stands_at_its_own_metrics_least(toy_library):
     prepared = prepare(parse_protocol(HEAD + CUTS), toy_library)
-    points = {pair.method_a: prepared.stimulus(pair.a).record for pair in prepared.pairs}
+    points = {pair.methods[0]: prepared.stimulus(pair.stimuli[0]).record for pair in prepared.pairs}
     assert set(points) == {"cut-lee2002", "cut-pointcloud"}
     for record in points.values():
         assert (record.blend_frames, record.frames, record.blend_start) == (0, 30, 15)

@@ -271,7 +271,7 @@ def test_what_is_no_results_folder_is_refused(prepared, tmp_path):
     with pytest.raises(StimulusError, match="expected JSON"):
         read_manifest(tmp_path)
     (tmp_path / "manifest.json").write_text('{"version": 99}')
-    with pytest.raises(StimulusError, match="expected a manifest of version 1, found 99"):
+    with pytest.raises(StimulusError, match="expected a manifest of version 2 or older, found 99"):
         read_manifest(tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(FileError, match="expected a folder to write to"):
@@ -325,7 +325,7 @@ def test_a_manifest_that_lacks_a_key_or_holds_something_else_is_refused_by_its_p
     record(prepared, tmp_path)
     path = tmp_path / "manifest.json"
     whole = json.loads(path.read_text())
-    keyed = [("fps",), ("size",), ("versions",), ("stimuli", 0, "source", "frame"), ("pairs", 0, "a")]
+    keyed = [("fps",), ("size",), ("versions",), ("stimuli", 0, "source", "frame"), ("pairs", 0, "name")]
     for keys, value in [
         *itertools.product(keyed, ("gone", None, [], -1.5)),
         (("pairs",), "gone"),

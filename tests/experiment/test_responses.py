@@ -12,7 +12,6 @@ import sqlalchemy as sa
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
-from study.experiment.session import Answer
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
 from study.experiment.store.answers import (
@@ -27,6 +26,7 @@ from study.experiment.store.answers import (
 from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame, export_csv
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import all_sessions, begin_session, find_session, session_table
+from study.tasks.answer import Answer
 
 
 @pytest.fixture

@@ -11,13 +11,13 @@ from postgres_server import PASSWORD, ROLE, without_password
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
-from study.experiment.session import Answer
 from study.experiment.store import databases
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
 from study.experiment.store.answers import record_answer
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session, find_session
+from study.tasks.answer import Answer
 
 ANSWER = Answer(1, "", 1, "same", 1.0)
 

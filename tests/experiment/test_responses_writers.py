@@ -18,7 +18,6 @@ import sqlalchemy as sa
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
-from study.experiment.session import Answer
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
 from study.experiment.store.answers import record_answer, stored_answers
@@ -27,6 +26,7 @@ from study.experiment.store.frames import answers_frame
 from study.experiment.store.migrations import FIRST_VERSION, MIGRATIONS, VERSION
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session
+from study.tasks.answer import Answer
 
 WRITER = """
 import itertools, sys
@@ -37,7 +37,7 @@ from study.experiment.protocol.whole import parse_protocol
 from study.experiment.store.answers import record_answer, stored_answers
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session
-from study.experiment.session import Answer
+from study.tasks.answer import Answer
 protocol = parse_protocol(c.TOY_PROTOCOL)
 pairs = c.pairs_of(protocol)
 responses = open_responses(sys.argv[1])
@@ -91,7 +91,7 @@ from study.experiment.protocol.whole import parse_protocol
 from study.experiment.store.answers import record_answer
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import session_by_id
-from study.experiment.session import Answer
+from study.tasks.answer import Answer
 database, program, newcomers, groups, cap = sys.argv[1], *map(int, sys.argv[2:])
 protocol = parse_protocol(c.TOY_PROTOCOL)
 pairs = c.pairs_of(protocol)

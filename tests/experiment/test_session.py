@@ -9,7 +9,6 @@ from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import (
     advanced,
-    answer_keys,
     answered,
     current,
     filled,
@@ -17,6 +16,7 @@ from study.experiment.session import (
     open_session,
     progress,
 )
+from study.experiment.steps import answer_keys
 
 
 def to_question(session):
@@ -48,7 +48,7 @@ def opened(toy_protocol, toy_stimuli):
 def test_a_trial_is_first_gap_second_answer_pause(opened):
     seen = []
     run(opened, seen=seen)
-    kinds = [step.kind for step in seen]
+    kinds = [step.place for step in seen]
     assert kinds[:2] == ["instructions", "instructions"]
     assert kinds[2:7] == ["first", "gap", "second", "answer", "pause"]
     assert kinds[-1] == "debrief"
@@ -57,7 +57,7 @@ def test_a_trial_is_first_gap_second_answer_pause(opened):
         if step.trial:
             trial = opened.plan.trial(step.trial)
             assert step.study == trial.study
-            assert step.stimulus == {"first": trial.first, "second": trial.second}.get(step.kind, "")
+            assert step.stimulus == (trial.stimuli[step.slot - 1] if step.slot else "")
     durations = {step.kind: step.duration_s for step in seen}
     assert (durations["gap"], durations["answer"], durations["pause"]) == (1.0, 5.0, 1.0)
     assert [step.text for step in seen if step.kind == "instructions"] == ["Welcome.", "Some pairs are the same."]
@@ -121,7 +121,7 @@ def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opene
     seen = []
     run(open_session(opened.protocol, opened.plan, before), seen=seen)
     assert seen[0].text == "Some pairs are the same."
-    assert seen[1].kind == "first"
+    assert seen[1].place == "first"
     assert seen[1].trial == 3
 
 
@@ -155,9 +155,9 @@ def test_a_rated_pair_shows_both_and_then_asks_every_item(pair_rating_protocol, 
     assert {(step.legal, step.duration_s) for step in asked} == {(("0", "1", "2", "3", "4"), None)}
     assert (asked[0].low, asked[0].middle, asked[0].high) == ("much worse", "the same", "much better")
     steps = [step for step in seen if step.trial == asked[0].trial]
-    assert [step.kind for step in steps] == ["first", "gap", "second", "answer", "answer", "pause"]
+    assert [step.place for step in steps] == ["first", "gap", "second", "answer", "answer", "pause"]
     trial = plan.trial(asked[0].trial)
-    assert (steps[0].stimulus, steps[2].stimulus) == (trial.first, trial.second)
+    assert (steps[0].stimulus, steps[2].stimulus) == trial.stimuli
 
 
 def test_rating_asks_every_item_without_time_limit(rating_protocol, make_stimuli):
@@ -170,7 +170,7 @@ def test_rating_asks_every_item_without_time_limit(rating_protocol, make_stimuli
         ("noticeable", ("0", "1", "2", "3", "4"), None),
     ]
     assert (rated[0].low, rated[0].high) == ("not at all", "very")
-    kinds = [step.kind for step in seen if step.trial == rated[0].trial]
+    kinds = [step.place for step in seen if step.trial == rated[0].trial]
     assert kinds == ["first", "answer", "answer", "pause"]
     half = answers[: [a.item for a in answers].index("natural") + 1]
     _, rest = run(open_session(rating_protocol, plan, half), choose=lambda step: step.legal[-1])
@@ -309,7 +309,7 @@ def test_the_end_of_practice_is_said_once(practising):
     over = [i for i, step in enumerate(seen) if step.text == practising.protocol.texts.practice_over]
     assert len(over) == 1
     assert [step.role for step in seen[: over[0]] if step.trial][-1] == "practice"
-    assert (seen[over[0] + 1].kind, seen[over[0] + 1].role, seen[over[0] + 1].trial) == ("first", "trial", 3)
+    assert (seen[over[0] + 1].place, seen[over[0] + 1].role, seen[over[0] + 1].trial) == ("first", "trial", 3)
     _, one = run(practising, 1)
     for answers, said in ((one, True), (run(practising, 2)[1], True), (run(practising, 5)[1], False)):
         again = open_session(practising.protocol, practising.plan, answers)

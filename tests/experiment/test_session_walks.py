@@ -69,7 +69,7 @@ class Walker:
                 value = str(self.rng.choice(step.legal))
                 session, answer = answered(session, value, float(self.rng.uniform(0, 5)), shown_well=well)
             self.stored.append(answer)
-        elif step.kind in ("gap", "second") and self.rng.random() < 0.05:
+        elif step.place in ("gap", "second") and self.rng.random() < 0.05:
             session = restarted(session)
         else:
             session = advanced(session)

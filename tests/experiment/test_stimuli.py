@@ -45,8 +45,8 @@ def test_every_pair_has_its_stimuli(prepared):
         "liking/still_slow",
     ]
     for pair in prepared.pairs:
-        assert prepared.stimulus(pair.a).record.transition == pair.motion
-        assert prepared.stimulus(pair.b).record.transition == pair.motion
+        assert prepared.stimulus(pair.stimuli[0]).record.transition == pair.motion
+        assert prepared.stimulus(pair.stimuli[1]).record.transition == pair.motion
     draw_plan(prepared.protocol, prepared.pairs, "p01")
 
 
@@ -63,34 +63,34 @@ def test_practice_has_the_plainest_levels_of_a_transition_of_its_own(toys):
 
 def test_levels_are_the_optimal_length_and_what_was_added(prepared):
     for pair in prepared.pairs[:3]:
-        reference, comparison = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
+        reference, comparison = prepared.stimulus(pair.stimuli[0]).record, prepared.stimulus(pair.stimuli[1]).record
         assert reference.blend_frames == reference.optimal_frames
         assert comparison.blend_frames == reference.optimal_frames + pair.difference_frames
         assert comparison.frames == 9 + comparison.blend_frames + 9
         assert (comparison.blend_start, comparison.blend_stop) == (9, 9 + comparison.blend_frames)
     for pair in prepared.pairs[3:]:
-        assert prepared.stimulus(pair.b).record.blend_frames == 10
-        assert pair.method_b == "fixed"
+        assert prepared.stimulus(pair.stimuli[1]).record.blend_frames == 10
+        assert pair.methods[1] == "fixed"
 
 
 def test_no_difference_is_the_very_same_stimulus(prepared):
     same = prepared.pairs[1]
     assert same.difference_frames == 0
-    assert same.a == same.b
+    assert same.stimuli[0] == same.stimuli[1]
 
 
 def test_identical_stimuli_are_there_once_and_studies_share_them(prepared):
     ids = [stimulus.id for stimulus in prepared.stimuli]
     assert len(set(ids)) == len(ids)
     # The preference study's geodesic stimulus is the reference of the other study: same transition and conditions.
-    assert prepared.pairs[3].a == prepared.pairs[0].a
+    assert prepared.pairs[3].stimuli[0] == prepared.pairs[0].stimuli[0]
     assert len(ids) == 3 + 1 + 2
 
 
 def test_entries_are_the_same_for_all_lengths_but_for_the_feet(toys):
     """Up to the blend all lengths show the same frames in the same place."""
     made = prepare(changed(("exit_s = 0.3", "exit_s = 0.3\nclean_feet = false")), toys)
-    entries = [made.stimulus(pair.b).positions[:9] for pair in made.pairs[:3]]
+    entries = [made.stimulus(pair.stimuli[1]).positions[:9] for pair in made.pairs[:3]]
     for entry in entries[1:]:
         np.testing.assert_array_equal(entry, entries[0])
 
@@ -159,7 +159,7 @@ def test_names_follow_what_is_seen_and_nothing_else(prepared, toys, old, new, sa
 def test_lengths_are_those_of_the_methods(prepared, toys):
     """What the record says is what `blend_length` gives at the recorded points."""
     for pair in prepared.pairs:
-        record = prepared.stimulus(pair.a).record
+        record = prepared.stimulus(pair.stimuli[0]).record
         clips = [
             toys.clip(use.motion, fps=30.0, min_seconds=use.frames / 30.0)
             for use in (record.source, record.destination)
@@ -176,43 +176,43 @@ def test_conditions_are_kept(toys):
     )
     for seed in range(4):
         made = prepare(parse_protocol(text.replace("seed = 5", f"seed = {seed}")), toys)
-        lengths = [made.stimulus(pair.a).record.optimal_frames for pair in made.pairs]
+        lengths = [made.stimulus(pair.stimuli[0]).record.optimal_frames for pair in made.pairs]
         assert all(4 <= length <= 30 and abs(length - 10) > 5 for length in lengths)
 
 
 def test_given_points_are_taken(toys):
     given = 'points = { choose = "given", source_s = 1.0, destination_frame = 77 }'
     made = prepare(changed(('destination = "quick"', f'destination = "quick"\n{given}')), toys)
-    record = made.stimulus(made.pairs[0].a).record
+    record = made.stimulus(made.pairs[0].stimuli[0]).record
     assert (record.source.frame, record.destination.frame) == (30, 77)
 
 
 def test_a_cut_has_no_blend(toys):
     made = prepare(changed(('comparison = "fixed"', 'comparison = "cut"')), toys)
-    record = made.stimulus(made.pairs[3].b).record
+    record = made.stimulus(made.pairs[3].stimuli[1]).record
     assert (record.blend_frames, record.frames, record.method) == (0, 18, "cut")
 
 
 def test_rating_pairs_hold_one_stimulus_each(rating_protocol, toys):
     made = prepare(rating_protocol, toys)
     rated = [pair for pair in made.pairs if pair.study == "rating"]
-    assert [(pair.name, pair.method_a, pair.b) for pair in rated] == [
-        ("rating/slow_quick/geodesic", "geodesic", ""),
-        ("rating/slow_quick/cut", "cut", ""),
-        ("rating/still_slow/geodesic", "geodesic", ""),
-        ("rating/still_slow/cut", "cut", ""),
+    assert [(pair.name, pair.methods, len(pair.stimuli)) for pair in rated] == [
+        ("rating/slow_quick/geodesic", ("geodesic",), 1),
+        ("rating/slow_quick/cut", ("cut",), 1),
+        ("rating/still_slow/geodesic", ("geodesic",), 1),
+        ("rating/still_slow/cut", ("cut",), 1),
     ]
 
 
 def test_rated_pairs_hold_both_methods(pair_rating_protocol, toys):
     made = prepare(pair_rating_protocol, toys)
     rated = [pair for pair in made.pairs if pair.study == "compared"]
-    assert [(pair.name, pair.method_a, pair.method_b) for pair in rated] == [
+    assert [(pair.name, *pair.methods) for pair in rated] == [
         ("compared/slow_quick", "geodesic", "cut"),
         ("compared/still_slow", "geodesic", "cut"),
     ]
     for pair in rated:
-        assert [made.stimulus(name).record.method for name in (pair.a, pair.b)] == ["geodesic", "cut"]
+        assert [made.stimulus(name).record.method for name in pair.stimuli] == ["geodesic", "cut"]
 
 
 # --- refusals ------------------------------------------------------------------------------------------------------
@@ -243,7 +243,7 @@ def test_a_level_below_one_frame_is_refused(toys):
     given = 'points = { choose = "given", source_s = 1.0, destination_frame = 77 }'
     at = ('destination = "quick"', f'destination = "quick"\n{given}')
     made = prepare(changed(at), toys)
-    length = made.stimulus(made.pairs[0].a).record.optimal_frames
+    length = made.stimulus(made.pairs[0].stimuli[0]).record.optimal_frames
     assert check(changed(at, ("[-3, 0, 5]", f"[{1 - length}, 5]")), toys) == []
     (problem,) = check(changed(at, ("[-3, 0, 5]", f"[{-length}, 5]")), toys)
     assert f"a level below one frame: the geodesic blend here takes {length} frames" in problem
@@ -318,7 +318,7 @@ def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypat
     monkeypatch.setattr(cycles, "extend", extend)
     made = prepare(changed(("entry_s = 0.3", "entry_s = 2.0"), ("exit_s = 0.3", "exit_s = 2.0")), library)
     assert {name for name, _, _ in calls} == {"slow", "quick"}
-    record = made.stimulus(made.pairs[0].a).record
+    record = made.stimulus(made.pairs[0].stimuli[0]).record
     for use, frames in ((record.source, 90), (record.destination, 60)):
         assert use.frames == frames
         assert 0 <= use.frame < frames

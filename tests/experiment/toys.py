@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.errors import MotionError
-from study.experiment.plan import Pair
 from study.experiment.protocol.whole import Protocol
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.library import Entry, Library
 from study.motion.skeleton import Skeleton
+from study.tasks.trial import Pair
 
 _JOINTS = (
     ("Hips", -1, (0.0, 0.9, 0.0)),
@@ -178,21 +178,19 @@ def pairs_of(protocol: Protocol) -> tuple[Pair, ...]:
                 study.task,
                 transition.name,
                 transition.category,
-                f"{transition.name}-k",
-                f"{transition.name}-fixed",
-                study.reference,
-                study.comparison or study.reference,
+                (f"{transition.name}-k", f"{transition.name}-fixed"),
+                (study.reference, study.comparison or study.reference),
             )
             if study.task == "same-different":
                 for d in study.levels_of(transition.name):
-                    b = f"{transition.name}{d:+d}" if d else base.a
-                    pairs.append(replace(base, name=f"{base.name}/{d:+d}", b=b, difference_frames=d))
+                    shown = base.stimuli[0], f"{transition.name}{d:+d}" if d else base.stimuli[0]
+                    pairs.append(replace(base, name=f"{base.name}/{d:+d}", stimuli=shown, difference_frames=d))
             elif study.paired:
                 pairs.append(base)
             else:
                 for m in study.methods:
-                    a = f"{transition.name}-{m}"
-                    pairs.append(replace(base, name=f"{base.name}/{m}", a=a, b="", method_a=m, method_b=""))
+                    alone = (f"{transition.name}-{m}",)
+                    pairs.append(replace(base, name=f"{base.name}/{m}", stimuli=alone, methods=(m,)))
     return tuple(pairs)
 
 

@@ -140,10 +140,10 @@ def trials_and_pairs(prepared, plan):
 def assert_study_one(prepared, plan):
     trials, pairs = trials_and_pairs(prepared, plan)
     assert len(trials) == 42
-    assert set(Counter((t.motion, t.difference_frames, t.reference_first) for t in trials).values()) == {1}
-    assert len({identifier for pair in pairs for identifier in (pair.a, pair.b)}) == 21
+    assert set(Counter((t.motion, t.difference_frames, t.a_first) for t in trials).values()) == {1}
+    assert len({identifier for pair in pairs for identifier in pair.stimuli}) == 21
     for pair in pairs:
-        reference, comparison = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
+        reference, comparison = prepared.stimulus(pair.stimuli[0]).record, prepared.stimulus(pair.stimuli[1]).record
         assert 16 <= reference.blend_frames <= 35
         assert comparison.blend_frames == reference.blend_frames + pair.difference_frames
 
@@ -152,7 +152,7 @@ def assert_study_two_or_three(prepared, plan):
     trials, pairs = trials_and_pairs(prepared, plan)
     assert len(trials) == len(pairs) == 8
     for pair in pairs:
-        optimal, fixed = prepared.stimulus(pair.a).record, prepared.stimulus(pair.b).record
+        optimal, fixed = prepared.stimulus(pair.stimuli[0]).record, prepared.stimulus(pair.stimuli[1]).record
         assert fixed.blend_frames == 10
         assert 5 <= optimal.blend_frames <= 35
         assert abs(optimal.blend_frames - 10) > 4

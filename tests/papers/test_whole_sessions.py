@@ -64,7 +64,7 @@ def test_the_sitting_of_2004_has_42_and_three_times_8_pairs(library, tmp_path):
     assert list(Counter(trial.study for trial in shown).values()) == [42, 8, 8, 8]
     records = {record.id: record for record in prepared.records}
     for pair in (pair for pair in prepared.pairs if pair.study == "geodesic_vs_timewarp"):
-        plain, warped = records[pair.a], records[pair.b]
+        plain, warped = records[pair.stimuli[0]], records[pair.stimuli[1]]
         assert (plain.source.frame, plain.destination.frame) == (warped.source.frame, warped.destination.frame)
         assert 5 <= plain.blend_frames <= 35
         (windows,) = (
@@ -109,11 +109,11 @@ def test_the_study_of_2003_cuts_where_each_metric_is_least(library, tmp_path):
     prepared = prepare(protocol, library)
     (transition,) = protocol.transitions_of(protocol.studies[0])
     pairs = [pair for pair in prepared.pairs if pair.motion == transition.name and pair.study == "cuts"]
-    assert [pair.method_a for pair in pairs] == ["cut-lee2002", "cut-wang2003"]
+    assert [pair.methods[0] for pair in pairs] == ["cut-lee2002", "cut-wang2003"]
     points = []
     clips = [library.clip(name, fps=30.0) for name in (transition.source, transition.destination)]
     for pair, metric in zip(pairs, ("lee2002", "wang2003"), strict=True):
-        record = prepared.stimulus(pair.a).record
+        record = prepared.stimulus(pair.stimuli[0]).record
         assert (record.frames, record.blend_start, record.blend_stop) == (180, 90, 90)
         points.append((record.source.frame, record.destination.frame))
         costs = frame_costs(*clips, metric)[90:, : clips[1].frames - 90]
@@ -121,7 +121,7 @@ def test_the_study_of_2003_cuts_where_each_metric_is_least(library, tmp_path):
     assert points[0] != points[1]
     orders = [
         tuple(
-            trial.method_a
+            trial.methods[0]
             for trial in draw_plan(protocol, prepared.pairs, "p", group=group).trials
             if trial.role == "trial" and trial.study == "cuts"
         )

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from study.experiment.observers import simulate
-from study.experiment.plan import Pair
 from study.experiment.protocol.whole import Protocol, load_protocol
-from study.experiment.stimuli.rendering import read_manifest
+from study.experiment.stimuli.rendering import MANIFEST_VERSION, read_manifest
 from study.experiment.stimuli.stimulus import MotionUse, StimulusRecord
 from study.experiment.store.responses import open_responses
+from study.tasks.trial import Pair
 
 sys.path.insert(0, str(Path(__file__).parent))  # tests are imported by path, without packages
 
@@ -120,15 +120,15 @@ def _pairs(protocol: Protocol, record: Callable[[str, str, int], StimulusRecord]
             for difference in study.differences_frames:
                 b = record(transition.name, study.reference, difference)
                 name = f"{study.name}/{transition.name}/{difference:+d}"
-                pairs.append(Pair(name, *base, a.id, b.id, study.reference, study.reference, difference))
+                pairs.append(Pair(name, *base, (a.id, b.id), (study.reference, study.reference), difference))
             if study.comparison:
                 b = record(transition.name, study.comparison, 0)
                 name = f"{study.name}/{transition.name}"
                 if study.paired:
-                    pairs.append(Pair(name, *base, a.id, b.id, study.reference, study.comparison))
+                    pairs.append(Pair(name, *base, (a.id, b.id), (study.reference, study.comparison)))
                 else:
-                    pairs.append(Pair(f"{name}/a", *base, a.id, "", study.reference, ""))
-                    pairs.append(Pair(f"{name}/b", *base, b.id, "", study.comparison, ""))
+                    pairs.append(Pair(f"{name}/a", *base, (a.id,), (study.reference,)))
+                    pairs.append(Pair(f"{name}/b", *base, (b.id,), (study.comparison,)))
     return pairs
 
 
@@ -162,7 +162,8 @@ def make_results(
             video = {"file": name, "frames": 40, "frames_sha256": "0", "file_sha256": "0", "bytes": 1}
         stimuli.append({**asdict(entry), "video": video})
     manifest = {
-        "version": 1, "protocol": protocol.name, "title": protocol.title, "protocol_sha256": protocol.sha256,
+        "version": MANIFEST_VERSION,
+        "protocol": protocol.name, "title": protocol.title, "protocol_sha256": protocol.sha256,
         "library": "synthetic" if synthetic else "cmu", "synthetic": synthetic,
         "acknowledgement": "" if synthetic else "The data used in this project was obtained from mocap.cs.cmu.edu.",
         "fps": 30.0, "size": [160, 120], "style": "mannequin", "versions": {"segue": "0.1.0", "numpy": "2.0"},

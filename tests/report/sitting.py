@@ -10,12 +10,14 @@ import numpy as np
 
 from study.experiment import session as sitting
 from study.experiment.folder import PROTOCOL
-from study.experiment.plan import Trial, draw_plan
+from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import load_protocol
+from study.experiment.steps import Step
 from study.experiment.stimuli.rendering import read_manifest
 from study.experiment.store.answers import Presentation, record_answer, record_event
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session
+from study.tasks.trial import PLACES, Trial
 
 
 @dataclass(frozen=True)
@@ -27,10 +29,10 @@ class Reaction:
     gap_frames: float = 1.02
 
 
-Behaviour = Callable[[Trial, sitting.Step, np.random.Generator], Reaction]
+Behaviour = Callable[[Trial, Step, np.random.Generator], Reaction]
 
 
-def attentive(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+def attentive(trial: Trial, step: Step, rng: np.random.Generator) -> Reaction:
     """Sees differences of ten frames, favours the first method in seven of ten pairs, rates at random."""
     seconds = float(rng.uniform(0.6, 2.5))
     if trial.role == "check":
@@ -44,26 +46,26 @@ def attentive(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Rea
     return Reaction(str(rng.choice(step.legal)), seconds)
 
 
-def missing(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+def missing(trial: Trial, step: Step, rng: np.random.Generator) -> Reaction:
     """Never answers."""
     del trial, step, rng
     return Reaction(None)
 
 
-def stubborn(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+def stubborn(trial: Trial, step: Step, rng: np.random.Generator) -> Reaction:
     """Always gives the first legal answer, far too soon, even where an attention check asks for another one."""
     del rng
     other = [value for value in step.legal if value != trial.expected]
     return Reaction(other[0] if trial.role == "check" else step.legal[0], 0.1)
 
 
-def stuttering(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+def stuttering(trial: Trial, step: Step, rng: np.random.Generator) -> Reaction:
     """Attentive, but every fifth showing stalls."""
     reaction = attentive(trial, step, rng)
     return Reaction(reaction.value, reaction.response_s, 4.0 if rng.random() < 0.2 else 1.02)
 
 
-def perfect(trial: Trial, step: sitting.Step, rng: np.random.Generator) -> Reaction:
+def perfect(trial: Trial, step: Step, rng: np.random.Generator) -> Reaction:
     """Sees every difference, always favours the first method, rates everything highest."""
     del rng
     if trial.role == "check":
@@ -104,8 +106,7 @@ def sit(
                     trial.trial, step.attempt, place, stimulus, "requestVideoFrameCallback", 120,
                     120 if shown_well else 117, reaction.gap_frames, shown_well,
                 )
-                for place, stimulus in (("first", trial.first), ("second", trial.second))
-                if stimulus
+                for place, stimulus in zip(PLACES, trial.stimuli, strict=False)
             ]  # fmt: skip
             record_answer(responses, record, answer, shown)
             given += 1

@@ -75,7 +75,7 @@ async function showFilms(view, study, { restarts, pauseOver, onFault }) {
       videos[index].classList.remove("now");
       if (restarts && unseen()) throw new Unseen();
       last = lastFrame;
-      shown.push({ place: film.place, ...how });
+      shown.push({ slot: film.slot, ...how });
     }
   } finally {
     filmsOn(false);
@@ -154,7 +154,7 @@ async function filmFault(study) {
 
 // Shows the films until they were shown, or given up: null then.
 async function shownFilms(view, study, pauseOver) {
-  const onFault = (film, why, attempt) => tell("fault", { what: why, trial: view.trial, place: film.place, try: attempt });
+  const onFault = (film, why, attempt) => tell("fault", { what: why, trial: view.trial, slot: film.slot, try: attempt });
   for (let restarts = MOST_RESTARTS; ; ) {
     try {
       return await showFilms(view, study, { restarts, pauseOver, onFault });

@@ -18,6 +18,7 @@ from study.apps.player.showing import Showing
 from study.apps.player.store import Store
 from study.errors import SessionError
 from study.experiment import session as sitting
+from study.experiment.form import LONGEST_TEXT, field_value
 from study.experiment.protocol.texts import FormField
 
 _KEPT_PAGES = 6
@@ -108,7 +109,7 @@ class Desk:
                 self.fault("focus lost")
             if isinstance(event, Focus):
                 step = sitting.current(self.session)
-                self.store.event("focus", {"focused": event.focused, "trial": step.trial, "step": step.kind})
+                self.store.event("focus", {"focused": event.focused, "trial": step.trial, "step": step.place})
         return leave
 
     def fault(self, what: str) -> None:
@@ -126,7 +127,7 @@ class Desk:
                 button = chosen(drawn, event)
                 if button is not None and button.name == "stop":
                     step = sitting.current(self.session)
-                    self.store.event("stopped", {"trial": step.trial, "step": step.kind})
+                    self.store.event("stopped", {"trial": step.trial, "step": step.place})
                     raise Stopped("stopped")
                 if button is not None or (isinstance(event, Key) and event.name == "escape"):
                     return
@@ -164,11 +165,11 @@ class Desk:
                     return None
                 if button is not None:
                     try:
-                        return sitting.field_value(field, entry.strip())
+                        return field_value(field, entry.strip())
                     except SessionError:
                         complaint = True
                 elif isinstance(event, Typed):
-                    entry, complaint = (entry + event.character)[: sitting.LONGEST_TEXT], False
+                    entry, complaint = (entry + event.character)[:LONGEST_TEXT], False
                 elif isinstance(event, Key) and event.name == "backspace":
                     entry, complaint = entry[:-1], False
                 elif self.notice((event,)):

@@ -24,8 +24,10 @@ from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, find_rate, frame_at
 from study.apps.player.store import Store
 from study.experiment import session as sitting
+from study.experiment.steps import Step
 from study.experiment.stimuli.stimulus import Stimulus
 from study.experiment.store.answers import Presentation
+from study.tasks.trial import PLACES
 
 
 @dataclass(frozen=True)
@@ -127,12 +129,12 @@ class _Player(Desk):
                 page = screens.reading_page(self.protocol, step, (0, 1))
             draw_page(page, self.window.size, self.look, must_fit=True)
 
-    def _do(self, step: sitting.Step) -> None:
+    def _do(self, step: Step) -> None:
         if step.kind == "consent":
             self._consent(step)
         elif step.kind == "form":
             self._form()
-        elif step.kind in ("first", "second"):
+        elif step.kind == "stimulus":
             self._stimulus_step(step)
         elif step.kind in ("gap", "pause"):
             self._blank(step)
@@ -141,14 +143,14 @@ class _Player(Desk):
         else:
             self._read(step)
 
-    def _read(self, step: sitting.Step) -> None:
+    def _read(self, step: Step) -> None:
         page = screens.reading_page(self.protocol, step, sitting.progress(self.session))
         while self.read_until(page) == "example":
             self._show(step.stimulus)
             self._blank_for(0.3)
         self.session = sitting.advanced(self.session)
 
-    def _consent(self, step: sitting.Step) -> None:
+    def _consent(self, step: Step) -> None:
         if self.read_until(screens.consent_page(self.protocol, step)) == "decline":
             self.read_until(screens.last_page(self.protocol, self.protocol.consent.declined))
             raise Stopped("declined")
@@ -173,8 +175,8 @@ class _Player(Desk):
 
     # A trial
 
-    def _stimulus_step(self, step: sitting.Step) -> None:
-        if step.kind == "first":
+    def _stimulus_step(self, step: Step) -> None:
+        if step.slot == 1:
             self.showings, self.faults = [], []
             if self.window.settle(self.look.ground):
                 self._note_display()
@@ -190,7 +192,7 @@ class _Player(Desk):
         self.showings.append(showing)
         self.session = sitting.advanced(self.session)
 
-    def _prepare(self, step: sitting.Step) -> None:
+    def _prepare(self, step: Step) -> None:
         """Lay out all that a trial shows, so that nothing has to be computed between its stimuli."""
         steps = self.session.steps[self.session.position :]
         own = [one for one in steps if (one.trial, one.attempt) == (step.trial, step.attempt)]
@@ -243,10 +245,10 @@ class _Player(Desk):
     def _start_again(self) -> None:
         """After an interruption the trial starts from its first stimulus; it has no answer yet."""
         step = sitting.current(self.session)
-        self.store.event("trial begun again", {"trial": step.trial, "attempt": step.attempt, "step": step.kind})
+        self.store.event("trial begun again", {"trial": step.trial, "attempt": step.attempt, "step": step.place})
         self.session = sitting.restarted(self.session)
 
-    def _blank(self, step: sitting.Step) -> None:
+    def _blank(self, step: Step) -> None:
         """A gap or a pause: the empty ground for its time. The next trial is laid out while it lasts."""
         if self._blank_for(step.duration_s or 0.0, prepare=step.kind == "pause"):
             self.session = sitting.advanced(self.session)
@@ -263,7 +265,7 @@ class _Player(Desk):
         end_s = self.flip_away() + duration_s - 0.5 * window.pacing.period_s
         if prepare:
             following = self.session.steps[self.session.position + 1]
-            if following.kind == "first":
+            if following.slot == 1:
                 self._prepare_next(following)
         while (left := end_s - window.now()) > 0:
             events = window.wait(left)
@@ -275,13 +277,13 @@ class _Player(Desk):
                 window.flip()
         return True
 
-    def _prepare_next(self, step: sitting.Step) -> None:
+    def _prepare_next(self, step: Step) -> None:
         before = self.session
         self.session = sitting.advanced(before)
         self._prepare(step)
         self.session = before
 
-    def _answer(self, step: sitting.Step) -> None:
+    def _answer(self, step: Step) -> None:
         """Ask, and store the answer with how its stimuli were shown before anything else."""
         page = screens.answer_page(self.protocol, step, sitting.progress(self.session))
         zero_s = self.showings[-1].last_frame_s
@@ -311,10 +313,10 @@ class _Player(Desk):
             reasons.append(f"a picture stood for {worst:.1f} frames")
         return list(dict.fromkeys(reasons))
 
-    def _presentations(self, step: sitting.Step) -> list[Presentation]:
+    def _presentations(self, step: Step) -> list[Presentation]:
         method = "own clock" if self.window.pacing.own_clock else "swap"
         rows = []
-        for place, showing in zip(("first", "second"), self.showings, strict=False):
+        for place, showing in zip(PLACES, self.showings, strict=False):
             detail: Mapping[str, Any] = {**showing.detail(), "faults": [*showing.faults, *self.faults]}
             rows.append(
                 Presentation(

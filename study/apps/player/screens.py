@@ -7,7 +7,7 @@ from dataclasses import replace
 from study.apps.player.pages import Button, Page
 from study.experiment.protocol.texts import FormField
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import Step, answer_keys, answer_words
+from study.experiment.steps import Step, answer_keys, answer_words
 
 
 def reading_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Page:

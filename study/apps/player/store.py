@@ -13,7 +13,6 @@ from typing import Protocol as Shape
 
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import Answer
 from study.experiment.store.answers import (
     Presentation,
     event_counts,
@@ -25,6 +24,7 @@ from study.experiment.store.answers import (
 from study.experiment.store.databases import patiently
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
+from study.tasks.answer import Answer
 
 
 class Store(Shape):

@@ -30,7 +30,8 @@ from study.errors import SessionError
 from study.experiment import session as flow
 from study.experiment.plan import draw_plan, groups_of
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import Answer, Session, Step
+from study.experiment.session import Session
+from study.experiment.steps import Step
 from study.experiment.stimuli.rendering import Manifest
 from study.experiment.store import participants as people
 from study.experiment.store.answers import (
@@ -45,6 +46,8 @@ from study.experiment.store.databases import AWAY, in_words
 from study.experiment.store.participants import Participant
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, session_by_id
+from study.tasks.answer import Answer
+from study.tasks.trial import PLACES
 
 TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
@@ -301,12 +304,16 @@ class Host:
         return state if step.kind == "answer" and (step.trial, step.item, step.attempt) == key else None
 
     def _presentation(self, sitting: Sitting, message: Answered, shown: Shown) -> Presentation:
-        trial = sitting.record.plan.trial(message.trial)
-        stimulus = trial.first if shown.place == "first" else trial.second
+        stimuli = sitting.record.plan.trial(message.trial).stimuli
+        if shown.slot > len(stimuli):
+            raise SessionError(
+                f"Expected one of the {len(stimuli)} films of trial {message.trial}, found {shown.slot}."
+            )
+        stimulus = stimuli[shown.slot - 1]
         return Presentation(
             trial=message.trial,
             attempt=message.attempt,
-            place=shown.place,
+            place=PLACES[shown.slot - 1],
             stimulus=stimulus,
             method=shown.method,
             frames_expected=self.frames.get(stimulus),
@@ -335,7 +342,7 @@ class Host:
     async def _view(self, sitting: Sitting) -> dict[str, Any]:
         step = flow.current(sitting.state)
         view = views.view(sitting.state, sitting.participant, self.film_bytes)
-        sitting.shown_trial = (step.trial, step.attempt) if step.kind == "first" else None
+        sitting.shown_trial = (step.trial, step.attempt) if step.slot == 1 else None
         if step.kind in ("debrief", "done"):
             # All is answered: who closes the page over the debriefing has finished, too.
             if not sitting.finished:

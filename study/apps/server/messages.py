@@ -12,6 +12,9 @@ from study.errors import SessionError
 LONGEST_FILM_FRAMES = 40_000
 """Far above the longest stimulus (120 s at 240 frames a second); a page can't fill the database."""
 
+MOST_SLOTS = 20
+"""Above the films of any trial."""
+
 SHORTEST_PAGE, LONGEST_PAGE = 8, 64
 """Characters of the name that a page gives itself."""
 
@@ -61,7 +64,7 @@ class Done(Message):
 class Shown(Message):
     """How one film was presented."""
 
-    place: Literal["first", "second"]
+    slot: Annotated[int, Field(ge=1, le=MOST_SLOTS)]
     method: Annotated[str, Field(max_length=40)]
     frames_presented: Annotated[int, Field(ge=0, lt=LONGEST_FILM_FRAMES)] | None = None
     longest_gap_frames: Annotated[float, Field(ge=0, lt=1e9)] | None = None
@@ -79,7 +82,7 @@ class Answered(Message):
     value: Annotated[str, Field(max_length=40)] | None = None
     response_s: Annotated[float, Field(ge=0, lt=1e6)] | None = None
     shown_well: bool = True
-    shown: Annotated[tuple[Shown, ...], Field(max_length=2)] = ()
+    shown: Annotated[tuple[Shown, ...], Field(max_length=MOST_SLOTS)] = ()
     timing: Annotated[dict[Annotated[str, Field(max_length=40)], float | str | None], Field(max_length=20)] = {}
 
 

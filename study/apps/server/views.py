@@ -12,8 +12,10 @@ from functools import lru_cache
 from typing import Any
 
 from study.experiment import session as sitting
+from study.experiment.plan import legal_answers
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import Session, Step
+from study.experiment.session import Session
+from study.experiment.steps import Step, answer_keys, answer_words
 from study.experiment.store.participants import Participant
 
 FILMS = "films"
@@ -26,8 +28,9 @@ def session_name(participant: Participant) -> str:
 
 
 def film_name(participant: Participant, step: Step) -> str:
-    """The name of a film in one showing: unguessable, and different for every place, trial and attempt."""
-    return _film_name(participant.secret, f"{step.kind}/{step.study}/{step.trial}/{step.attempt}/{step.stimulus}")
+    """The name of a film in one showing: unguessable, and different for every slot, trial and attempt."""
+    place = f"{step.kind}/{step.study}/{step.trial}/{step.attempt}/{step.slot}/{step.stimulus}"
+    return _film_name(participant.secret, place)
 
 
 @lru_cache(maxsize=4096)
@@ -46,7 +49,7 @@ def films_due(session: Session) -> list[Step]:
     """The steps whose films a participant may load now: those of this trial and of the next, or the example."""
     step = sitting.current(session)
     due = [step] if step.kind == "instructions" and step.stimulus else []
-    return due + [other for other in _near(session) if other.kind in ("first", "second")]
+    return due + [other for other in _near(session) if other.slot]
 
 
 def _near(session: Session) -> list[Step]:
@@ -75,7 +78,7 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
     step, protocol = sitting.current(session), session.protocol
     done, total = sitting.progress(session)
     shown: dict[str, Any] = {"kind": step.kind, "text": step.text, "progress": [done, total]}
-    if step.kind == "first":
+    if step.slot == 1:
         return {**shown, **_trial(session, participant, film_bytes), "kind": "trial"}
     if step.kind == "answer":
         # The films of this trial were shown; further questions about them follow.
@@ -89,7 +92,7 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
         study = protocol.study(step.study) if step.study else None
         shown["fps"] = protocol.fps
         shown["example"] = _film(step, participant, film_bytes) if step.stimulus else None
-        shown["keys"] = _options(protocol, sitting.legal_answers(study)) if study and study.task != "rating" else []
+        shown["keys"] = _options(protocol, legal_answers(study)) if study and study.task != "rating" else []
     return shown
 
 
@@ -103,9 +106,9 @@ def _trial(session: Session, participant: Participant, film_bytes: int) -> dict[
     question = next(other for other in own if other.kind == "answer")
     return {
         **_asking(session, question),
-        "films": [_film(other, participant, film_bytes) for other in own if other.kind in ("first", "second")],
+        "films": [_film(other, participant, film_bytes) for other in own if other.slot],
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
-        "ahead": [_film(other, participant, film_bytes) for other in ahead if other.kind in ("first", "second")],
+        "ahead": [_film(other, participant, film_bytes) for other in ahead if other.slot],
     }
 
 
@@ -122,8 +125,7 @@ def _asking(session: Session, step: Step) -> dict[str, Any]:
 
 
 def _film(step: Step, participant: Participant, film_bytes: int) -> dict[str, Any]:
-    place = "first" if step.kind == "instructions" else step.kind
-    return {"place": place, "url": f"{FILMS}/{film_name(participant, step)}.mp4", "bytes": film_bytes}
+    return {"slot": step.slot, "url": f"{FILMS}/{film_name(participant, step)}.mp4", "bytes": film_bytes}
 
 
 def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
@@ -140,7 +142,5 @@ def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
 
 
 def _options(protocol: Protocol, legal: tuple[str, ...]) -> list[dict[str, str]]:
-    keys = sitting.answer_keys(protocol, legal)
-    return [
-        {"value": value, "label": sitting.answer_words(protocol, value), "key": keys.get(value, "")} for value in legal
-    ]
+    keys = answer_keys(protocol, legal)
+    return [{"value": value, "label": answer_words(protocol, value), "key": keys.get(value, "")} for value in legal]

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.errors import StimulusError
-from study.experiment.plan import Pair
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.drafts import Draft, add_drafts
 from study.experiment.stimuli.films import Film, Showing, plan_all
@@ -22,6 +21,7 @@ from study.experiment.stimuli.look import LOOK_VERSION, with_cameras
 from study.experiment.stimuli.rendering import Manifest, RenderSummary, made_from, read_manifest, record, render
 from study.experiment.stimuli.stimulus import Stimulus, StimulusRecord, StimulusSet
 from study.experiment.stimuli.ways import Ways
+from study.tasks.trial import Pair
 
 if TYPE_CHECKING:
     from study.motion.library import Library
@@ -98,8 +98,8 @@ def versions() -> dict[str, str]:
 def _pair(study: StudySpec, showing: Showing, stimuli: dict[Film, Stimulus]) -> Pair:
     transition = showing.settled.transition
     name = f"{study.name}/{transition.name}"
-    a, b = stimuli[showing.a].id, "" if showing.b is None else stimuli[showing.b].id
-    if a == b and showing.method_a != showing.method_b:
+    shown = tuple(stimuli[film].id for film in showing.films)
+    if len(set(shown)) < len(shown) and showing.method_a != showing.method_b:
         raise StimulusError(
             f"transition {transition.name!r}: expected two films by the methods {showing.method_a!r} and "
             f"{showing.method_b!r} of the study {study.name!r}, found that they look the same; choose other motions, "
@@ -115,9 +115,7 @@ def _pair(study: StudySpec, showing: Showing, stimuli: dict[Film, Stimulus]) -> 
         task=study.task,
         motion=transition.name,
         category=transition.category,
-        a=a,
-        b=b,
-        method_a=showing.method_a,
-        method_b=showing.method_b if study.paired else "",
+        stimuli=shown,
+        methods=(showing.method_a, showing.method_b)[: len(shown)],
         difference_frames=showing.difference_frames,
     )

@@ -18,9 +18,9 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from study.errors import StimulusError
 from study.experiment.folder import ANSWERS, MANIFEST, PROTOCOL, STIMULI
-from study.experiment.plan import Pair
 from study.experiment.stimuli.stimulus import Stimulus, StimulusRecord, StimulusSet
 from study.files import make_folder, read_text, refused, write_whole
+from study.tasks.trial import Pair, pair_since_version_1
 
 if TYPE_CHECKING:
     from renderer.jobs import Progress
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol
     from study.motion.library import Library
 
-MANIFEST_VERSION = 1
+MANIFEST_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -322,12 +322,14 @@ def read_manifest(folder: str | Path) -> Manifest:
     try:
         data = json.loads(content)
         version = data["version"]
+        if version == 1:
+            content = json.dumps({**data, "pairs": [pair_since_version_1(pair) for pair in data["pairs"]]}).encode()
     except (ValueError, KeyError, TypeError) as error:
         found = f"no {error}" if isinstance(error, KeyError) else f"something else ({error})"
         raise StimulusError(f"{path}: expected JSON of a manifest, found {found}; {_ANEW}.") from error
-    if version != MANIFEST_VERSION:
+    if version not in (1, MANIFEST_VERSION):
         raise StimulusError(
-            f"{path}: expected a manifest of version {MANIFEST_VERSION}, found {version!r}; "
+            f"{path}: expected a manifest of version {MANIFEST_VERSION} or older, found {version!r}; "
             "use the Segue that wrote it, or render into a new folder."
         )
     try:

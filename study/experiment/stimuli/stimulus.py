@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import StimulusError
-from study.experiment.plan import Pair
+from study.tasks.trial import Pair
 
 if TYPE_CHECKING:
     from renderer.camera import Camera

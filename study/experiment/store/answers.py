@@ -10,28 +10,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sqlalchemy as sa
 from pydantic_core import to_json
 
 from study.errors import SessionError
-from study.experiment.plan import Plan, Trial
-from study.experiment.session import Answer, right_answer
-from study.experiment.store.databases import (
-    alone,
-)
+from study.experiment.store.databases import alone
 from study.experiment.store.responses import Clock, Responses, rows_of, utc_now
 from study.experiment.store.sessions import SessionRecord, find_session
-from study.experiment.store.tables import (
-    answers,
-    events,
-    form_values,
-    presentations,
-)
-
-if TYPE_CHECKING:
-    pass
+from study.experiment.store.tables import answers, events, form_values, presentations
+from study.tasks.answer import Answer, answer_columns
 
 
 @dataclass(frozen=True)
@@ -41,7 +30,7 @@ class Presentation:
     Parameters
     ----------
     place
-        `first` or `second`.
+        The slot that it filled (`trial.PLACES`): `first`, `second`, ...
     method
         What timed it: `requestVideoFrameCallback`, `swap`, or the name of a fallback, which measured nothing.
     frames_expected, frames_presented, longest_gap_frames
@@ -117,7 +106,7 @@ Row = tuple[sa.Insert, dict[str, Any]]
 
 def answer_rows(record: SessionRecord, answer: Answer, shown: Sequence[Presentation], at: datetime) -> list[Row]:
     """The rows of one answer, for a transaction of the caller's (`insert_rows`)."""
-    values = {**_trial_values(record.plan.trial(answer.trial)), **_answer_values(record.plan, answer)}
+    values = answer_columns(record.plan.trial(answer.trial), answer)
     presented = [(_INSERT_PRESENTATION, {"session_id": record.id, "at": at, **_presentation_values(o)}) for o in shown]
     return [(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values}), *presented]
 
@@ -202,31 +191,3 @@ def event_row(record: SessionRecord, kind: str, detail: Mapping[str, Any] | None
     """The row of one event, for a transaction of the caller's."""
     text = None if detail is None else json.dumps(detail, sort_keys=True)
     return _INSERT_EVENT, {"session_id": record.id, "kind": kind, "at": at, "detail_json": text}
-
-
-_TRIAL_COLUMNS = tuple(column.name for column in answers.c if column.name in Trial.__dataclass_fields__)
-
-
-def _trial_values(trial: Trial) -> dict[str, Any]:
-    return {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
-
-
-def _answer_values(plan: Plan, answer: Answer) -> dict[str, Any]:
-    """The answer's own columns, with what it means: correct (same-different), method a chosen (preference)."""
-    trial = plan.trial(answer.trial)
-    correct = chose_a = None
-    right = right_answer(trial)
-    if answer.value is not None and right is not None:
-        correct = answer.value == right
-    if answer.value is not None and trial.task == "preference" and trial.role != "check":
-        chose_a = (answer.value == "first") == trial.a_first
-    return {
-        "item": answer.item,
-        "attempt": answer.attempt,
-        "answer": answer.value,
-        "missed": answer.missed,
-        "correct": correct,
-        "chose_a": chose_a,
-        "response_s": answer.response_s,
-        "shown_well": answer.shown_well,
-    }

@@ -50,9 +50,9 @@ class SessionRecord:
 
 def refuse_other_stimuli(responses: Responses, identifiers: Collection[str]) -> None:
     """Refuse a database whose sessions show stimuli that are not among these: their answers would be about nothing."""
-    known = {*identifiers, ""}  # where one stimulus is rated there is no second
+    known = set(identifiers)
     for record in all_sessions(responses):
-        shown_there = {name for trial in record.plan.trials for name in (trial.first, trial.second)}
+        shown_there = {name for trial in record.plan.trials for name in trial.stimuli}
         if missing := shown_there - known:
             raise SessionError(
                 f"{responses.place}: expected sessions with the stimuli of this results folder, found that of "

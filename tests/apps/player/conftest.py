@@ -12,11 +12,11 @@ from playing import Playing
 
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
-from study.experiment.session import Answer
 from study.experiment.stimuli.prepare import prepare
 from study.experiment.stimuli.stimulus import StimulusSet
 from study.experiment.store.answers import Presentation
 from study.motion.library import open_library
+from study.tasks.answer import Answer
 
 SMALL = """\
 name = "small"

@@ -9,11 +9,11 @@ import pytest
 
 from study.apps.player.store import ResponsesStore
 from study.experiment.plan import draw_plan
-from study.experiment.session import Answer
 from study.experiment.store.answers import has_event, stored_form
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import find_session
+from study.tasks.answer import Answer
 
 
 def participant(responses: Any, small: Any, name: str) -> ResponsesStore:

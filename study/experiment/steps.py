@@ -1,0 +1,241 @@
+"""Steps: what a participant goes through, one after another.
+
+A protocol, a plan and the answers so far come in; the steps that are left go out: consent, form, welcome, and for each
+study its instructions, practice, trials and breaks; at the end the debriefing. A trial is: its stimuli with a gap
+between two, the questions, a pause (2004 section 4.2). `session` walks over them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from study.errors import SessionError
+from study.experiment import wording
+from study.experiment.plan import Plan, legal_answers
+from study.experiment.protocol.whole import Protocol, StudySpec
+from study.tasks.answer import Answer, right_answer
+from study.tasks.trial import PLACES, Trial
+
+Kind = Literal[
+    "consent",
+    "form",
+    "instructions",
+    "stimulus",
+    "gap",
+    "answer",
+    "feedback",
+    "pause",
+    "break",
+    "debrief",
+    "done",
+]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What to do now.
+
+    Parameters
+    ----------
+    kind
+        `stimulus` plays one to its end; `gap` and `pause` wait; `answer` asks; `form` is filled in; the others are
+        read. Passing over `consent` means agreeing.
+    study
+        Name of the study; empty before the first and after the last.
+    text
+        What the participant reads.
+    stimulus
+        Id of the stimulus to play; with `instructions`, of the example that can be played.
+    slot
+        Which slot of the trial the stimulus fills, from 1; 0 outside stimuli.
+    duration_s
+        How long a gap, pause or answer window lasts; None for as long as it takes.
+    trial, attempt
+        The trial's number in the plan (0 outside trials), and which showing of it this is, from 1.
+    item
+        The rating item that is asked.
+    legal
+        The answers that count.
+    low, middle, high
+        Words at the ends and in the middle of a rating scale.
+    role
+        What the trial is for: `trial`, `practice` or `check`; empty outside trials.
+    """
+
+    kind: Kind
+    study: str = ""
+    text: str = ""
+    stimulus: str = ""
+    slot: int = 0
+    duration_s: float | None = None
+    trial: int = 0
+    attempt: int = 0
+    item: str = ""
+    legal: tuple[str, ...] = ()
+    low: str = ""
+    middle: str = ""
+    high: str = ""
+    role: str = ""
+
+    @property
+    def place(self) -> str:
+        """What records call it: the slot of a stimulus (`first`, `second`), or else the kind of step."""
+        return PLACES[self.slot - 1] if self.slot else self.kind
+
+
+def comes_again(protocol: Protocol, trial: Trial, attempt: int, shown_well: bool) -> bool:
+    """Whether a trial is queued again: badly shown, and not too often yet, so that no slow machine keeps anyone."""
+    return not shown_well and attempt <= protocol.timing.show_again and trial.role != "practice"
+
+
+def feedback_text(protocol: Protocol, trial: Trial, answer: Answer) -> str:
+    """What is read after the last answer to a practice trial."""
+    texts, right = protocol.texts, right_answer(trial)
+    if answer.missed:
+        return texts.missed
+    if right is None:
+        return texts.practice_noted
+    if answer.value == right:
+        return texts.practice_right
+    return texts.practice_wrong.replace("{answer}", answer_words(protocol, right))
+
+
+def answer_words(protocol: Protocol, value: str) -> str:
+    """What stands on the button of an answer; points of a scale are their own words."""
+    return str(getattr(protocol.texts, value, value))
+
+
+def answer_keys(protocol: Protocol, legal: Sequence[str]) -> dict[str, str]:
+    """The key of each legal answer; points of a scale have their digit, and 10 has none."""
+    keys = {value: getattr(protocol.keys, value, value) for value in legal}
+    return {value: key for value, key in keys.items() if len(key) == 1}
+
+
+def film_times(protocol: Protocol, plan: Plan, frames: Mapping[str, int]) -> wording.Films:
+    """How long the films of a plan's trials take, by study; `frames` has those of each stimulus."""
+    shown: dict[str, dict[bool, list[int]]] = {}
+    for trial in plan.trials:
+        own = shown.setdefault(trial.study, {True: [], False: []})
+        own[trial.role == "practice"].append(sum(frames[name] for name in trial.stimuli))
+    return {
+        study: wording.FilmTimes(*(sum(own) / len(own) / protocol.fps if own else 0.0 for own in (of[False], of[True])))
+        for study, of in shown.items()
+    }
+
+
+def steps_left(
+    protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Collection[str], films: wording.Films
+) -> tuple[Step, ...]:
+    """All that is left to do, in order."""
+    known = {trial.trial for trial in plan.trials}
+    if strays := sorted({answer.trial for answer in answers} - known):
+        raise SessionError(f"Expected answers to the plan's trials 1 to {len(plan.trials)}, found trials {strays}.")
+    steps: list[Step] = []
+    if "consent" not in passed and (text := wording.consent_text(protocol, films)):
+        steps.append(Step("consent", text=text))
+    if protocol.form and "form" not in passed:
+        steps.append(Step("form", text=protocol.texts.form.strip()))
+    if not answers and (text := wording.welcome_text(protocol, films)):
+        steps.append(Step("instructions", text=text))
+    earlier: dict[int, list[tuple[int, Answer]]] = {}
+    for place, answer in enumerate(answers):
+        earlier.setdefault(answer.trial, []).append((place, answer))
+    studies: dict[str, list[Trial]] = {}
+    for trial in plan.trials:
+        studies.setdefault(trial.study, []).append(trial)
+    breaks = _breaks(protocol, plan)
+    for trials in studies.values():
+        steps += _study_steps(protocol, trials, earlier, breaks, films)
+    if "debrief" not in passed and (text := wording.debrief_text(protocol, films)):
+        steps.append(Step("debrief", text=text))
+    return (*steps, Step("done"))
+
+
+def _study_steps(
+    protocol: Protocol,
+    trials: Sequence[Trial],
+    earlier: Mapping[int, Sequence[tuple[int, Answer]]],
+    breaks: Collection[int],
+    films: wording.Films,
+) -> list[Step]:
+    """What is left of a study: its instructions, trials with breaks, and those that come again, as they were queued.
+
+    `earlier` has the answers of each trial that has any, with their places among all; `breaks` the trials with a break
+    after them.
+    """
+    study = protocol.study(trials[0].study)
+    steps: list[Step] = []
+    again: list[tuple[int, list[Step]]] = []
+    begun = any(trial.trial in earlier for trial in trials if trial.role != "practice")
+    practised = trials[0].role == "practice" and not begun
+    for trial in trials:
+        if practised and trial.role != "practice" and protocol.texts.practice_over.strip():
+            steps.append(Step("instructions", study.name, protocol.texts.practice_over.strip()))
+        practised = practised and trial.role == "practice"
+        answers = earlier.get(trial.trial, ())
+        attempt, done = _state(protocol, study, trial, [answer for _, answer in answers])
+        if done is None:
+            continue
+        if attempt > 1:
+            queued = max(place for place, answer in answers if answer.attempt == attempt - 1)
+            again.append((queued, trial_steps(protocol, trial, attempt, done)))
+            continue
+        steps += trial_steps(protocol, trial, attempt, done)
+        if trial.trial in breaks:
+            steps.append(Step("break", study.name, protocol.texts.break_text.strip()))
+    steps += [step for _, repeated in sorted(again, key=lambda one: one[0]) for step in repeated]
+    if steps and (text := wording.instructions_text(protocol, study, films)):
+        steps.insert(0, Step("instructions", study.name, text, stimulus=trials[0].stimuli[0] if study.example else ""))
+    return steps
+
+
+def _breaks(protocol: Protocol, plan: Plan) -> set[int]:
+    """The trials that a break follows: every so many, practice not counted, and never the last one."""
+    counted = [trial.trial for trial in plan.trials if trial.role != "practice"]
+    every = protocol.timing.break_after
+    return set(counted[every - 1 : -1 : every]) if every else set()
+
+
+def _state(
+    protocol: Protocol, study: StudySpec, trial: Trial, answers: Sequence[Answer]
+) -> tuple[int, frozenset[str] | None]:
+    """Which showing of a trial is due and which of its items are answered; None for the items where it is finished."""
+    items = {""} if trial.role == "check" else {item.name for item in study.items} or {""}
+    attempt = max((answer.attempt for answer in answers), default=1)
+    latest = [answer for answer in answers if answer.attempt == attempt]
+    done = frozenset(answer.item for answer in latest)
+    if not items <= done:
+        return attempt, done
+    if not comes_again(protocol, trial, attempt, all(answer.shown_well for answer in latest)):
+        return attempt, None
+    return attempt + 1, frozenset()
+
+
+def trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset[str]) -> list[Step]:
+    """A trial from its first stimulus to its pause; items that are `done` are not asked again."""
+    study, timing = protocol.study(trial.study), protocol.timing
+    base = Step("stimulus", trial.study, trial=trial.trial, attempt=attempt, role=trial.role)
+    steps: list[Step] = []
+    for slot, stimulus in enumerate(trial.stimuli, start=1):
+        if slot > 1:
+            steps.append(replace(base, kind="gap", duration_s=timing.gap_s))
+        steps.append(replace(base, stimulus=stimulus, slot=slot))
+    legal = legal_answers(study)
+    # A rating is a questionnaire: it has no answer window (2003 section 4.2).
+    window_s = None if study.task == "rating" else timing.answer_s
+    ask = replace(base, kind="answer", text=wording.question_text(protocol, study), duration_s=window_s, legal=legal)
+    if trial.role == "check":
+        words = protocol.texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected))
+        steps.append(replace(ask, text=words))
+    elif study.items:
+        steps += [
+            replace(ask, item=item.name, text=item.question, low=item.low, middle=item.middle, high=item.high)
+            for item in study.items
+            if item.name not in done
+        ]
+    else:
+        steps.append(ask)
+    steps.append(replace(base, kind="pause", duration_s=timing.pause_s))
+    return steps

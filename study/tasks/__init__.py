@@ -1,0 +1,1 @@
+"""Tasks: what a participant decides, one module a task."""
