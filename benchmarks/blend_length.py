@@ -73,7 +73,7 @@ def made_up_clips() -> tuple[Clip, Clip]:
 
 
 def captured_clips(paths: list[Path]) -> tuple[Clip, Clip]:
-    from study.motion.files import read_clip
+    from study.motion.readers.registry import read_clip
 
     source, destination = (resample(read_clip(path), 30.0) for path in paths)
     return source, destination

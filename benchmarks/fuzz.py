@@ -192,8 +192,8 @@ def acclaim(generator: Generator, folder: Path) -> Callable[[], int]:
 
 def _inspected(file: Path) -> int:
     from study.errors import SegueError
-    from study.motion.bvh import write_bvh
-    from study.motion.files import read_clip
+    from study.motion.readers.bvh_writing import write_bvh
+    from study.motion.readers.registry import read_clip
 
     status, _ = run_verb("motions", "inspect", str(file), "--json")
     if status == 0:

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from study.motion.bvh import read_bvh
 from study.motion.clip import joint_positions, resample
+from study.motion.readers.bvh import read_bvh
 
 MOCAP = Path(os.environ.get("SEGUE_MOCAP", Path(__file__).resolve().parents[2] / "shared" / "motions"))
 

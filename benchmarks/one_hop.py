@@ -31,8 +31,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from study.motion.clip import Clip, resample, retarget, trim
-from study.motion.defects import mend
-from study.motion.files import read_clip
+from study.motion.mending import mend
+from study.motion.readers.registry import read_clip
 from study.motion.synthetic import synthesize
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.problem import (

@@ -72,7 +72,7 @@ def read_clip(path: str | None) -> Clip:
     from study.motion.clip import joint_positions, resample, trim
 
     if path:
-        from study.motion.files import read_clip as read
+        from study.motion.readers.registry import read_clip as read
 
         clip = resample(read(path), FPS)
         clip = trim(clip, 0, min(clip.frames, 130))

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from study.errors import MotionError, MotionFileError
 from study.motion.clip import Clip, trim
 from study.motion.cmu import Boundary, IndexedMotion, Take, cmu_index
-from study.motion.files import read_clip
 from study.motion.library_file import FACTS, ClipTable, LibraryFile, absolute, composed, find_library_file, placed
+from study.motion.readers.registry import read_clip
 
 if TYPE_CHECKING:
     from study.motion.defects import Defect
@@ -261,7 +261,7 @@ def own_names(files: Sequence[Path], folder: Path, given: Mapping[Path, str], ta
 def prepared(entry: Entry, *, as_is: bool = False) -> Clip:
     """Read an entry's file and make it fit for use, at the file's own frame rate; the clip's history says how.
 
-    Frames that belong to no motion are dropped, other defects mended (`study.motion.defects.mend`), the floor put at
+    Frames that belong to no motion are dropped, other defects mended (`study.motion.mending.mend`), the floor put at
     height 0, the start over the origin, setting out towards +Z. With `as_is` nothing of that is done, and a file's own
     name stands for all of its frames.
 
@@ -270,8 +270,9 @@ def prepared(entry: Entry, *, as_is: bool = False) -> Clip:
     MotionError
         Where the file can't be read, lacks the entry's frames, or is not usable for half of its length.
     """
-    from study.motion.defects import find_defects, mend, told
+    from study.motion.defects import find_defects, told
     from study.motion.feet import faced, grounded
+    from study.motion.mending import mend
     from study.motion.mirror import mirror
 
     clip = read_entry(entry)

@@ -33,8 +33,8 @@ from study.motion.entries import (
     own_tables,
     prepared,
 )
-from study.motion.files import SUFFIXES
 from study.motion.library_file import LibraryFile, absolute, composed, find_library_file, placed
+from study.motion.readers.registry import SUFFIXES
 
 __all__ = ["CMU_ACKNOWLEDGEMENT", "Entry", "Library", "download_trial", "open_library"]
 
@@ -353,7 +353,7 @@ def _motion_files(folder: Path, skipped: list[str]) -> Iterator[Path]:
 
 def _only_others(folder: Path) -> str:
     """What a folder without motion files holds instead, if it is motion in another format."""
-    from study.motion.other_formats import KNOWN, by_suffix
+    from study.motion.readers.other_formats import KNOWN, by_suffix
 
     others = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KNOWN)
     return str(by_suffix(others[0])) if others else "found none."

@@ -11,8 +11,9 @@ import pytest
 
 from study.apps.cli import run
 from study.motion import quaternions as quat
-from study.motion.bvh import read_bvh, write_bvh
 from study.motion.clip import Clip
+from study.motion.readers.bvh import read_bvh
+from study.motion.readers.bvh_writing import write_bvh
 from study.motion.synthetic import synthesize
 from study.motion.units import CMU_UNIT
 

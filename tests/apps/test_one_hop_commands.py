@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from study.apps.cli import run
-from study.motion.bvh import read_bvh
+from study.motion.readers.bvh import read_bvh
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from study.apps.cli import VERBS, run
-from study.motion.other_formats import by_beginning
+from study.motion.readers.other_formats import by_beginning
 
 ROOT = Path(__file__).parents[2]
 SEGUE = [sys.executable, "-m", "study.apps.cli"]

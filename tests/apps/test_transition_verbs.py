@@ -174,7 +174,7 @@ def test_advice_comes_as_table_csv_json_and_strips(capsys: pytest.CaptureFixture
 
 
 def test_a_joint_can_blend_for_a_time_of_its_own(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from study.motion.files import read_clip
+    from study.motion.readers.registry import read_clip
 
     clips = []
     for name, option in (("together.bvh", ()), ("apart.bvh", ("--joint", "shoulder.L=4"))):

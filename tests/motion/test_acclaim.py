@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
-from study.motion.acclaim import read_amc
-from study.motion.bvh import read_bvh
 from study.motion.clip import global_rotations, joint_positions
+from study.motion.readers.amc import read_amc
+from study.motion.readers.bvh import read_bvh
 
 ASF = """# a comment
 :version 1.10

@@ -13,9 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
-from study.motion.bvh import frame_rate, read_bvh, write_bvh
 from study.motion.clip import joint_positions
-from study.motion.digits import parse_words, split_words
+from study.motion.readers.bvh import read_bvh
+from study.motion.readers.bvh_writing import write_bvh
+from study.motion.readers.frame_times import frame_rate
+from study.motion.readers.numbers import parse_words, split_words
 from study.motion.units import CMU_UNIT
 
 HIERARCHY = """HIERARCHY

@@ -11,8 +11,9 @@ import pytest
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, resample, trim
-from study.motion.defects import Defect, find_defects, mend
-from study.motion.files import read_clip
+from study.motion.defects import Defect, find_defects
+from study.motion.mending import mend
+from study.motion.readers.registry import read_clip
 from study.motion.skeleton import Skeleton
 
 JOINTS = {  # name: (parent, offset in metres)

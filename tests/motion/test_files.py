@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import MotionError, MotionFileError
-from study.motion.files import read_clip
+from study.motion.readers.registry import read_clip
 
 BVH = """HIERARCHY
 ROOT Hips

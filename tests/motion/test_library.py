@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from study.errors import FileError, MotionError, MotionFileError
-from study.motion.bvh import write_bvh
 from study.motion.clip import Clip, joint_positions, moved, trim
 from study.motion.cmu import CMU_ACKNOWLEDGEMENT, cmu_index, is_trial, trial_files
 from study.motion.cycles import find_cycle
@@ -22,6 +21,7 @@ from study.motion.download import download_trial
 from study.motion.entries import entry_of_file, motion_file
 from study.motion.feet import faced, floor_height, foot_points, grounded, heading, stance
 from study.motion.library import FolderLibrary, open_library
+from study.motion.readers.bvh_writing import write_bvh
 from study.motion.synthetic import synthesize
 
 SHARED_NAMES = (

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from study.errors import FileError, MotionError, MotionFileError
-from study.motion.bvh import write_bvh
 from study.motion.clip import Clip
 from study.motion.entries import entry_of_file
 from study.motion.library import open_library
 from study.motion.library_file import read_library_file, write_library_file
 from study.motion.mirror import mirror
+from study.motion.readers.bvh_writing import write_bvh
 from study.motion.synthetic import synthesize
 
 

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from study.errors import MotionError, MotionFileError, MotionWarning
-from study.motion.acclaim import read_amc
-from study.motion.bvh import read_bvh, write_bvh
 from study.motion.clip import MOST_POSES, Clip, resample
-from study.motion.files import read_clip
+from study.motion.readers.amc import read_amc
+from study.motion.readers.bvh import read_bvh
+from study.motion.readers.bvh_writing import write_bvh
+from study.motion.readers.registry import read_clip
+from study.motion.readers.source import NUMBER
 from study.motion.skeleton import MOST_JOINTS, Skeleton
-from study.motion.source import NUMBER
 
 ONE = (
     "HIERARCHY\nROOT a\n{{\nOFFSET {offset}\nCHANNELS {channels}\n}}\n"

@@ -11,8 +11,8 @@ import pytest
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions
-from study.motion.files import read_clip
 from study.motion.mirror import find_partners, mirror, mirror_map
+from study.motion.readers.registry import read_clip
 from study.motion.skeleton import Skeleton
 
 _NAMES = ("Hips", "Spine", "Head", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightUpLeg", "RightLeg", "RightFoot")

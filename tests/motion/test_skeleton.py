@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from study.errors import MotionError
-from study.motion.files import read_clip
 from study.motion.joint_names import ROLES, split_side
+from study.motion.readers.registry import read_clip
 from study.motion.skeleton import Skeleton
 
 

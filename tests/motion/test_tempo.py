@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from study.motion.clip import Clip
-from study.motion.defects import find_defects, mend
+from study.motion.defects import find_defects
 from study.motion.library import open_library
+from study.motion.mending import mend
 from study.motion.synthetic import NAMES, synthesize
 from study.motion.tempo import wrong_tempo
 

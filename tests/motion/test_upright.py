@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from study.motion import quaternions as quat
-from study.motion.bvh import write_bvh
 from study.motion.clip import Clip, joint_positions
 from study.motion.defects import find_defects
-from study.motion.files import read_clip
+from study.motion.readers.bvh_writing import write_bvh
+from study.motion.readers.registry import read_clip
 from study.motion.synthetic import synthesize
 from study.motion.upright import lying_axis, put_upright
 

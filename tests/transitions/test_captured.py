@@ -7,7 +7,7 @@ import pytest
 
 from study.motion import quaternions as quat
 from study.motion.clip import joint_positions, moved, resample, trim
-from study.motion.files import read_clip
+from study.motion.readers.registry import read_clip
 from study.transitions.blend_length import blend_length, joint_costs
 from study.transitions.blending import blend, cut, facing
 from study.transitions.footskate import find_contacts, plant_feet

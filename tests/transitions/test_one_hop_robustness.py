@@ -14,8 +14,8 @@ from matplotlib.image import imread
 
 from study.errors import TransitionError
 from study.motion.clip import Clip, resample, retarget, trim
-from study.motion.defects import mend
-from study.motion.files import read_clip
+from study.motion.mending import mend
+from study.motion.readers.registry import read_clip
 from study.motion.synthetic import synthesize
 from study.transitions.cost_matrix import cost_matrix
 from study.transitions.one_hop.build import build_table

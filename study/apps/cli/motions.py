@@ -63,7 +63,7 @@ def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
     import warnings
 
     from study.errors import MotionWarning, SegueError
-    from study.motion.files import read_clip
+    from study.motion.readers.registry import read_clip
 
     tables: list[tuple[str, str, str, str]] = []
     for name in library.names():

@@ -288,8 +288,8 @@ def play(
 
     CLIPs are the table's, in its order; where none are given, motions of --library by the table's names.
     """
-    from study.motion.bvh import write_bvh
     from study.motion.drawing import draw_clip
+    from study.motion.readers.bvh_writing import write_bvh
     from study.transitions.one_hop.play import Trigger
     from study.transitions.one_hop.play import play as play_machine
     from study.transitions.one_hop.strip import draw_played

@@ -179,9 +179,9 @@ def transition(
 
     --start, --end and --frames are frames at --fps.
     """
-    from study.motion.bvh import write_bvh
     from study.motion.drawing import draw_clip
     from study.motion.library_file import UNITS
+    from study.motion.readers.bvh_writing import write_bvh
     from study.transitions.footskate import plant_feet
     from study.transitions.rates import remade
 

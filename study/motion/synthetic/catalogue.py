@@ -17,7 +17,7 @@ import numpy as np
 
 from study.errors import MotionError
 from study.motion.clip import Clip
-from study.motion.synthetic import boxing, courses, dancing, standing, tai_chi
+from study.motion.synthetic import boxing, courses, dancing, modern_dance, standing, tai_chi
 from study.motion.synthetic.targets import Targets, pose
 
 Generator = Callable[..., Targets]
@@ -102,7 +102,7 @@ _ENTRIES: dict[str, _Entry] = {
     ),
     "dance": _Entry(dancing.dance, "dancing", (False, False), 24.0, "dancing to a beat: steps, sways, twists, points"),
     "dance_modern": _Entry(
-        dancing.dance_modern, "dancing", (False, False), 24.0, "modern dance: lunges, contractions, lifted knees"
+        modern_dance.dance_modern, "dancing", (False, False), 24.0, "modern dance: lunges, contractions, lifted knees"
     ),
     "dance_turns": _Entry(
         dancing.dance_turns, "dancing", (False, False), 24.0, "dancing with whole turns in three steps"

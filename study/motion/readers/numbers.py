@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.counting import counted
-from study.motion.source import LARGEST, NUMBER, Source, number
+from study.motion.readers.source import LARGEST, NUMBER, Source, number
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import codecs
 import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.errors import MotionFileError
-from study.motion.other_formats import by_beginning
+from study.errors import MotionFileError, MotionWarning
+from study.motion.readers.other_formats import by_beginning
 
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 # A number as motion files write it; Python's own reading would also take `1_000`, `nan` and `inf`.
@@ -43,6 +44,10 @@ class Source:
         start = ends[-1].end() if ends else 0
         column = len(before[start:].decode("utf-8", "replace")) + 1
         return MotionFileError(message, self.path, len(ends) + 1, column)
+
+    def warn(self, message: str) -> None:
+        """Warn of what was read otherwise than the file says."""
+        warnings.warn(f"{self.path}: {message}", MotionWarning, stacklevel=3)
 
     def text(self, start: int, stop: int) -> str:
         """A piece of the file as text, for names and messages."""

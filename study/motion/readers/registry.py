@@ -1,18 +1,35 @@
-"""Any motion file to a clip, by its suffix, with Y up."""
+"""The readers of motion files by suffix, and any motion file to a clip with Y up."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Protocol
 
 from study.errors import MotionError, MotionFileError
-from study.motion.acclaim import CMU_FPS, read_amc
-from study.motion.bvh import read_bvh
 from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip
-from study.motion.other_formats import by_suffix
+from study.motion.readers.amc import read_amc
+from study.motion.readers.bvh import read_bvh
+from study.motion.readers.other_formats import by_suffix
 from study.motion.upright import put_upright
 
-SUFFIXES = (".bvh", ".amc")
+
+class Reader(Protocol):
+    """What `read_clip` asks of a reader; None stands for what the file says or the reader finds."""
+
+    def __call__(
+        self,
+        path: Path,
+        *,
+        metres_per_unit: float | None,
+        fps: float | None,
+        mapping: Mapping[str, str] | None,
+    ) -> Clip:
+        """Read the file, whichever axis of it is up."""
+
+
+READERS: dict[str, Reader] = {".bvh": read_bvh, ".amc": read_amc}
+SUFFIXES = tuple(READERS)
 
 
 def read_clip(
@@ -48,11 +65,8 @@ def read_clip(
         if value is not None and not low <= value <= high:
             raise MotionError(f"Expected {label} above 0, from {low:.0e} to {high:.0e}, for {path}, got {value}.")
     suffix = path.suffix.lower()
-    if suffix == ".amc":
-        rate = CMU_FPS if fps is None else fps
-        return put_upright(read_amc(path, metres_per_unit=metres_per_unit, fps=rate, mapping=mapping))
-    if suffix == ".bvh":
-        return put_upright(read_bvh(path, metres_per_unit=metres_per_unit, fps=fps, mapping=mapping))
+    if suffix in READERS:
+        return put_upright(READERS[suffix](path, metres_per_unit=metres_per_unit, fps=fps, mapping=mapping))
     hint = "; name the .amc file, and its .asf is found beside it" if suffix == ".asf" else ""
     found = by_suffix(path) or f"found {suffix or 'no suffix'}{hint}."
     raise MotionFileError(f"Expected a motion file ({', '.join(SUFFIXES)}), {found}", path)

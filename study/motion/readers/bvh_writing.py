@@ -1,0 +1,81 @@
+"""Clips to BVH files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import MotionFileError
+from study.files import write_whole
+from study.motion import quaternions as quat
+from study.motion.clip import Clip
+from study.motion.readers.source import LARGEST
+from study.motion.skeleton import Skeleton
+
+FloatArray = NDArray[np.float64]
+
+
+def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float | None = None) -> None:
+    """Write a clip as a BVH file, whole or not at all; reading it back gives the same motion.
+
+    Parameters
+    ----------
+    clip
+        What to write; channels are `Zrotation Yrotation Xrotation`, in degrees.
+    path
+        The file; one that is there is replaced.
+    metres_per_unit
+        The length unit to write; by default that of the file which the clip was read from, and centimetres for clips
+        that were read from none.
+
+    Raises
+    ------
+    MotionFileError
+        Where the file would hold numbers that no reader takes.
+    FileError
+        Where the file can't be written.
+    """
+    path = Path(path)
+    metres_per_unit = clip.metres_per_unit if metres_per_unit is None else metres_per_unit
+    lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
+    lines += ["MOTION", f"Frames: {clip.frames}", f"Frame Time: {1.0 / clip.fps!r}"]
+    degrees = np.degrees(quat.to_euler("ZYX", clip.rotations)).reshape(clip.frames, -1)
+    table = np.concatenate([clip.root_positions / metres_per_unit, degrees], axis=1)
+    if np.max(np.abs(table)) > LARGEST:
+        raise MotionFileError(f"Expected to write no number above {LARGEST:.0e}, but the body moves further.", path)
+    row = " ".join(["%.10g"] * table.shape[1])
+    lines += [row % tuple(values) for values in table.tolist()]
+    write_whole(path, "\n".join(lines) + "\n")
+
+
+def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:
+    """The lines of the tree, joint by joint: depth first, as a skeleton has them."""
+
+    def place(offset: FloatArray) -> str:
+        return "OFFSET " + " ".join(f"{value:.10g}" for value in offset * scale)
+
+    ends: dict[int, list[FloatArray]] = {}
+    for joint, offset in zip(skeleton.end_parents.tolist(), skeleton.end_offsets, strict=True):
+        ends.setdefault(joint, []).append(offset)
+    lines: list[str] = []
+    open_joints: list[int] = []
+
+    def close_to(parent: int) -> None:
+        while open_joints and open_joints[-1] != parent:
+            open_joints.pop()
+            lines.append("\t" * len(open_joints) + "}")
+
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        close_to(parent)
+        tab = "\t" * len(open_joints)
+        position = "6 Xposition Yposition Zposition" if joint == 0 else "3"
+        lines += [f"{tab}{'ROOT' if joint == 0 else 'JOINT'} {skeleton.names[joint]}", f"{tab}{{"]
+        lines += [f"{tab}\t{place(skeleton.offsets[joint])}"]
+        lines += [f"{tab}\tCHANNELS {position} Zrotation Yrotation Xrotation"]
+        for end in ends.get(joint, []):
+            lines += [f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\t{place(end)}", f"{tab}\t}}"]
+        open_joints.append(joint)
+    close_to(-1)
+    return lines
