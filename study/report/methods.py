@@ -160,25 +160,35 @@ def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
     motions = "synthetic motions" if manifest.synthetic else f"motions of the library {words.library(manifest.library)}"
     camera = f"a camera travelling with it (smoothed over {shown.track_s:g} s)" if shown.track_s else "a fixed camera"
     ground = "above a ground plane" if shown.floor else "without a ground plane"
-    blended = sum(record.blend_frames > 0 for record in manifest.records)
-    cuts = len(manifest.records) - blended
-    how, joint = "were cuts from a frame of the source to a frame of the destination.", "cut"
-    if blended:
-        makes = [method.make for method in _methods(protocol).values() if isinstance(method.make, Blending)]
-        weights, feet = sorted({make.weight for make in makes}), {make.clean_feet for make in makes}
-        how = (
-            f"were blended by spherical linear interpolation under a {' or '.join(weights)} weight, between a start "
-            f"frame in the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}."
-        )
-        if True in feet:
-            where = ", where the method is said to do so" if False in feet else ""
-            how += f" Sliding of planted feet was removed after blending{where}."
-        joint = "blend or the cut" if cuts else "blend"
+    how, joint = _made(protocol, manifest)
     return (
         f"{counted(len(manifest.records), 'transition')} between {motions} {how} Each was rendered as a "
         f"{shown.style} figure of {shown.width} × {shown.height} pixels at {protocol.fps:g} frames per second, seen by "
         f"{camera} {ground}, with {shown.entry_s:g} s before and {shown.exit_s:g} s after the {joint}."
     )
+
+
+def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:
+    """How the transitions were made, as the end of a sentence and further ones, and what they are called."""
+    methods = _methods(protocol)
+    others = [f" Those by “{words.readable(name)}” {one.make.how}." for name, one in methods.items() if one.make.how]
+    plain = [record for record in manifest.records if not methods[record.method].make.how]
+    blended = sum(record.blend_frames > 0 for record in plain)
+    cuts = len(plain) - blended
+    if not plain:
+        return f"were shown.{''.join(others)}", "transition"
+    if not blended:
+        return f"were cuts from a frame of the source to a frame of the destination.{''.join(others)}", "cut"
+    makes = [method.make for method in methods.values() if isinstance(method.make, Blending)]
+    weights, feet = sorted({make.weight for make in makes}), {make.clean_feet for make in makes}
+    how = (
+        f"were blended by spherical linear interpolation under a {' or '.join(weights)} weight, between a start frame "
+        f"in the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}."
+    )
+    if True in feet:
+        where = ", where the method is said to do so" if False in feet else ""
+        how += f" Sliding of planted feet was removed after blending{where}."
+    return how + "".join(others), "blend or the cut" if cuts else "blend"
 
 
 def _procedure(protocol: Protocol, analysis: Result, presentations: pd.DataFrame) -> str:

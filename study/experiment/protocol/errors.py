@@ -170,26 +170,40 @@ def _near_key(model: type[BaseModel], location: Location) -> str:
     return near[0] if near else ""
 
 
-def _unwrap(annotation: Any) -> Any:
-    """The part model within `Annotated`, `X | None` and `tuple[X, ...]`; anything else as it is."""
+NAMED = "NAME"
+"""Stands in the path of a part for a name that the protocol chooses, as in `methods.files.NAME`."""
+
+
+def _unwrap(annotation: Any) -> tuple[Any, bool]:
+    """The part model within `Annotated`, `X | None`, `tuple[X, ...]` and `dict[str, X]`; anything else as it is.
+
+    And whether it was in a dictionary, so that a name stands before its keys.
+    """
+    named = False
     while True:
         origin = get_origin(annotation)
         if origin is typing.Annotated or origin is tuple:
             annotation = get_args(annotation)[0]
+        elif origin is dict:
+            annotation, named = get_args(annotation)[1], True
         elif origin in (typing.Union, types.UnionType):
             annotation = next(a for a in get_args(annotation) if a is not type(None))
         else:
-            return annotation
+            return annotation, named
 
 
 def model_at(model: type[BaseModel], location: Location) -> type[BaseModel] | None:
     """The model of the part at a location; None where there is none."""
+    named = False
     for step in location:
         if isinstance(step, int):
             continue
+        if named:
+            named = False
+            continue
         if step not in model.model_fields:
             return None
-        inner = _unwrap(model.model_fields[step].annotation)
+        inner, named = _unwrap(model.model_fields[step].annotation)
         if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
             return None
         model = inner
@@ -200,9 +214,9 @@ def parts(model: type[BaseModel], path: str = "") -> Iterator[tuple[str, type[Ba
     """Every part of a protocol with its path, the protocol first."""
     yield path, model
     for name, field in model.model_fields.items():
-        inner = _unwrap(field.annotation)
+        inner, named = _unwrap(field.annotation)
         if isinstance(inner, type) and issubclass(inner, BaseModel):
-            yield from parts(inner, f"{path}.{name}" if path else name)
+            yield from parts(inner, ".".join(filter(None, (path, name, NAMED if named else ""))))
 
 
 def _unit(model: type[BaseModel], location: Location) -> str:

@@ -155,6 +155,20 @@ class Protocol(Part):
             for name in study.methods
         }
 
+    @property
+    def entry_frames(self) -> int:
+        """Frames of the source that are shown before a transition."""
+        return round(self.stimuli.entry_s * self.fps)
+
+    @property
+    def exit_frames(self) -> int:
+        """Frames of the destination that are shown after a transition."""
+        return round(self.stimuli.exit_s * self.fps)
+
+    def files_read(self) -> tuple[Path, ...]:
+        """The files that the protocol's own methods read, from the folder of the protocol's own file."""
+        return tuple(self.path_of(file) for own in self.methods for file in own.method({}).make.files_read())
+
     def path_of(self, file: str) -> Path:
         """A file that the protocol names, from the folder of the protocol's own file."""
         return (self._path.parent if self._path else Path()) / file

@@ -50,9 +50,8 @@ def _draft(protocol: Protocol, planned: Planned, method: str, difference: int, f
     """Make the frames, cut them to entry and exit, and place them at the origin with the common heading."""
     settled = planned.settled.at(method)
     made = film.way.made(ways.place(planned.study, settled))
-    entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
-    first = made.blend_start - film.way.lead - entry
-    clip = trim(made.clip, first, made.blend_stop + film.frames_on + after)
+    first = made.blend_start - film.way.lead - protocol.entry_frames
+    clip = trim(made.clip, first, made.blend_stop + film.frames_on + protocol.exit_frames)
     notes = tuple(note for note in (made.note, settled.lengths[method].note) if note)
     positions = _placed(joint_positions(clip, ends=True), protocol, settled)
     blended = made.blend_start - first, made.blend_stop - first
@@ -67,9 +66,8 @@ def _placed(positions: FloatArray, protocol: Protocol, settled: Settled) -> Floa
     """
     points = settled.start_frame, settled.end_frame
     made = blend(settled.source.clip, settled.destination.clip, *points, 1)
-    entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
     path = made.clip.root_positions
-    way = path[made.blend_stop + after - 1] - path[made.blend_start - entry]
+    way = path[made.blend_stop + protocol.exit_frames - 1] - path[made.blend_start - protocol.entry_frames]
     if np.hypot(way[0], way[2]) > _TRAVELS_M:
         heading = float(np.arctan2(way[0], way[2]))
     else:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from study.errors import SegueError
+from study.errors import SegueError, StimulusError
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.points import Settled, settle
 from study.experiment.stimuli.ways import Ways
@@ -45,8 +45,7 @@ class Film:
 
     def frames(self, protocol: Protocol) -> int:
         """Frames in all: entry, transition and exit."""
-        entry, after = (round(s * protocol.fps) for s in (protocol.stimuli.entry_s, protocol.stimuli.exit_s))
-        return entry + self.way.frames + self.frames_on + after
+        return protocol.entry_frames + self.way.frames + self.frames_on + protocol.exit_frames
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +128,8 @@ def _film(study: StudySpec, settled: Settled, method: str, difference: int, ways
     own, way = settled.at(method), ways.of(study, settled, method, difference)
     # What stands beside a one-hop transition is shown for as long as that one takes.
     spans = [name for name, each in ways.methods(study).items() if each.make.sets_span and name != method]
-    on = max((ways.of(study, settled, name).frames - way.frames for name in spans), default=0)
+    on = max(0, *(ways.of(study, settled, name).frames - way.frames for name in spans), 0)
+    if lacking := way.lacking(ways.protocol.entry_frames, ways.protocol.exit_frames + on):
+        raise StimulusError(f"transition {settled.transition.name!r}, {method}: {lacking}.")
     added = (settled.source.added_before, settled.destination.added_before)
-    return Film(settled.transition.name, own.start_frame, own.end_frame, added, way, max(on, 0))
+    return Film(settled.transition.name, own.start_frame, own.end_frame, added, way, on)

@@ -127,8 +127,7 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points, methods: Iterab
     """What the source needs around its point, and the destination around its."""
     methods = tuple(methods)
     room = _room(methods, protocol.fps, points.longest_frames)
-    entry = max(round(protocol.stimuli.entry_s * protocol.fps), room.entry)
-    after = round(protocol.stimuli.exit_s * protocol.fps) + room.after
+    entry, after = max(protocol.entry_frames, room.entry), protocol.exit_frames + room.after
     longest = room.blend + max((0, *study.differences_frames)) + room.stay
     plenty = max(longest, room.search)
     blend, whole = f"blends of up to {counted(longest, 'frame')}", any(method.points.own for method in methods)
@@ -210,12 +209,11 @@ def _given_frame(asked: _Asked, end: str, motion: Supply) -> int:
 
 def _room_problem(asked: _Asked, settled: Settled) -> str:
     """What is missing around points for entry, the longest blend and exit; empty where nothing is."""
-    stimuli, fps = asked.protocol.stimuli, asked.protocol.fps
-    room = _room(asked.methods.values(), fps, asked.points.longest_frames)
+    room = _room(asked.methods.values(), asked.protocol.fps, asked.points.longest_frames)
     own = [length.blend_frames for length in settled.lengths.values()]
     reference = settled.lengths[asked.study.reference].blend_frames
     longest = max(*own, *(reference + d for d in asked.study.differences_frames), 0) + room.stay
-    entry, after = round(stimuli.entry_s * fps), round(stimuli.exit_s * fps) + room.after
+    entry, after = asked.protocol.entry_frames, asked.protocol.exit_frames + room.after
     rooms = (
         ("entry", entry, settled.start_frame, settled.source),
         ("the longest blend", longest, settled.source.clip.frames - settled.start_frame, settled.source),

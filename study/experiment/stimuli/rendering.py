@@ -138,12 +138,12 @@ def render(
 
 
 def made_from(protocol: Protocol, library: Library) -> str:
-    """Hash of all that stimuli are made from: the protocol's text, the library's files, and this program's own.
+    """Hash of all that stimuli are made from: the protocol's text and given files, the library's, this program's own.
 
     Files count by path, size and time of change, so that asking costs milliseconds.
     """
     digest = hashlib.sha256(f"{protocol.sha256} {library.name}\n".encode())
-    for path in (*program_files(), *library.files()):
+    for path in (*program_files(), *library.files(), *protocol.files_read()):
         # Python writes what it compiled under passing names, at any time.
         if path.parent.name != "__pycache__" and path.is_file():
             state = path.stat()

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from study.errors import MotionError, StimulusError, TransitionError
+from study.errors import MotionError, MotionFileError, StimulusError, TransitionError
 from study.experiment.chance import generator
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.motion.clip import Clip, retarget
@@ -52,7 +52,7 @@ class Ways:
         windows = (source + difference_frames, destination + difference_frames)
         try:
             return self.methods(study)[method].make.way(self.place(study, own), windows)
-        except (TransitionError, MotionError) as error:
+        except (TransitionError, MotionError, MotionFileError) as error:
             raise StimulusError(f"transition {settled.transition.name!r}, {method}: {error}") from error
 
     def place(self, study: StudySpec, settled: Settled) -> Place:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from study.motion.clip import Clip
     from study.transitions.blend_length import BlendLength
-    from study.transitions.blending import Transition
     from study.transitions.timewarp import WarpLength
 
 CANDIDATES = 2000
@@ -44,6 +43,11 @@ Kept = TypeVar("Kept")
 def setting(default: Any, words: str) -> Any:
     """A field of a part, with the words that explain it to who writes a protocol; `[unit]` may stand at their end."""
     return field(default=default, metadata={"words": words})
+
+
+def required(words: str) -> Any:
+    """A setting without a default."""
+    return field(metadata={"words": words})
 
 
 class Motions(Protocol):
@@ -116,6 +120,20 @@ class Room:
     after: int = 0
 
 
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A transition as it is shown.
+
+    `clip` stands on the floor where the source does at the start point; `blend_start` and `blend_stop` bound its blend
+    as a slice counts them. `note` says how it was made.
+    """
+
+    clip: Clip
+    blend_start: int
+    blend_stop: int
+    note: str
+
+
 class Way(ABC):
     """How the frames of one transition are made, decided and not yet made. Equal ways make equal frames."""
 
@@ -140,11 +158,11 @@ class Way(ABC):
         return ""
 
     @abstractmethod
-    def made(self, place: Place) -> Transition:
+    def made(self, place: Place) -> Made:
         """Make the frames."""
 
     def lacking(self, entry: int, after: int) -> str:
-        """What is missing for so many frames before and after, in words; empty where the two clips supply them."""
+        """What is missing for so many frames of entry and after the blend, in words; empty where nothing is."""
         del entry, after
         return ""
 
@@ -233,13 +251,15 @@ class Make(MethodPart):
     `windows` is what it takes of a length (see `Length.windows`). `levels` says whether its blend can be lengthened and
     shortened in a same-different study, `sets_span` whether what stands beside it in a pair is shown for as long, and
     `draws` how many points may be tried where it makes what the other method makes. In `words`, `{length}` and
-    `{points}` are replaced by those of the other parts.
+    `{points}` are replaced by those of the other parts. `how` ends the sentence "Transitions by this method ..." of a
+    Methods section, for makes that are neither blends by spherical linear interpolation nor cuts.
     """
 
     windows: ClassVar[int] = 1
     levels: ClassVar[bool] = False
     sets_span: ClassVar[bool] = False
     draws: ClassVar[int] = CANDIDATES
+    how: ClassVar[str] = ""
 
     @abstractmethod
     def way(self, place: Place, windows: tuple[int, int]) -> Way:
@@ -264,7 +284,7 @@ class Make(MethodPart):
         """The settings in words, for methods of a protocol's own."""
         return ""
 
-    def files(self) -> tuple[str, ...]:
+    def files_read(self) -> tuple[str, ...]:
         """The files that it reads, as the protocol names them."""
         return ()
 

@@ -12,6 +12,7 @@ from study.transitions.methods.lengths.none import NoLength
 from study.transitions.methods.lengths.one_window import Fixed, Geodesic, Velocity
 from study.transitions.methods.lengths.two_windows import Timewarp
 from study.transitions.methods.makes.blends import Cut, Slerp, Warped
+from study.transitions.methods.makes.given import Given
 from study.transitions.methods.makes.one_hop import OneHop
 from study.transitions.methods.method import Length, Make, Method, Points
 from study.transitions.methods.points.least_cost import LeastCost
@@ -19,7 +20,7 @@ from study.transitions.methods.points.shared import Shared
 
 POINTS: Mapping[str, type[Points]] = {part.name: part for part in (Shared, LeastCost)}
 LENGTHS: Mapping[str, type[Length]] = {part.name: part for part in (Fixed, Geodesic, Velocity, Timewarp, NoLength)}
-MAKES: Mapping[str, type[Make]] = {part.name: part for part in (Slerp, Warped, Cut, OneHop)}
+MAKES: Mapping[str, type[Make]] = {part.name: part for part in (Slerp, Warped, Cut, OneHop, Given)}
 
 # Utilities by 2004 Table 2; of cuts at two optima, the distance that gives 2003's F of 6.39 in ratings.
 METHODS: Mapping[str, Method] = {

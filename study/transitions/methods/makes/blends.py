@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Make, Place, Way, setting
-
-if TYPE_CHECKING:
-    from study.transitions.blending import Transition
+from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Made, Make, Place, Way, setting
 
 
 @dataclass(frozen=True)
@@ -29,7 +26,7 @@ class Blended(Way):
         """The longer of the two windows."""
         return max(self.windows)
 
-    def made(self, place: Place) -> Transition:
+    def made(self, place: Place) -> Made:
         """Cut, blend, or warp and blend; then plant the feet."""
         from study.transitions.blending import blend, cut
         from study.transitions.footskate import plant_feet
@@ -37,13 +34,15 @@ class Blended(Way):
 
         clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
         if self.blend_frames == 0:
-            return cut(*clips, *points)
-        if self.windows[0] != self.windows[1]:
+            made = cut(*clips, *points)
+        elif self.windows[0] != self.windows[1]:
             made = warped_blend(*clips, *points, *self.windows, weight=self.weight)
         else:
             made = blend(*clips, *points, self.blend_frames, weight=self.weight)
-        # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
-        return plant_feet(made, *clips)[0] if self.clean_feet else made
+        if self.clean_feet and self.blend_frames:
+            # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
+            made, _ = plant_feet(made, *clips)
+        return Made(made.clip, made.blend_start, made.blend_stop, made.note)
 
     def longer_than(self, other: Way) -> int | None:
         """The larger difference of the two windows; a cut differs from a blend in its length alone."""

@@ -6,7 +6,7 @@ time as the direct blend of the same length has it. Both blends are made and cle
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge, Le
@@ -14,7 +14,7 @@ from annotated_types import Ge, Le
 from study.errors import TransitionError
 from study.transitions.methods.lengths.one_window import Fixed
 from study.transitions.methods.makes.blends import Blended, Blending
-from study.transitions.methods.method import SHOEMAKE_1985, Length, Place, Room, Way, setting
+from study.transitions.methods.method import SHOEMAKE_1985, Length, Made, Place, Room, Way, setting
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -89,7 +89,7 @@ class Hop(Way):
             f"{self.weight:.3g} a frame"
         )
 
-    def made(self, place: Place) -> Transition:
+    def made(self, place: Place) -> Made:
         """Two blends, the second into the destination at its place in time.
 
         The result's blend runs from the first blended frame of the first blend to the last one of the second.
@@ -98,12 +98,13 @@ class Hop(Way):
         start = place.start_frame + self.stay_source
         into = place.end_frame - self.hop_blend_frames + 1
         if self.direct:
-            return self._blend(source, destination, start, into + self.stay_source)
+            only = self._blend(source, destination, start, into + self.stay_source)
+            return Made(only.clip, only.blend_start, only.blend_stop, only.note)
         between = self._clip(place)
         first = self._blend(source, between, start, self.frame)
         leave = start + self.hop_blend_frames + self.stay_hop
         second = self._blend(first.clip, destination, leave, into + leave - place.start_frame)
-        return replace(second, blend_start=start, note=f"{first.note}; {second.note}; {self.note}")
+        return Made(second.clip, start, second.blend_stop, f"{first.note}; {second.note}; {self.note}")
 
     def _blend(self, source: Clip, destination: Clip, start: int, into: int) -> Transition:
         from study.transitions.blending import blend
