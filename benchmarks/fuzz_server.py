@@ -77,7 +77,7 @@ class _Server:
         from study.apps.server.settings import Settings
         from study.apps.server.web import make_app
         from study.experiment.protocol.whole import load_protocol
-        from study.experiment.stimuli.rendering import read_manifest
+        from study.experiment.stimuli.manifest import read_manifest
         from study.experiment.store.responses import open_responses
 
         folder = Path(tempfile.mkdtemp(prefix="segue-fuzz-")) / "results"

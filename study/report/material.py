@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import sqlalchemy as sa
 
     from study.experiment.protocol.whole import Protocol
-    from study.experiment.stimuli.rendering import Manifest
+    from study.experiment.stimuli.manifest import Manifest
     from study.experiment.store.responses import Responses
 
 Result = Mapping[str, Any]
@@ -63,7 +63,7 @@ def gather(folder: Path, database: str | None = None) -> Material:
     """
     from study.experiment.folder import PROTOCOL
     from study.experiment.protocol.whole import load_protocol
-    from study.experiment.stimuli.rendering import read_manifest
+    from study.experiment.stimuli.manifest import read_manifest
     from study.experiment.store.frames import answers_frame
     from study.experiment.store.responses import open_answers
     from study.experiment.store.sessions import session_table

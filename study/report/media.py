@@ -23,7 +23,7 @@ from study.counting import counted
 from study.errors import StimulusError
 
 if TYPE_CHECKING:
-    from study.experiment.stimuli.prepare import Manifest
+    from study.experiment.stimuli.manifest import Manifest
     from study.experiment.stimuli.stimulus import StimulusRecord
 
 MOST_VIDEO_BYTES = 1_800_000
@@ -90,7 +90,7 @@ _BESIDE = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); import study
 
 def tell(folder: str) -> None:
     """Print the pictures of a results folder as JSON: what the process of `embedding` does."""
-    from study.experiment.stimuli.rendering import read_manifest
+    from study.experiment.stimuli.manifest import read_manifest
 
     json.dump(asdict(embed(read_manifest(folder))), sys.stdout)
 

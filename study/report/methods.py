@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from study.experiment.protocol.whole import Protocol, StudySpec
-    from study.experiment.stimuli.prepare import Manifest
+    from study.experiment.stimuli.manifest import Manifest
     from study.transitions.methods.method import Method
 
 Result = Mapping[str, Any]

@@ -13,7 +13,7 @@ from study.report.tables import Table
 if TYPE_CHECKING:
     import pandas as pd
 
-    from study.experiment.stimuli.prepare import Manifest
+    from study.experiment.stimuli.manifest import Manifest
     from study.experiment.stimuli.stimulus import MotionUse
 
 Result = Mapping[str, Any]

@@ -20,8 +20,8 @@ from study.apps.server.running import configuration
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.experiment.protocol.whole import Protocol, parse_protocol
+from study.experiment.stimuli.manifest import Manifest, read_manifest, record
 from study.experiment.stimuli.prepare import prepare
-from study.experiment.stimuli.rendering import Manifest, read_manifest, record
 from study.experiment.store.responses import Responses, open_responses
 from study.motion.library import open_library
 

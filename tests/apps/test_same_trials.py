@@ -31,8 +31,8 @@ from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import advanced, answered, current, filled, open_session
 from study.experiment.steps import answer_keys
+from study.experiment.stimuli.manifest import Manifest
 from study.experiment.stimuli.prepare import prepare
-from study.experiment.stimuli.rendering import Manifest
 from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame
 from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import find_session

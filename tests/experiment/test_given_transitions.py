@@ -12,9 +12,9 @@ from toys import Toy, ToyLibrary
 from study.errors import ProtocolError, StimulusError
 from study.experiment.protocol.whole import Protocol, load_protocol
 from study.experiment.stimuli.films import plan_all
+from study.experiment.stimuli.manifest import made_from
 from study.experiment.stimuli.outlook import look_ahead
 from study.experiment.stimuli.prepare import check, prepare
-from study.experiment.stimuli.rendering import made_from
 from study.experiment.stimuli.ways import Ways
 from study.motion.clip import Clip, moved, resample, trim
 from study.motion.readers.bvh_writing import write_bvh

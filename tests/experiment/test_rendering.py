@@ -18,16 +18,10 @@ from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
 from study.errors import FileError, StimulusError
 from study.experiment.protocol.whole import load_protocol, parse_protocol
-from study.experiment.stimuli import rendering
+from study.experiment.stimuli import manifest
+from study.experiment.stimuli.manifest import made_from, read_manifest, record
 from study.experiment.stimuli.prepare import prepare
-from study.experiment.stimuli.rendering import (
-    made_from,
-    read_manifest,
-    record,
-    render,
-    rendered_already,
-    rendered_before,
-)
+from study.experiment.stimuli.rendering import render, rendered_already, rendered_before
 
 MOTIONS = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
 
@@ -194,7 +188,8 @@ import sys
 sys.path.insert(0, "tests/experiment")
 from toys import TOY_PROTOCOL, Toy, ToyLibrary
 from study.experiment.protocol.whole import parse_protocol
-from study.experiment.stimuli.prepare import prepare, render
+from study.experiment.stimuli.prepare import prepare
+from study.experiment.stimuli.rendering import render
 motions = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
 prepared = prepare(parse_protocol(TOY_PROTOCOL), ToyLibrary(motions))
 print("ready", flush=True)
@@ -291,14 +286,14 @@ def test_the_program_is_found_wherever_its_modules_stand():
     import renderer.window
     import study.motion.clip
 
-    found = set(rendering.program_files())
-    assert {Path(module.__file__).resolve() for module in (rendering, renderer.window, study.motion.clip)} <= found
+    found = set(manifest.program_files())
+    assert {Path(module.__file__).resolve() for module in (manifest, renderer.window, study.motion.clip)} <= found
 
 
 def test_what_python_compiles_meanwhile_changes_nothing():
     protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
     before = made_from(protocol, library)
-    compiled = Path(rendering.__file__).parent / "__pycache__" / "rendering.cpython-311.pyc.139872"
+    compiled = Path(manifest.__file__).parent / "__pycache__" / "manifest.cpython-311.pyc.139872"
     compiled.parent.mkdir(exist_ok=True)
     try:
         compiled.write_bytes(b"half written")

@@ -16,7 +16,7 @@ import pytest
 
 from study.experiment.observers import simulate
 from study.experiment.protocol.whole import Protocol, load_protocol
-from study.experiment.stimuli.rendering import MANIFEST_VERSION, read_manifest
+from study.experiment.stimuli.manifest import MANIFEST_VERSION, read_manifest
 from study.experiment.stimuli.stimulus import MotionUse, StimulusRecord
 from study.experiment.store.responses import open_responses
 from study.tasks.trial import Pair

@@ -13,7 +13,7 @@ from study.experiment.folder import PROTOCOL
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import load_protocol
 from study.experiment.steps import Step
-from study.experiment.stimuli.rendering import read_manifest
+from study.experiment.stimuli.manifest import read_manifest
 from study.experiment.store.answers import Presentation, record_answer, record_event
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from study.experiment.stimuli.rendering import Manifest, read_manifest
+from study.experiment.stimuli.manifest import Manifest, read_manifest
 from study.report import media
 
 MakeFolder = Callable[..., Path]

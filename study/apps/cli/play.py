@@ -61,7 +61,7 @@ def play(
     Stopped or killed, the same command goes on where it was. Escape asks whether to stop.
     """
     from renderer.window import check_display
-    from study.experiment.stimuli.prepare import record
+    from study.experiment.stimuli.manifest import record
     from study.experiment.store.responses import open_responses
 
     pixels = _size(size)

@@ -14,7 +14,7 @@ from study.counting import counted
 
 if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol
-    from study.experiment.stimuli.rendering import Manifest
+    from study.experiment.stimuli.manifest import Manifest
     from study.experiment.stimuli.stimulus import StimulusSet
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
@@ -95,7 +95,7 @@ def simulate_participants(
     """
     from study.experiment.observers import default_observer
     from study.experiment.observers import simulate as simulate_all
-    from study.experiment.stimuli.rendering import read_manifest
+    from study.experiment.stimuli.manifest import read_manifest
     from study.experiment.store.responses import open_responses
     from study.experiment.store.sessions import refuse_other_stimuli
 
@@ -242,7 +242,7 @@ def simulate(
 ) -> None:
     """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
     from study.experiment.folder import MANIFEST, PROTOCOL
-    from study.experiment.stimuli.rendering import record
+    from study.experiment.stimuli.manifest import record
     from study.files import read_text
 
     checked = load(protocol)

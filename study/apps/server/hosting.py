@@ -32,7 +32,7 @@ from study.experiment.plan import draw_plan, groups_of
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Session
 from study.experiment.steps import Step
-from study.experiment.stimuli.rendering import Manifest
+from study.experiment.stimuli.manifest import Manifest
 from study.experiment.store import participants as people
 from study.experiment.store.answers import (
     Presentation,

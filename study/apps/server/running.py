@@ -17,7 +17,7 @@ from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.protocol.whole import Protocol
-from study.experiment.stimuli.rendering import read_manifest
+from study.experiment.stimuli.manifest import read_manifest
 from study.experiment.store.databases import try_to_write
 from study.experiment.store.responses import open_responses
 

@@ -18,26 +18,13 @@ from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.drafts import Draft, add_drafts
 from study.experiment.stimuli.films import Film, Showing, plan_all
 from study.experiment.stimuli.look import LOOK_VERSION, with_cameras
-from study.experiment.stimuli.rendering import Manifest, RenderSummary, made_from, read_manifest, record, render
-from study.experiment.stimuli.stimulus import Stimulus, StimulusRecord, StimulusSet
+from study.experiment.stimuli.manifest import made_from
+from study.experiment.stimuli.stimulus import Stimulus, StimulusSet
 from study.experiment.stimuli.ways import Ways
 from study.tasks.trial import Pair
 
 if TYPE_CHECKING:
     from study.motion.library import Library
-
-__all__ = [
-    "Manifest",
-    "RenderSummary",
-    "Stimulus",
-    "StimulusRecord",
-    "StimulusSet",
-    "check",
-    "prepare",
-    "read_manifest",
-    "record",
-    "render",
-]
 
 
 def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None = None) -> StimulusSet:

@@ -100,7 +100,7 @@ class Stimulus:
 class StimulusSet:
     """All stimuli of a protocol on one library, each once, and the pairs that are shown.
 
-    `made_from` is a hash of all that they were made from; see `rendering.made_from`.
+    `made_from` is a hash of all that they were made from; see `manifest.made_from`.
     """
 
     protocol: Protocol
