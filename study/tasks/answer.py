@@ -8,7 +8,7 @@ from typing import Any
 from study.tasks.trial import Trial
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Answer:
     """What a participant did at one question.
 

@@ -7,6 +7,7 @@ stimuli and trials of three slots. Plans and manifests of version 1 knew two slo
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -44,7 +45,7 @@ class Pair:
     difference_frames: int | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Trial:
     """One trial: what is shown in each slot, and what the answer will mean.
 
@@ -106,7 +107,14 @@ def trial_from_json(data: Mapping[str, Any], version: int) -> Trial:
         a_first = own.pop("a_first"), own.pop("reference_first")
         own |= _listed(own, "first", "second")
         own["members"] = (0,) if len(own["stimuli"]) == 1 else (0, 1) if True in a_first else (1, 0)
-    return Trial(**{**own, **{key: tuple(own[key]) for key in ("stimuli", "members", "methods")}})
+    return Trial(**{key: _shared(value) for key, value in own.items()})
+
+
+def _shared(value: Any) -> Any:
+    """The same value with each text as one object in all trials: a server keeps the plans of many sessions."""
+    if isinstance(value, list | tuple):
+        return tuple(map(_shared, value))
+    return sys.intern(value) if isinstance(value, str) else value
 
 
 def pair_since_version_1(data: Mapping[str, Any]) -> dict[str, Any]:
