@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from study.analysis.analyse import analyse
+from study.experiment.protocol.whole import parse_protocol
 from study.report.material import Material, gather
 from study.report.methods import methods_paragraphs, references
 
@@ -82,3 +83,25 @@ def test_own_methods_are_described_by_their_parts_and_settings(results_folder: M
     assert "under a linear or sigmoid weight" in told["Stimuli"]
     assert "removed after blending, where the method is said to do so." in told["Stimuli"]
     assert any(work.startswith("Shoemake") for work in cited)
+
+
+def test_given_transitions_are_not_called_blends(results_folder: MakeFolder) -> None:
+    material = gather(results_folder(2, videos=0))
+    given = '\n[[methods]]\nname = "ours"\nmake = "given"\n[methods.files]\n'
+    files = "".join(
+        f'{one.name} = {{ file = "{one.name}.bvh", start_frame = 3, end_frame = 9 }}\n'
+        for one in material.protocol.transitions
+    )
+    protocol = parse_protocol(
+        material.protocol.text.replace('comparison = "fixed"', 'comparison = "ours"') + given + files
+    )
+    named = [replace(one, method="ours") if one.method == "fixed" else one for one in material.manifest.records]
+    shown = replace(material.manifest, records=tuple(named))
+    told, _ = paragraphs(replace(material, protocol=protocol, manifest=shown))
+    assert "and “ours” (the researchers’ own transitions)" in told["Participants and design"]
+    assert "under a linear weight" in told["Stimuli"]
+    assert "Those by “ours” were read from motion files." in told["Stimuli"]
+    alone = replace(material.manifest, records=tuple(one for one in named if one.method == "ours"))
+    told, _ = paragraphs(replace(material, protocol=protocol, manifest=alone))
+    assert "motions were shown. Those by “ours” were read from motion files. Each was rendered" in told["Stimuli"]
+    assert "after the transition." in told["Stimuli"]

@@ -305,7 +305,7 @@ class Method:
     points: Points
     length: Length
     make: Make
-    utility: float = 0.0
+    utility: float
 
     def with_settings(self, settings: Mapping[str, Any]) -> Method:
         """The same method with those of the settings that its parts take."""
