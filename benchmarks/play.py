@@ -146,7 +146,7 @@ class Timed:
         if kind == "finished":
             raise Done
 
-    def answer(self, answer: Any, shown: Any) -> None:
+    def answer(self, _: Any, answer: Any, shown: Any) -> None:
         """One answer; none where the key came before its question, on a machine that was too busy to show it."""
         self.shown += shown
         if answer.missed:

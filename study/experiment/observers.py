@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 from typing import Protocol as Shape
 
 import numpy as np
 
 from study.errors import SessionError
-from study.experiment import session as sitting
 from study.experiment.chance import generator
 from study.experiment.observer_models import (
     LEAST_CRITERION,
@@ -30,11 +30,11 @@ from study.experiment.observer_models import (
 )
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol
+from study.experiment.session import open_session, walk
 from study.experiment.steps import Step
 from study.experiment.store.answers import has_event, record_answer, record_event, stored_answers
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
-from study.tasks.answer import Answer
 from study.tasks.trial import Pair, Trial
 
 __all__ = [
@@ -214,19 +214,14 @@ def simulate(
     made = found = 0
     for plan in plans:
         record = _open(protocol, stimuli, responses, plan, known)
-        if record is None:
-            found += questions(protocol, plan)
-            continue
         before = stored_answers(responses, record.id)
         found += len(before)
+        if has_event(responses, record, "finished"):
+            continue
         who = person(settings, plan.participant, seed)
-        state = sitting.open_session(protocol, plan, before, passed=("consent", "form"))
-        while (step := sitting.current(state)).kind != "done":
-            if step.kind != "answer":
-                state = sitting.advanced(state)
-                continue
-            state, answer = _answer(state, who, plan.trial(step.trial), step)
-            record_answer(responses, record, answer)
+        state = open_session(protocol, plan, before, passed=("consent", "form"))
+        for trial, answer in walk(state, partial(respond, who), partial(shown_well, who)):
+            record_answer(responses, record, trial, answer)
             made += 1
             if progress:
                 # Trials that come again are more than the plans ask for.
@@ -237,8 +232,8 @@ def simulate(
 
 def _open(
     protocol: Protocol, stimuli: StimulusSource, responses: Responses, plan: Plan, known: Mapping[str, Any]
-) -> SessionRecord | None:
-    """A simulated participant's session, begun or taken up; None where it is finished."""
+) -> SessionRecord:
+    """A simulated participant's session, begun, taken up, or finished already."""
     stored = find_session(responses, plan.participant)
     if stored is not None and stored.simulated and stored.truth != dict(known):
         # Half a session by one observer and half by another would have no truth.
@@ -247,7 +242,7 @@ def _open(
             "use the same ones, or another results folder."
         )
     if stored is not None and stored.plan == plan and stored.simulated and has_event(responses, stored, "finished"):
-        return None
+        return stored
     return begin_session(
         responses,
         protocol,
@@ -259,14 +254,8 @@ def _open(
     )
 
 
-def _answer(state: sitting.Session, who: Person, trial: Trial, step: Step) -> tuple[sitting.Session, Answer]:
-    value, response_s = respond(who, trial, step)
-    well = shown_well(who, trial, step)
-    if value is None or response_s is None:
-        return sitting.missed(state, shown_well=well)
-    return sitting.answered(state, value, response_s, shown_well=well)
-
-
 def questions(protocol: Protocol, plan: Plan) -> int:
-    """How many answers a plan asks for."""
-    return sum(1 if trial.role == "check" else max(1, len(protocol.study(trial.study).items)) for trial in plan.trials)
+    """How many answers a plan asks for at most, repeats of trials that were badly shown apart."""
+    items = {study.name: max(1, len(study.items)) for study in protocol.studies}
+    known = sum(1 if trial.role == "check" else items[trial.study] for trial in plan.trials)
+    return known + sum(course.most * items[course.study] for course in plan.courses)

@@ -1,8 +1,8 @@
 """Plan: the trials of one participant, drawn once and stored with its seed.
 
-Pairs of stimuli come in (`stimuli.prepare`, or the manifest of a results folder); a `Plan` goes out: the trial table
-that window, browser and simulated observer all follow. Showing a plan draws nothing. 2004 section 4.2: each pair in
-both orders, the order of pairs and the order within a pair both at random.
+Pairs of stimuli come in (`stimuli.prepare`, or the manifest of a results folder); a `Plan` goes out: the trials that
+window, browser and simulated observer all follow, and the course of studies whose trials depend on the answers
+(`procedures`). Showing a plan draws nothing.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ import numpy as np
 
 from study.errors import SessionError
 from study.experiment.chance import generator
+from study.experiment.procedures.constant_stimuli import ConstantStimuli
+from study.experiment.procedures.procedure import Course, Draw, Procedure
+from study.experiment.procedures.registry import course_from_json, course_to_json
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.tasks.trial import Pair, Trial, trial_from_json, trial_of
 
@@ -33,16 +36,47 @@ class Plan:
     seed: int
     group: int
     trials: tuple[Trial, ...]
+    courses: tuple[Course, ...] = ()
 
-    def trial(self, number: int) -> Trial:
-        """A trial by its number, counted from 1."""
-        if not 1 <= number <= len(self.trials):
-            raise SessionError(f"Expected a trial from 1 to {len(self.trials)}, found {number}.")
-        return self.trials[number - 1]
+    @property
+    def last(self) -> int:
+        """The largest number that a trial may have."""
+        ends = (course.first + course.most - 1 for course in self.courses)
+        return max([*ends, *(trial.trial for trial in self.trials[-1:])], default=0)
+
+    @property
+    def stimuli(self) -> set[str]:
+        """The ids of all stimuli that may be shown."""
+        shown: list[Trial | Pair] = [*self.trials, *(pair for course in self.courses for pair in course.pairs)]
+        return {name for one in shown for name in one.stimuli}
+
+    def practice(self, study: str) -> tuple[Trial, ...]:
+        """The practice trials of a study."""
+        return tuple(trial for trial in self.trials if trial.study == study and trial.role == "practice")
+
+    def procedures(self) -> dict[str, Procedure]:
+        """The procedure of each study, study after study in their order."""
+        first = {course.study: course.first for course in self.courses}
+        for trial in self.trials:
+            first[trial.study] = min(first.get(trial.study, trial.trial), trial.trial)
+        found: dict[str, Procedure] = {
+            study: ConstantStimuli(
+                tuple(trial for trial in self.trials if trial.study == study and trial.role != "practice")
+            )
+            for study in sorted(first, key=lambda study: first[study])
+        }
+        for course in self.courses:
+            rng = generator(self.seed, "procedure", self.protocol, self.participant, course.study)
+            found[course.study] = course.settings.begun(course, rng)
+        return found
 
     def to_json(self) -> str:
         """The plan as JSON; `plan_from_json` gives it back."""
-        return json.dumps({"version": PLAN_VERSION, **asdict(self)}, separators=(",", ":"))
+        data = {"version": PLAN_VERSION, **asdict(replace(self, courses=()))}
+        del data["courses"]
+        if self.courses:
+            data["courses"] = [course_to_json(course) for course in self.courses]
+        return json.dumps(data, separators=(",", ":"))
 
 
 def plan_from_json(text: str) -> Plan:
@@ -54,7 +88,9 @@ def plan_from_json(text: str) -> Plan:
             raise SessionError(
                 f"Expected a plan of version {PLAN_VERSION} or older, found {version}; use the Segue that wrote it."
             )
-        return Plan(**{**data, "trials": tuple(trial_from_json(trial, version) for trial in data["trials"])})
+        trials = tuple(trial_from_json(trial, version) for trial in data["trials"])
+        courses = tuple(course_from_json(course) for course in data.get("courses", ()))
+        return Plan(**{**data, "trials": trials, "courses": courses})
     except (ValueError, KeyError, TypeError) as error:
         raise SessionError(f"Expected a stored plan, found JSON that is none: {error}.") from error
 
@@ -85,23 +121,29 @@ def draw_plan(
     if protocol.study_order == "random":
         studies = [studies[i] for i in rng.permutation(len(studies))]
     trials: list[Trial] = []
+    courses: list[Course] = []
+    number = 1
     for study in studies:
         own, for_practice = _pairs_of(study, pairs)
         if not own:
             raise SessionError(
                 f"Expected pairs for the study {study.name!r}, found none; prepare this protocol's stimuli."
             )
-        shown: list[Trial] = []
-        for repeat in range(1, study.repeats + 1):
-            shown += _draw_set(study, own, repeat, rng, group)
+        draw = Draw(study.name, tuple(own), study.order, study.repeats, group)
+        shown = study.procedure.drawn(draw, rng)
         # Practice and checks draw from generators of their own, so that they leave the trials as they are.
         practice = _draw_practice(
             study, for_practice or own, generator(seed, "practice", protocol.name, participant, study.name)
         )
         checks = generator(seed, "checks", protocol.name, participant, study.name)
-        trials += [*practice, *_with_checks(study, shown, checks)]
-    numbered = tuple(replace(trial, trial=number) for number, trial in enumerate(trials, start=1))
-    return Plan(protocol.name, protocol.sha256, participant, seed, group, numbered)
+        known = [*practice, *_with_checks(study, shown, checks)]
+        trials += [replace(trial, trial=place) for place, trial in enumerate(known, start=number)]
+        number += len(known)
+        # Numbers are kept for all trials that may come, so that those of later studies hang on no answer.
+        if (course := study.procedure.course(draw, number)) is not None:
+            courses.append(course)
+            number += course.most
+    return Plan(protocol.name, protocol.sha256, participant, seed, group, tuple(trials), tuple(courses))
 
 
 def _pairs_of(study: StudySpec, pairs: Sequence[Pair]) -> tuple[list[Pair], list[Pair]]:
@@ -109,29 +151,6 @@ def _pairs_of(study: StudySpec, pairs: Sequence[Pair]) -> tuple[list[Pair], list
     own = [pair for pair in pairs if pair.study == study.name]
     for_practice = [pair for pair in own if pair.motion in study.practice_transitions]
     return [pair for pair in own if pair.motion not in study.practice_transitions], for_practice
-
-
-def _draw_set(
-    study: StudySpec, pairs: Sequence[Pair], repeat: int, rng: np.random.Generator, group: int
-) -> list[Trial]:
-    """One repeat of a study: each pair in its order or orders, shuffled."""
-    count = len(pairs)
-    if not study.paired:
-        if study.order == "by-group":
-            turn = group % count
-            return [trial_of(pair, (0,), repeat) for pair in [*pairs[turn:], *pairs[:turn]]]
-        return [trial_of(pairs[i], (0,), repeat) for i in rng.permutation(count)]
-    if study.order == "both":
-        shown = [(pair, a_first) for pair in pairs for a_first in (True, False)]
-    elif study.order == "random":
-        shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.integers(0, 2, count), strict=True)]
-    elif study.order == "balanced":
-        # An odd count leaves one pair over; which way it goes is drawn too.
-        halves = (np.arange(count) + int(rng.integers(0, 2))) % 2 == 0
-        shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.permutation(halves), strict=True)]
-    else:
-        shown = [(pair, group % 2 == 0) for pair in pairs]
-    return [trial_of(shown[i][0], _both(shown[i][1]), repeat) for i in rng.permutation(len(shown))]
 
 
 def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Generator) -> list[Trial]:

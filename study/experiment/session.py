@@ -9,33 +9,50 @@ answers that there are.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from study.errors import SessionError
 from study.experiment import wording
+from study.experiment.folding import Folded, continued, finished, fold
 from study.experiment.form import field_value
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol
-from study.experiment.steps import Step, comes_again, feedback_text, film_times, steps_left, trial_steps
+from study.experiment.steps import (
+    Step,
+    break_step,
+    breaks_of,
+    comes_again,
+    feedback_text,
+    film_times,
+    steps_left,
+    trial_steps,
+)
 from study.tasks.answer import Answer
+from study.tasks.trial import Trial
 
 
 @dataclass(frozen=True)
 class Session:
     """Where a sitting stands. Use `open_session`, `current`, `advanced`, `answered` and `missed`.
 
-    `trials_left` has for each step how many trials have steps from there on: an answer then costs the same however
-    long the plan is. `badly_shown` are the showings (trial and attempt) of which an answer says that they were faulty:
-    a trial with several items comes again where any of them does.
+    `steps` are those of all trials that are known; where a procedure waits for an answer (`folding`), the steps of its
+    next trial are added after it. `trials_left` has for each step how many trials have steps from there on: an answer
+    then costs the same however long the plan is. `badly_shown` are the showings (trial and attempt) of which an answer
+    says that they were faulty: a trial with several items comes again where any of them does.
     """
 
     plan: Plan
     protocol: Protocol
     steps: tuple[Step, ...]
     trials_left: tuple[int, ...]
+    folded: Folded
     position: int = 0
     badly_shown: frozenset[tuple[int, int]] = frozenset()
+
+    def trial(self, number: int) -> Trial:
+        """A trial by its number: one that is known beforehand, or that the answers so far led to."""
+        return self.folded.trial(number)
 
 
 def open_session(
@@ -62,9 +79,11 @@ def open_session(
         )
     before = tuple(answers)
     films = wording.NO_FILMS if frames is None else film_times(protocol, plan, frames)
-    steps = steps_left(protocol, plan, before, passed, films)
+    folded = fold(protocol, plan, before)
+    breaks = breaks_of(protocol, plan) - folded.breaks
+    steps = steps_left(protocol, folded.trials.values(), before, passed, breaks, films)
     badly_shown = frozenset((answer.trial, answer.attempt) for answer in before if not answer.shown_well)
-    return Session(plan, protocol, steps, _trials_left(steps), badly_shown=badly_shown)
+    return Session(plan, protocol, steps, _trials_left(steps), folded, badly_shown=badly_shown)
 
 
 def current(session: Session) -> Step:
@@ -73,9 +92,13 @@ def current(session: Session) -> Step:
 
 
 def progress(session: Session) -> tuple[int, int]:
-    """Trials finished and trials in all, as the plan counts them (repeats of faulty ones not counted)."""
-    total = len(session.plan.trials)
-    return total - session.trials_left[session.position], total
+    """Trials finished and trials in all, as the plan counts them (repeats of faulty ones not counted).
+
+    Of trials that depend on answers the most that there may be count; what was not needed is finished, too.
+    """
+    plan = session.plan
+    total = len(plan.trials) + sum(course.most for course in plan.courses)
+    return total - session.trials_left[session.position] - sum(session.folded.unknown.values()), total
 
 
 def advanced(session: Session) -> Session:
@@ -95,7 +118,35 @@ def advanced(session: Session) -> Session:
 
 def _at(session: Session, position: int) -> Session:
     # Not `replace`, which takes as long as the rest of an answer.
-    return Session(session.plan, session.protocol, session.steps, session.trials_left, position, session.badly_shown)
+    known = session.steps, session.trials_left, session.folded
+    return Session(session.plan, session.protocol, *known, position, session.badly_shown)
+
+
+def near(session: Session) -> tuple[list[Step], list[Step]]:
+    """The steps of the present trial, or else of the next one; and the stimuli of which some come after it.
+
+    Where the trial after it depends on the answer, those are the stimuli of all trials that may come.
+    """
+    own: list[Step] = []
+    after: list[Step] = []
+    for position in range(session.position, len(session.steps)):
+        step = session.steps[position]
+        if step.trial and (not own or _same_showing(step, own[0])):
+            own.append(step)
+        elif step.trial and (not after or _same_showing(step, after[0])):
+            after.append(step)
+        elif step.trial:
+            break
+    if own and not (after and after[0].study == own[0].study):
+        study, folded = own[0].study, session.folded
+        candidates = folded.procedures[study].candidates(folded.given[study])
+        may_come = [step for one in candidates for step in trial_steps(session.protocol, one, 1, frozenset())]
+        after = may_come or after
+    return own, [step for step in after if step.slot]
+
+
+def _same_showing(step: Step, other: Step) -> bool:
+    return (step.trial, step.attempt) == (other.trial, other.attempt)
 
 
 def restarted(session: Session) -> Session:
@@ -150,6 +201,36 @@ def missed(session: Session, *, shown_well: bool = True) -> tuple[Session, Answe
     return _record(session, Answer(step.trial, step.item, step.attempt, None, None, shown_well))
 
 
+def walk(
+    session: Session,
+    respond: Callable[[Trial, Step], tuple[str | None, float | None]],
+    shown_well: Callable[[Trial, Step], bool] = lambda _trial, _step: True,
+) -> Iterator[tuple[Trial, Answer]]:
+    """Go through a session to its end: each trial with an answer to it, as soon as the answer is given.
+
+    Steps that are shown or read are passed over; the form has to be behind the participant.
+
+    Parameters
+    ----------
+    respond
+        Gives the response to the question of a step, None for no response, and the response time in seconds.
+    shown_well
+        Says whether the stimuli of the trial were shown without a fault.
+    """
+    while (step := current(session)).kind != "done":
+        if step.kind != "answer":
+            session = advanced(session)
+            continue
+        trial = session.trial(step.trial)
+        value, response_s = respond(trial, step)
+        well = shown_well(trial, step)
+        if value is None or response_s is None:
+            session, given = missed(session, shown_well=well)
+        else:
+            session, given = answered(session, value, response_s, shown_well=well)
+        yield trial, given
+
+
 def _asked(session: Session) -> Step:
     step = current(session)
     if step.kind != "answer":
@@ -164,16 +245,33 @@ def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     session = replace(session, position=session.position + 1, badly_shown=badly_shown)
     following = current(session)
     trial_goes_on = following.kind == "answer" and following.trial == answer.trial
-    trial = session.plan.trial(answer.trial)
+    trial = session.trial(answer.trial)
     if trial.role == "practice" and not trial_goes_on:
         feedback = Step("feedback", here.study, feedback_text(session.protocol, trial, answer), role=trial.role)
         session = _with_steps(session, session.position, [feedback])
-    shown_well = showing not in badly_shown
-    if not comes_again(session.protocol, trial, answer.attempt, shown_well) or trial_goes_on:
+    if trial_goes_on or trial.role == "practice":
         return session, answer
+    if not comes_again(session.protocol, trial, answer.attempt, showing not in badly_shown):
+        return _finished(session, trial, answer), answer
     end = max(i for i, step in enumerate(session.steps) if step.study == trial.study) + 1
     repeat = trial_steps(session.protocol, trial, answer.attempt + 1, frozenset())
     return _with_steps(session, end, repeat), answer
+
+
+def _finished(session: Session, trial: Trial, answer: Answer) -> Session:
+    """After the last answer to a trial: where no other of its study is known, its procedure says how to go on."""
+    session = replace(session, folded=finished(session.folded, trial, answer))
+    at = session.position
+    while session.steps[at].trial == trial.trial:
+        at += 1
+    after = next((number for i in range(at, len(session.steps)) if (number := session.steps[i].trial)), None)
+    if after is not None and session.trial(after).study == trial.study:
+        return session
+    folded, fresh = continued(session.folded, trial.study)
+    steps = [step for one in fresh for step in trial_steps(session.protocol, one, 1, frozenset())]
+    if trial.trial in folded.breaks and (fresh or after):
+        steps.insert(0, break_step(session.protocol, trial))
+    return replace(_with_steps(session, at, steps), folded=folded)
 
 
 def _with_steps(session: Session, at: int, added: Sequence[Step]) -> Session:

@@ -7,14 +7,13 @@ between two, the questions, a pause (2004 section 4.2). `session` walks over the
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from study.errors import SessionError
 from study.experiment import wording
 from study.experiment.plan import Plan, legal_answers
-from study.experiment.protocol.whole import Protocol, StudySpec
+from study.experiment.protocol.whole import Protocol
 from study.tasks.answer import Answer, right_answer
 from study.tasks.trial import PLACES, Trial
 
@@ -114,24 +113,44 @@ def answer_keys(protocol: Protocol, legal: Sequence[str]) -> dict[str, str]:
 
 
 def film_times(protocol: Protocol, plan: Plan, frames: Mapping[str, int]) -> wording.Films:
-    """How long the films of a plan's trials take, by study; `frames` has those of each stimulus."""
+    """How long the films of a plan's trials take, by study; `frames` has those of each stimulus.
+
+    Where trials depend on the answers, all pairs that they may show count alike.
+    """
     shown: dict[str, dict[bool, list[int]]] = {}
     for trial in plan.trials:
         own = shown.setdefault(trial.study, {True: [], False: []})
         own[trial.role == "practice"].append(sum(frames[name] for name in trial.stimuli))
+    for course in plan.courses:
+        own = shown.setdefault(course.study, {True: [], False: []})
+        own[False] += [sum(frames[name] for name in pair.stimuli) for pair in course.pairs]
     return {
         study: wording.FilmTimes(*(sum(own) / len(own) / protocol.fps if own else 0.0 for own in (of[False], of[True])))
         for study, of in shown.items()
     }
 
 
+Earlier = Mapping[int, Sequence[tuple[int, Answer]]]
+"""The answers of each trial that has any, with their places among all."""
+
+
+def by_trial(answers: Sequence[Answer]) -> Earlier:
+    """Answers by the number of their trial."""
+    earlier: dict[int, list[tuple[int, Answer]]] = {}
+    for place, answer in enumerate(answers):
+        earlier.setdefault(answer.trial, []).append((place, answer))
+    return earlier
+
+
 def steps_left(
-    protocol: Protocol, plan: Plan, answers: Sequence[Answer], passed: Collection[str], films: wording.Films
+    protocol: Protocol,
+    trials: Iterable[Trial],
+    answers: Sequence[Answer],
+    passed: Collection[str],
+    breaks: Collection[int],
+    films: wording.Films,
 ) -> tuple[Step, ...]:
-    """All that is left to do, in order."""
-    known = {trial.trial for trial in plan.trials}
-    if strays := sorted({answer.trial for answer in answers} - known):
-        raise SessionError(f"Expected answers to the plan's trials 1 to {len(plan.trials)}, found trials {strays}.")
+    """All that is left to do, in order, of the trials that are known; `breaks` are those that a break follows."""
     steps: list[Step] = []
     if "consent" not in passed and (text := wording.consent_text(protocol, films)):
         steps.append(Step("consent", text=text))
@@ -139,15 +158,12 @@ def steps_left(
         steps.append(Step("form", text=protocol.texts.form.strip()))
     if not answers and (text := wording.welcome_text(protocol, films)):
         steps.append(Step("instructions", text=text))
-    earlier: dict[int, list[tuple[int, Answer]]] = {}
-    for place, answer in enumerate(answers):
-        earlier.setdefault(answer.trial, []).append((place, answer))
+    earlier = by_trial(answers)
     studies: dict[str, list[Trial]] = {}
-    for trial in plan.trials:
+    for trial in trials:
         studies.setdefault(trial.study, []).append(trial)
-    breaks = _breaks(protocol, plan)
-    for trials in studies.values():
-        steps += _study_steps(protocol, trials, earlier, breaks, films)
+    for own in studies.values():
+        steps += _study_steps(protocol, own, earlier, breaks, films)
     if "debrief" not in passed and (text := wording.debrief_text(protocol, films)):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
@@ -156,15 +172,11 @@ def steps_left(
 def _study_steps(
     protocol: Protocol,
     trials: Sequence[Trial],
-    earlier: Mapping[int, Sequence[tuple[int, Answer]]],
+    earlier: Earlier,
     breaks: Collection[int],
     films: wording.Films,
 ) -> list[Step]:
-    """What is left of a study: its instructions, trials with breaks, and those that come again, as they were queued.
-
-    `earlier` has the answers of each trial that has any, with their places among all; `breaks` the trials with a break
-    after them.
-    """
+    """What is left of a study: its instructions, trials with breaks, and those that come again, as they were queued."""
     study = protocol.study(trials[0].study)
     steps: list[Step] = []
     again: list[tuple[int, list[Step]]] = []
@@ -174,35 +186,42 @@ def _study_steps(
         if practised and trial.role != "practice" and protocol.texts.practice_over.strip():
             steps.append(Step("instructions", study.name, protocol.texts.practice_over.strip()))
         practised = practised and trial.role == "practice"
-        answers = earlier.get(trial.trial, ())
-        attempt, done = _state(protocol, study, trial, [answer for _, answer in answers])
+        attempt, done = showing_due(protocol, trial, earlier)
         if done is None:
             continue
         if attempt > 1:
-            queued = max(place for place, answer in answers if answer.attempt == attempt - 1)
+            queued = max(place for place, answer in earlier[trial.trial] if answer.attempt == attempt - 1)
             again.append((queued, trial_steps(protocol, trial, attempt, done)))
             continue
         steps += trial_steps(protocol, trial, attempt, done)
         if trial.trial in breaks:
-            steps.append(Step("break", study.name, protocol.texts.break_text.strip()))
+            steps.append(break_step(protocol, trial))
     steps += [step for _, repeated in sorted(again, key=lambda one: one[0]) for step in repeated]
     if steps and (text := wording.instructions_text(protocol, study, films)):
         steps.insert(0, Step("instructions", study.name, text, stimulus=trials[0].stimuli[0] if study.example else ""))
     return steps
 
 
-def _breaks(protocol: Protocol, plan: Plan) -> set[int]:
-    """The trials that a break follows: every so many, practice not counted, and never the last one."""
+def break_step(protocol: Protocol, trial: Trial) -> Step:
+    """The break after a trial."""
+    return Step("break", trial.study, protocol.texts.break_text.strip())
+
+
+def breaks_of(protocol: Protocol, plan: Plan) -> set[int]:
+    """The trials that a break follows: every so many, practice not counted, and never the last one.
+
+    All trials that may come count, whether they do or not.
+    """
     counted = [trial.trial for trial in plan.trials if trial.role != "practice"]
+    counted += [number for course in plan.courses for number in range(course.first, course.first + course.most)]
     every = protocol.timing.break_after
-    return set(counted[every - 1 : -1 : every]) if every else set()
+    return set(sorted(counted)[every - 1 : -1 : every]) if every else set()
 
 
-def _state(
-    protocol: Protocol, study: StudySpec, trial: Trial, answers: Sequence[Answer]
-) -> tuple[int, frozenset[str] | None]:
+def showing_due(protocol: Protocol, trial: Trial, earlier: Earlier) -> tuple[int, frozenset[str] | None]:
     """Which showing of a trial is due and which of its items are answered; None for the items where it is finished."""
-    items = {""} if trial.role == "check" else {item.name for item in study.items} or {""}
+    answers = [answer for _, answer in earlier.get(trial.trial, ())]
+    items = {""} if trial.role == "check" else {item.name for item in protocol.study(trial.study).items} or {""}
     attempt = max((answer.attempt for answer in answers), default=1)
     latest = [answer for answer in answers if answer.attempt == attempt]
     done = frozenset(answer.item for answer in latest)

@@ -99,9 +99,11 @@ def _filled(text: str, standard: str, slots: Mapping[str, str]) -> str:
 
 
 def _slots(protocol: Protocol, films: Films) -> dict[str, str]:
+    fewest = sum(protocol.fewest_trials_of(study) for study in protocol.studies)
+    most = sum(protocol.trials_of(study) for study in protocol.studies)
     return {
         "minutes": str(minutes(duration_s(protocol, films=films))),
-        "trials": str(sum(protocol.trials_of(study) for study in protocol.studies)),
+        "trials": str(most) if fewest == most else f"{fewest}–{most}",
         "studies": str(len(protocol.studies)),
         "answer_s": f"{protocol.timing.answer_s:g}",
         "contact": protocol.consent.contact,
@@ -126,7 +128,9 @@ def duration_s(protocol: Protocol, *, at_most: bool = False, films: Films = NO_F
     total, counted = 0.0, 0
     for study in protocol.studies:
         again = 1 + (protocol.timing.show_again if at_most else 0)
-        shown = again * (protocol.trials_of(study) + study.attention_checks)
+        most = protocol.trials_of(study)
+        trials = most if at_most else (most + protocol.fewest_trials_of(study)) / 2
+        shown = again * (trials + study.attention_checks)
         known = films.get(study.name) or _estimated(protocol, study)
         besides_s = _besides_s(protocol, study, at_most)
         total += shown * (known.trial_s + besides_s) + study.practice * (known.practice_s + besides_s)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -318,23 +319,17 @@ def _sitting(design: Design, plan: Plan, seed: int) -> pd.DataFrame:
     """A simulated participant's answers to the study, through the session that real front ends run."""
     import pandas as pd
 
-    from study.experiment import session as sitting
+    from study.experiment.session import open_session, walk
 
     who = person(design.settings, plan.participant, seed)
     own = [trial for trial in plan.trials if trial.study == design.study.name]
-    state = sitting.open_session(design.protocol, replace(plan, trials=_renumbered(own)), passed=("consent", "form"))
-    rows = []
-    while (step := sitting.current(state)).kind != "done":
-        if step.kind != "answer":
-            state = sitting.advanced(state)
-            continue
-        trial = state.plan.trial(step.trial)
-        value, response_s = respond(who, trial, step)
-        if value is None or response_s is None:
-            state, answer = sitting.missed(state)
-        else:
-            state, answer = sitting.answered(state, value, response_s)
-        rows.append({"participant": plan.participant, **answer_columns(trial, answer)})
+    state = open_session(
+        design.protocol, replace(plan, trials=_renumbered(own), courses=()), passed=("consent", "form")
+    )
+    rows = [
+        {"participant": plan.participant, **answer_columns(trial, answer)}
+        for trial, answer in walk(state, partial(respond, who))
+    ]
     return pd.DataFrame(rows)
 
 

@@ -239,7 +239,7 @@ def test_identical_films_look_different_from_outside(serve, stimuli):
     person = serve().person()
     view = person.until(person.begin(parameters={"participant": "p01"}), "trial")
     plan = draw_plan(protocol_of(), stimuli.pairs, "p01")
-    while plan.trial(view["trial"]).stimuli[0] != plan.trial(view["trial"]).stimuli[1]:
+    while plan.trials[view["trial"] - 1].stimuli[0] != plan.trials[view["trial"] - 1].stimuli[1]:
         view = person.until(person.step(view), "trial")
     heads = [person.client.head(film["url"]).headers for film in view["films"]]
     heads = heads if heads[0].get("etag") else [person.client.get(film["url"]).headers for film in view["films"]]
@@ -250,7 +250,7 @@ def test_identical_films_look_different_from_outside(serve, stimuli):
 def test_a_damaged_film_is_a_fault_on_record(serve, stimuli, responses):
     person = serve().person()
     view = person.until(person.begin(), "trial")
-    stimulus = draw_plan(protocol_of(), stimuli.pairs, session_table(responses)["participant"][0]).trial(1).stimuli[0]
+    stimulus = draw_plan(protocol_of(), stimuli.pairs, session_table(responses)["participant"][0]).trials[0].stimuli[0]
     file = stimuli.video(stimulus)
     whole = file.read_bytes()
     try:

@@ -312,7 +312,7 @@ def test_no_view_and_no_header_tells_identical_films_from_different_ones(serve, 
     while view["kind"] != "done":
         films = view.get("films", []) if view["kind"] == "trial" else []
         if len(films) == 2:
-            trial = plan.trial(view["trial"])
+            trial = plan.trials[view["trial"] - 1]
             for film in films:
                 told = {name: value for name, value in film.items() if name not in ("slot", "url")}
                 headers = dict(person.client.head(film["url"]).headers)
@@ -332,7 +332,7 @@ def test_a_film_is_the_file_and_an_empty_box_that_says_how_many_frames(serve, st
     plan = draw_plan(protocol_of(), stimuli.pairs, "p01")
     frames = {record.id: record.frames for record in stimuli.records}
     whole = whole_bytes(video["bytes"] for video in stimuli.videos.values())
-    for film, stimulus in zip(view["films"], plan.trial(1).stimuli, strict=True):
+    for film, stimulus in zip(view["films"], plan.trials[0].stimuli, strict=True):
         content = person.client.get(film["url"]).content
         file = stimuli.video(stimulus).read_bytes()
         assert len(content) == film["bytes"] == whole

@@ -8,11 +8,12 @@ import re
 from pathlib import Path
 
 import pytest
+from toys import keep_answer
 
 from study.errors import SessionError
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
-from study.experiment.store.answers import Presentation, record_answer, record_form
+from study.experiment.store.answers import Presentation, record_form
 from study.experiment.store.export import export, label, labels
 from study.experiment.store.frames import export_csv
 from study.experiment.store.responses import open_responses
@@ -26,8 +27,8 @@ def responses(tmp_path, toy_protocol, toy_stimuli):
     with open_responses(tmp_path / "answers.sqlite") as opened:
         simulate(toy_protocol, toy_stimuli, opened, 2, seed=1)
         record = begin_session(opened, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "a b-1"))
-        record_answer(opened, record, Answer(1, "", 1, None, None))
-        record_answer(opened, record, Answer(2, "", 1, "same", 0.75))
+        keep_answer(opened, record, Answer(1, "", 1, None, None))
+        keep_answer(opened, record, Answer(2, "", 1, "same", 0.75))
         record_form(opened, record, {field.name: "one\ttwo" for field in toy_protocol.form})
         yield opened
 
@@ -69,7 +70,7 @@ def test_no_text_in_any_export_begins_like_a_formula(tmp_path, toy_protocol, toy
         record = begin_session(opened, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, said))
         record_form(opened, record, {field.name: said for field in toy_protocol.form})
         shown = Presentation(1, 1, "first", "x", said, 9, 9, 1.0, True)
-        record_answer(opened, record, Answer(1, "", 1, "same", 0.75), [shown])
+        keep_answer(opened, record, Answer(1, "", 1, "same", 0.75), [shown])
         if kind == "csv":
             files = [export_csv(opened, tmp_path / "answers.csv")]
         else:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -24,7 +25,7 @@ from study.experiment.observer_models import (
 )
 from study.experiment.observers import ObserverSettings, default_observer, person, simulate
 from study.experiment.protocol.whole import parse_protocol
-from study.experiment.session import advanced, answered, current, missed, open_session
+from study.experiment.session import open_session, walk
 from study.experiment.store.answers import has_event
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
@@ -275,15 +276,7 @@ def test_front_ends_and_simulation_drive_the_same_session(toy_protocol, toy_stim
 
     plan = draw_plan(toy_protocol, toy_stimuli.pairs, "sim-001")
     who = person(default_observer(), "sim-001", 3)
-    state, asked = open_session(toy_protocol, plan), []
-    while current(state).kind != "done":
-        step = current(state)
-        if step.kind != "answer":
-            state = advanced(state)
-            continue
-        value, response_s = respond(who, plan.trial(step.trial), step)
-        state, answer = missed(state) if value is None else answered(state, value, response_s)
-        asked.append(answer)
+    asked = [answer for _, answer in walk(open_session(toy_protocol, plan), partial(respond, who))]
     with open_responses("sqlite://") as responses:
         simulate(toy_protocol, toy_stimuli, responses, 1, seed=3)
         table = answers_frame(responses)

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
+from toys import keep_answer
 
 from study.experiment.plan import draw_plan
 from study.experiment.store import participants as people
 from study.experiment.store.answers import (
     Presentation,
-    record_answer,
     record_event,
     record_form,
     stored_answers,
@@ -116,7 +116,7 @@ def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol):
     stays, leaves = enrol("stays"), enrol("leaves")
     for record in (stays, leaves):
         shown = Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True, {"mark": f"mark of {record.participant}"})
-        record_answer(responses, record, Answer(1, "", 1, "same", 1.0), [shown])
+        keep_answer(responses, record, Answer(1, "", 1, "same", 1.0), [shown])
         record_form(responses, record, {"remark": f"words of {record.participant}"})
     assert people.withdraw(responses, "no such code", clock=lambda: NOW) is None
     assert people.withdraw(responses, f" {code_of(responses, 'leaves').upper()} ", clock=lambda: NOW) == leaves.id
@@ -134,7 +134,7 @@ def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol):
 
 def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(responses, enrol):
     stays, leaves = enrol("stays"), enrol("leaves")
-    record_answer(responses, stays, Answer(1, "", 1, "same", 1.0))
+    keep_answer(responses, stays, Answer(1, "", 1, "same", 1.0))
     people.withdraw(responses, code_of(responses, "leaves"))
     assert enrol("next").id == leaves.id + 1
     with pytest.raises(sa.exc.IntegrityError, match="append-only"), responses.engine.begin() as connection:

@@ -213,5 +213,3 @@ def test_what_is_no_plan_is_refused(toy_protocol, toy_stimuli):
         plan_from_json(text.replace('"version":2', '"version":9'))
     with pytest.raises(SessionError, match="Expected a stored plan"):
         plan_from_json("{}")
-    with pytest.raises(SessionError, match="Expected a trial from 1 to 8, found 9"):
-        draw_plan(toy_protocol, toy_stimuli.pairs, "p01").trial(9)

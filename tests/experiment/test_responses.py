@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import pandas as pd
 import pytest
 import sqlalchemy as sa
+from toys import keep_answer
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
@@ -17,7 +18,6 @@ from study.experiment.store import tables as response_tables
 from study.experiment.store.answers import (
     Presentation,
     has_event,
-    record_answer,
     record_event,
     record_form,
     stored_answers,
@@ -63,16 +63,16 @@ def test_a_session_stores_protocol_plan_seed_and_versions(responses, toy_protoco
 def test_answers_come_back_as_they_were(responses, toy_protocol, plan):
     record = begin_session(responses, toy_protocol, plan)
     given = (answer(1), answer(2, "different", 0.123), answer(3, None, None), answer(4, shown_well=False))
-    assert all(record_answer(responses, record, one) for one in given)
+    assert all(keep_answer(responses, record, one) for one in given)
     assert stored_answers(responses, record.id) == given
 
 
 def test_an_answer_sent_twice_counts_once_and_another_one_is_refused(responses, toy_protocol, plan):
     record = begin_session(responses, toy_protocol, plan)
-    assert record_answer(responses, record, answer(1))
-    assert not record_answer(responses, record, answer(1))
+    assert keep_answer(responses, record, answer(1))
+    assert not keep_answer(responses, record, answer(1))
     with pytest.raises(SessionError, match=r"first answer of 'p01' to trial 1 \(showing 1\), found that one is stored"):
-        record_answer(responses, record, answer(1, "different"))
+        keep_answer(responses, record, answer(1, "different"))
     assert stored_answers(responses, record.id) == (answer(1),)
 
 
@@ -86,7 +86,7 @@ def full(responses, toy_protocol, plan):
     people.erase(responses, gone.id)
     people.admit(responses, toy_protocol, people.Newcomer("p01", "token"), people.Places(), lambda _: plan)
     record = find_session(responses, "p01")
-    record_answer(responses, record, answer(1), [Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True)])
+    keep_answer(responses, record, answer(1), [Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True)])
     record_form(responses, record, {"age": "33"})
     return responses
 
@@ -133,7 +133,7 @@ def test_a_seed_that_no_database_can_store_is_refused(responses, toy_protocol, p
 def test_a_missed_answer_has_no_value(responses, toy_protocol, plan):
     """The database itself refuses what would contradict itself."""
     record = begin_session(responses, toy_protocol, plan)
-    record_answer(responses, record, answer(1, None, None))
+    keep_answer(responses, record, answer(1, None, None))
     with pytest.raises(sa.exc.IntegrityError, match="missed_has_no_answer"), responses.engine.begin() as connection:
         connection.execute(
             sa.insert(response_tables.answers).values(
@@ -148,7 +148,7 @@ def test_the_table_says_what_each_answer_means(responses, toy_protocol, plan):
     record = begin_session(responses, toy_protocol, plan)
     for trial in plan.trials:
         value = "different" if trial.task == "same-different" else "first"
-        record_answer(responses, record, answer(trial.trial, value))
+        keep_answer(responses, record, answer(trial.trial, value))
     table = answers_frame(responses)
     assert tuple(table.columns) == ANSWER_COLUMNS
     assert len(table) == 8
@@ -164,7 +164,7 @@ def test_the_table_says_what_each_answer_means(responses, toy_protocol, plan):
 
 def test_missed_answers_are_neither_right_nor_wrong(responses, toy_protocol, plan):
     record = begin_session(responses, toy_protocol, plan)
-    record_answer(responses, record, answer(1, None, None))
+    keep_answer(responses, record, answer(1, None, None))
     row = answers_frame(responses).iloc[0]
     assert row["missed"]
     assert pd.isna(row["answer"])
@@ -174,8 +174,8 @@ def test_missed_answers_are_neither_right_nor_wrong(responses, toy_protocol, pla
 
 def test_the_last_showing_counts_and_all_can_be_had(responses, toy_protocol, plan):
     record = begin_session(responses, toy_protocol, plan)
-    record_answer(responses, record, answer(1, "same", shown_well=False))
-    record_answer(responses, record, answer(1, "different", attempt=2))
+    keep_answer(responses, record, answer(1, "same", shown_well=False))
+    keep_answer(responses, record, answer(1, "different", attempt=2))
     assert list(answers_frame(responses)["answer"]) == ["different"]
     assert list(answers_frame(responses, all_attempts=True)["answer"]) == ["same", "different"]
 
@@ -188,7 +188,7 @@ def test_an_empty_database_gives_an_empty_table(responses):
 
 def test_a_session_is_taken_up_not_begun_again(responses, toy_protocol, plan):
     first = begin_session(responses, toy_protocol, plan)
-    record_answer(responses, first, answer(1))
+    keep_answer(responses, first, answer(1))
     second = begin_session(responses, toy_protocol, plan)
     assert second == first
     assert len(all_sessions(responses)) == 1
@@ -210,13 +210,13 @@ def test_protocols_are_not_mixed(responses, toy_protocol, toy_stimuli, plan):
 
 def test_answers_of_merged_protocols_are_not_mixed_silently(responses, toy_protocol, plan):
     record = begin_session(responses, toy_protocol, plan)
-    record_answer(responses, record, answer(1))
+    keep_answer(responses, record, answer(1))
     with responses.engine.begin() as connection:
         row = dict(connection.execute(sa.select(response_tables.sessions)).mappings().one())
         row |= {"id": 2, "participant": "p02", "protocol_sha256": "f" * 64}
         connection.execute(sa.insert(response_tables.sessions).values(row))
     other = find_session(responses, "p02")
-    record_answer(responses, other, answer(1))
+    keep_answer(responses, other, answer(1))
     with pytest.raises(SessionError, match="expected answers under one protocol, found 2"):
         answers_frame(responses)
     assert list(answers_frame(responses, protocol_sha256="f" * 64)["participant"]) == ["p02"]
@@ -236,8 +236,8 @@ def test_another_plan_for_the_same_participant_is_refused(responses, toy_protoco
 
 def test_csv_holds_every_showing(responses, toy_protocol, plan, tmp_path):
     record = begin_session(responses, toy_protocol, plan)
-    record_answer(responses, record, answer(1, "same", shown_well=False))
-    record_answer(responses, record, answer(1, "different", attempt=2))
+    keep_answer(responses, record, answer(1, "same", shown_well=False))
+    keep_answer(responses, record, answer(1, "different", attempt=2))
     table = pd.read_csv(export_csv(responses, tmp_path / "answers.csv"))
     assert tuple(table.columns) == ANSWER_COLUMNS
     assert list(table["attempt"]) == [1, 2]

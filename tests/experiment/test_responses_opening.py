@@ -8,13 +8,13 @@ from datetime import UTC, datetime
 import pytest
 import sqlalchemy as sa
 from postgres_server import PASSWORD, ROLE, without_password
+from toys import keep_answer
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
 from study.experiment.store import databases
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
-from study.experiment.store.answers import record_answer
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session, find_session
 from study.tasks.answer import Answer
@@ -162,7 +162,7 @@ def test_a_role_that_owns_nothing_runs_sessions_and_cannot_take_the_guard_away(
         newcomer = people.Newcomer("p01", "token")
         people.admit(responses, toy_protocol, newcomer, people.Places(), lambda _: plan)
         record = find_session(responses, "p01")
-        record_answer(responses, record, ANSWER)
+        keep_answer(responses, record, ANSWER)
         people.seen(responses, [record.id])
         for statement in ("ALTER TABLE answers DISABLE TRIGGER ALL", "DROP FUNCTION segue_append_only() CASCADE"):
             with pytest.raises(sa.exc.ProgrammingError, match="must be owner"), responses.engine.begin() as connection:
@@ -208,4 +208,4 @@ def test_a_connection_that_the_server_cut_is_made_anew(postgres_server, postgres
     with open_responses(postgres_url) as responses:
         record = begin_session(responses, toy_protocol, plan)
         postgres_server.administer(f"SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE usename = '{ROLE}'")
-        assert record_answer(responses, record, ANSWER)
+        assert keep_answer(responses, record, ANSWER)

@@ -15,12 +15,13 @@ from datetime import UTC, datetime
 
 import pytest
 import sqlalchemy as sa
+from toys import keep_answer
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
-from study.experiment.store.answers import record_answer, stored_answers
+from study.experiment.store.answers import stored_answers
 from study.experiment.store.databases import alone, patiently
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.migrations import FIRST_VERSION, MIGRATIONS, VERSION
@@ -34,7 +35,7 @@ sys.path.insert(0, "tests/experiment")
 import toys as c
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
-from study.experiment.store.answers import record_answer, stored_answers
+from study.experiment.store.answers import stored_answers
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import begin_session
 from study.tasks.answer import Answer
@@ -45,7 +46,7 @@ for number in itertools.count(int(sys.argv[2])):
     record = begin_session(responses, protocol, draw_plan(protocol, pairs, f"p{number:05d}"))
     there = {answer.trial for answer in stored_answers(responses, record.id)}
     for trial in sorted(set(range(1, 9)) - there):
-        assert record_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
+        assert c.keep_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
         print(number, trial, flush=True)
 """
 
@@ -88,7 +89,6 @@ import toys as c
 from study.experiment.store import participants as people
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
-from study.experiment.store.answers import record_answer
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import session_by_id
 from study.tasks.answer import Answer
@@ -106,7 +106,7 @@ for number in range(newcomers):
     if not isinstance(found, str):
         record = session_by_id(responses, found.session_id)
         for trial in (1, 2):
-            assert record_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
+            assert c.keep_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
         found = "admitted"
     print(name, found, flush=True)
 """
@@ -163,7 +163,7 @@ def test_two_connections_that_record_the_same_answer_record_it_once(two, toy_pro
 
             def send(responses, trial=trial, together=together):
                 together.wait()
-                return record_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
+                return keep_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
 
             assert sorted(threads.map(send, two)) == [False, True]
     assert len(stored_answers(two[0], record.id)) == 8
@@ -179,7 +179,7 @@ def test_of_two_different_answers_to_one_question_the_first_stands(two, toy_prot
             def send(number, trial=trial, together=together):
                 together.wait()
                 try:
-                    return record_answer(two[number], record, Answer(trial, "", 1, values[number], 1.0))
+                    return keep_answer(two[number], record, Answer(trial, "", 1, values[number], 1.0))
                 except SessionError as refusal:
                     return str(refusal)
 
@@ -214,7 +214,7 @@ def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(two, 
             together.wait()
             for trial in range(1, 9):
                 try:
-                    record_answer(two[0], record, Answer(trial, "", 1, "same", 1.0))
+                    keep_answer(two[0], record, Answer(trial, "", 1, "same", 1.0))
                 except SessionError as gone:
                     return str(gone)
             return ""

@@ -55,9 +55,11 @@ def test_a_trial_is_first_gap_second_answer_pause(opened):
     assert kinds.count("answer") == 8
     for step in seen:
         if step.trial:
-            trial = opened.plan.trial(step.trial)
+            trial = opened.trial(step.trial)
             assert step.study == trial.study
             assert step.stimulus == (trial.stimuli[step.slot - 1] if step.slot else "")
+    with pytest.raises(SessionError, match="Expected a trial from 1 to 8 that is known, found 9"):
+        opened.trial(9)
     durations = {step.kind: step.duration_s for step in seen}
     assert (durations["gap"], durations["answer"], durations["pause"]) == (1.0, 5.0, 1.0)
     assert [step.text for step in seen if step.kind == "instructions"] == ["Welcome.", "Some pairs are the same."]
@@ -156,7 +158,7 @@ def test_a_rated_pair_shows_both_and_then_asks_every_item(pair_rating_protocol, 
     assert (asked[0].low, asked[0].middle, asked[0].high) == ("much worse", "the same", "much better")
     steps = [step for step in seen if step.trial == asked[0].trial]
     assert [step.place for step in steps] == ["first", "gap", "second", "answer", "answer", "pause"]
-    trial = plan.trial(asked[0].trial)
+    trial = plan.trials[asked[0].trial - 1]
     assert (steps[0].stimulus, steps[2].stimulus) == trial.stimuli
 
 

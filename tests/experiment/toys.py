@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from study.errors import MotionError
 from study.experiment.protocol.whole import Protocol
+from study.experiment.store.answers import Presentation, record_answer
+from study.experiment.store.responses import Responses
+from study.experiment.store.sessions import SessionRecord
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.library import Entry, Library
 from study.motion.skeleton import Skeleton
+from study.tasks.answer import Answer
 from study.tasks.trial import Pair
 
 _JOINTS = (
@@ -203,6 +208,27 @@ class FakeStimuli:
     synthetic: bool = True
 
 
+STAIRCASE = """
+[studies.procedure]
+name = "staircase"
+start_frames = 6
+most_frames = 8
+steps_frames = [2, 1]
+reversals = 3
+averaged = 2
+most_trials = 14
+catch_every = 4
+"""
+
+
+def with_staircases(text: str = TOY_PROTOCOL, keys: str = "") -> str:
+    """A protocol's text with staircases in place of the differences of its study `jnd`."""
+    text = text.replace('differences_frames = [-3, 0, 5]\norder = "both"\n', keys)
+    head, study = text.split('name = "jnd"', 1)
+    own, *others = study.split("\n[[studies]]")
+    return "\n[[studies]]".join([f'{head}name = "jnd"{own}{STAIRCASE}', *others])
+
+
 TOY_PAIR_RATING = """
 [[studies]]
 name = "compared"
@@ -226,3 +252,10 @@ question = "Compared with the first, the second looked:"
 low = "much less natural"
 high = "much more natural"
 """
+
+
+def keep_answer(
+    responses: Responses, record: SessionRecord, answer: Answer, shown: Sequence[Presentation] = ()
+) -> bool:
+    """Store an answer to a trial that the plan knows beforehand."""
+    return record_answer(responses, record, record.plan.trials[answer.trial - 1], answer, shown)

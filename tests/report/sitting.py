@@ -94,7 +94,7 @@ def sit(
             if step.kind != "answer":
                 state = sitting.advanced(state)
                 continue
-            trial = plan.trial(step.trial)
+            trial = state.trial(step.trial)
             reaction = behave(trial, step, rng)
             shown_well = reaction.gap_frames <= 1.5
             if reaction.value is None:
@@ -108,7 +108,7 @@ def sit(
                 )
                 for place, stimulus in zip(PLACES, trial.stimuli, strict=False)
             ]  # fmt: skip
-            record_answer(responses, record, answer, shown)
+            record_answer(responses, record, trial, answer, shown)
             given += 1
         if sitting.current(state).kind == "done":
             record_event(responses, record, "finished")

@@ -29,11 +29,19 @@ def table_of(protocol: Protocol, outlook: Outlook) -> Iterator[str]:
             yield ""
 
 
+def trials_between(fewest: int, most: int) -> str:
+    """How many trials there are; a range where it depends on the responses."""
+    return counted(most, "trial") if fewest == most else f"{fewest} to {counted(most, 'trial')}"
+
+
 def _heading(protocol: Protocol, study: StudySpec) -> str:
     besides = [counted(study.practice, "practice trial")] if study.practice else []
     besides += [counted(study.attention_checks, "attention check")] if study.attention_checks else []
-    trials = ", ".join([counted(protocol.trials_of(study), "trial"), *besides])
-    return f"{study.name}: {study.task}, {' and '.join(study.methods)}; {trials}; frames at {protocol.fps:g} fps"
+    trials = ", ".join([trials_between(protocol.fewest_trials_of(study), protocol.trials_of(study)), *besides])
+    chosen = f"{words}; " if (words := study.procedure.in_words()) else ""
+    return (
+        f"{study.name}: {study.task}, {' and '.join(study.methods)}; {chosen}{trials}; frames at {protocol.fps:g} fps"
+    )
 
 
 def _cells(row: Row) -> tuple[str, ...]:

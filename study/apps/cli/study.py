@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.console import database_option, emit, json_option, library_option, progress, say
-from study.apps.cli.shown import table_of
+from study.apps.cli.shown import table_of, trials_between
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -176,15 +176,16 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
     lines += table_of(checked, found)
     lines += found.problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]
     lines.append(
-        f"A participant sees {counted(found.trials, 'trial')} made of {counted(found.films, 'film')} and takes about "
-        f"{counted(found.minutes, 'minute')}, {found.minutes_at_most} where every answer and every film takes its "
-        "longest; practice, breaks and reading are included."
+        f"A participant sees {trials_between(found.fewest_trials, found.trials)} made of "
+        f"{counted(found.films, 'film')} and takes about {counted(found.minutes, 'minute')}, "
+        f"{found.minutes_at_most} where every answer and every film takes its longest; practice, breaks "
+        "and reading are included."
     )
     lines += [f"Note: {note}" for note in found.notes]
     lines += [f"To do: {note}" for note in notes]
     result: dict[str, Any] = {"protocol": checked.name, "library": opened.name, "problems": found.problems}
     result |= {"notes": [*found.notes, *notes], "minutes": found.minutes, "minutes_at_most": found.minutes_at_most}
-    result |= {"trials": found.trials, "films": found.films, "fps": checked.fps}
+    result |= {"trials": found.trials, "fewest_trials": found.fewest_trials, "films": found.films, "fps": checked.fps}
     result |= {"shown": [asdict(row) for row in found.rows]} | ({"texts": read} if texts else {})
     emit(result, as_json, "\n".join(lines))
     if found.problems:

@@ -299,7 +299,7 @@ class _Player(Desk):
         else:
             self.session, answer = sitting.answered(before, button.name, at - zero_s, shown_well=shown_well)
         first_item = before.steps[before.position - 1].kind != "answer"
-        self.store.answer(answer, self._presentations(step) if first_item else ())
+        self.store.answer(before.trial(step.trial), answer, self._presentations(step) if first_item else ())
         self._answers += 1
         self._faulty += not shown_well
         which = f"trial {step.trial}" + (f" {step.item}" if step.item else "")

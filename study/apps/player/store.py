@@ -25,6 +25,7 @@ from study.experiment.store.databases import patiently
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
 from study.tasks.answer import Answer
+from study.tasks.trial import Trial
 
 
 class Store(Shape):
@@ -33,7 +34,7 @@ class Store(Shape):
     def begin(self) -> None:
         """The participant takes part."""
 
-    def answer(self, answer: Answer, shown: Sequence[Presentation]) -> None:
+    def answer(self, trial: Trial, answer: Answer, shown: Sequence[Presentation]) -> None:
         """Commit an answer, with how its stimuli were shown."""
 
     def form(self, values: Mapping[str, str]) -> None:
@@ -77,10 +78,10 @@ class ResponsesStore:
         for kind, detail in waiting:
             self.event(kind, detail)
 
-    def answer(self, answer: Answer, shown: Sequence[Presentation]) -> None:
+    def answer(self, trial: Trial, answer: Answer, shown: Sequence[Presentation]) -> None:
         """Commit an answer; it is on disk when this returns."""
         record = self._begun()
-        patiently(lambda: record_answer(self._responses, record, answer, shown), self._responses.place)
+        patiently(lambda: record_answer(self._responses, record, trial, answer, shown), self._responses.place)
 
     def form(self, values: Mapping[str, str]) -> None:
         """Commit the form."""

@@ -278,7 +278,7 @@ class Host:
             at = datetime.now(UTC)
             shown = [self._presentation(sitting, message, one) for one in message.shown]
             try:
-                await self.writer.put(answer_rows(sitting.record, answer, shown, at))
+                await self.writer.put(answer_rows(sitting.record, state.trial(answer.trial), answer, shown, at))
             except sa.exc.IntegrityError:
                 # It is there: the database was lost before it could say so, or another server stored it.
                 await self._take_up(sitting)
@@ -304,7 +304,7 @@ class Host:
         return state if step.kind == "answer" and (step.trial, step.item, step.attempt) == key else None
 
     def _presentation(self, sitting: Sitting, message: Answered, shown: Shown) -> Presentation:
-        stimuli = sitting.record.plan.trial(message.trial).stimuli
+        stimuli = sitting.state.trial(message.trial).stimuli
         if shown.slot > len(stimuli):
             raise SessionError(
                 f"Expected one of the {len(stimuli)} films of trial {message.trial}, found {shown.slot}."

@@ -41,29 +41,16 @@ def _film_name(secret: str, place: str) -> str:
 def step_key(session: Session) -> str:
     """The name of a step that is read, the same after a restart of the server."""
     step = sitting.current(session)
-    trial = next((other.trial for other in _near(session)), 0)
+    trial = next((other.trial for other in sitting.near(session)[0]), 0)
     return f"{step.kind}/{step.study}/{trial}"
 
 
 def films_due(session: Session) -> list[Step]:
-    """The steps whose films a participant may load now: those of this trial and of the next, or the example."""
+    """The steps whose films a participant may load now: those of this trial and of what may follow, or the example."""
     step = sitting.current(session)
     due = [step] if step.kind == "instructions" and step.stimulus else []
-    return due + [other for other in _near(session) if other.slot]
-
-
-def _near(session: Session) -> list[Step]:
-    """The steps of the next two trials that there are."""
-    near: list[Step] = []
-    trials: set[tuple[int, int]] = set()
-    for position in range(session.position, len(session.steps)):
-        step = session.steps[position]
-        if step.trial:
-            trials.add((step.trial, step.attempt))
-            if len(trials) > 2:
-                break
-            near.append(step)
-    return near
+    own, ahead = sitting.near(session)
+    return due + [other for other in own if other.slot] + ahead
 
 
 def to_view(session: Session) -> Session:
@@ -97,18 +84,13 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
 
 
 def _trial(session: Session, participant: Participant, film_bytes: int) -> dict[str, Any]:
-    step = sitting.current(session)
-    near = _near(session)
-    own: list[Step] = []
-    ahead: list[Step] = []
-    for other in near:
-        (own if (other.trial, other.attempt) == (step.trial, step.attempt) else ahead).append(other)
+    own, ahead = sitting.near(session)
     question = next(other for other in own if other.kind == "answer")
     return {
         **_asking(session, question),
         "films": [_film(other, participant, film_bytes) for other in own if other.slot],
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
-        "ahead": [_film(other, participant, film_bytes) for other in ahead if other.slot],
+        "ahead": list({(film := _film(other, participant, film_bytes))["url"]: film for other in ahead}.values()),
     }
 
 

@@ -9,11 +9,14 @@ import re
 import types
 import typing
 from collections.abc import Iterator
-from typing import Any, get_args, get_origin
+from dataclasses import MISSING, fields
+from typing import Any, get_args, get_origin, get_type_hints
 
 import annotated_types
 from pydantic.fields import FieldInfo
 
+from study.experiment.procedures.procedure import Settings
+from study.experiment.procedures.registry import PROCEDURES
 from study.experiment.protocol.errors import model_at, parts
 from study.experiment.protocol.whole import Protocol
 
@@ -23,7 +26,8 @@ _WORDS = {int: "whole number", float: "number", str: "text", bool: "true or fals
 
 def key_tables() -> str:
     """Markdown tables of all keys: key, type, unit, default, meaning."""
-    return "\n\n".join(_table(path) for path, _ in parts(Protocol) if not path.endswith(".points"))
+    tables = [_table(path) for path, _ in parts(Protocol) if not path.endswith(".points")]
+    return "\n\n".join([*tables, *(_procedure_table(member) for member in PROCEDURES.values() if fields(member))])
 
 
 def _table(path: str) -> str:
@@ -31,16 +35,37 @@ def _table(path: str) -> str:
     if model is None:
         raise AssertionError(f"{path} comes from the model itself")
     title = f"`[[{path}]]`" if path in _REPEATED else f"`[{path}]`"
-    lines = [f"### {title if path else 'At the top of the file'}", ""]
-    lines += ["| key | type | unit | default | meaning |", "|---|---|---|---|---|"]
-    for name, field in model.model_fields.items():
-        cells = (f"`{name}`", _type(field), *_unit_and_words(field))
-        lines.append(f"| {cells[0]} | {cells[1]} | {cells[2]} | {_default(field)} | {cells[3]} |")
-    return "\n".join(lines)
+    rows = [_row(name, _type(field), _default(field), field.description) for name, field in model.model_fields.items()]
+    return "\n".join([f"### {title if path else 'At the top of the file'}", *_HEAD, *rows])
 
 
-def _unit_and_words(field: FieldInfo) -> tuple[str, str]:
-    words = field.description or ""
+def _procedure_table(member: type[Settings]) -> str:
+    hints = get_type_hints(member)
+    rows = [
+        _row(
+            one.name,
+            _annotation(hints[one.name]),
+            "required" if one.default is MISSING else f"`{_toml(one.default)}`",
+            one.metadata["words"],
+        )
+        for one in fields(member)
+    ]
+    return "\n".join([f'### `[studies.procedure]` with `name = "{member.name}"`', *_HEAD, *rows])
+
+
+_HEAD = ("", "| key | type | unit | default | meaning |", "|---|---|---|---|---|")
+
+
+def _row(name: str, kind: str, default: str, description: str | None) -> str:
+    unit, words = _unit_and_words(description or "")
+    return f"| `{name}` | {kind} | {unit} | {default} | {words} |"
+
+
+def _toml(value: object) -> str:
+    return str(list(value)) if isinstance(value, tuple) else str(value)
+
+
+def _unit_and_words(words: str) -> tuple[str, str]:
     if found := re.search(r"\s*\[([a-z ]+)\]$", words):
         return found[1], words[: found.start()]
     return "", words

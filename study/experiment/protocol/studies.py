@@ -6,11 +6,14 @@ Pydantic models and what keeps one study consistent; `protocol_checks` looks at 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
+from study.experiment.procedures.constant_stimuli import Constant
+from study.experiment.procedures.procedure import Settings, SettingsError
+from study.experiment.procedures.registry import settings_of
 from study.experiment.protocol.errors import KeyMismatchError
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
@@ -48,6 +51,18 @@ class OneHop(Part):
     conditions: int = Field(default=100, ge=1, le=10000, description="Transitions drawn for the weight of Eq. 5.")
 
 
+def _procedure(table: object) -> Settings:
+    """The settings of a procedure; what is wrong with them is told at their key."""
+    if isinstance(table, Settings):
+        return table
+    if not isinstance(table, Mapping):
+        raise KeyMismatchError(f"expected a table of keys, found {table!r}; write [studies.procedure] and its keys")
+    try:
+        return settings_of(table)
+    except SettingsError as error:
+        raise KeyMismatchError(str(error), *([error.key] if error.key else [])) from None
+
+
 class StudySpec(Part):
     """One study of the sitting: a task over transitions."""
 
@@ -82,6 +97,10 @@ class StudySpec(Part):
         "which are 10 frames at 30 fps. [frames]",
     )
     one_hop: OneHop = Field(default=OneHop(), description="How the method `one-hop` finds its hops.")
+    procedure: Annotated[Settings, PlainValidator(_procedure)] = Field(
+        default=Constant(),
+        description="How the trials are chosen: `constant` (all of them beforehand), or `staircase` (by the answers).",
+    )
     order: Order = Field(
         default="random",
         description="Order within pairs: `both` shows each pair in both, `random` draws, `balanced` draws half each "
@@ -113,6 +132,25 @@ class StudySpec(Part):
     )
     points: Points = Field(default=Points(), description="Conditions for this study's transition points.")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _with_differences(cls, table: Any) -> Any:
+        """A procedure that finds its differences says which ones may come."""
+        if not isinstance(table, Mapping) or not isinstance(table.get("procedure"), Mapping):
+            return table
+        try:
+            settings = settings_of(table["procedure"])
+        except SettingsError:  # told where the key itself is checked
+            return table
+        if (own := settings.differences()) is None:
+            return table
+        if "differences_frames" in table:
+            raise KeyMismatchError(
+                f"expected no differences_frames with {settings.name!r}, which finds its own; remove it",
+                "differences_frames",
+            )
+        return {**table, "procedure": settings, "differences_frames": own}
+
     @model_validator(mode="after")
     def _fits_task(self) -> Self:
         _check_task(self)
@@ -141,6 +179,8 @@ class StudySpec(Part):
 def _check_task(study: StudySpec) -> None:
     """Refuse what doesn't fit between the task and the other keys of a study."""
     who = f"the {study.task} study {study.name!r}"
+    for key, words in study.procedure.problems(study):
+        raise KeyMismatchError(words, key)
     if study.task == "same-different":
         if not study.differences_frames:
             raise KeyMismatchError(f"expected differences_frames in {who}, found none; write for example [-5, 0, 5]")

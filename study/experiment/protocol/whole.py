@@ -125,13 +125,20 @@ class Protocol(Part):
         return tuple(transition for transition in self.transitions if transition.name not in for_practice)
 
     def trials_of(self, study: StudySpec) -> int:
-        """How many trials of a study a participant sees, practice and attention checks apart."""
+        """How many trials of a study a participant sees at most, practice and attention checks apart."""
         shown = len(self.transitions_of(study))
+        if (own := study.procedure.trials(shown, study.repeats)) is not None:
+            return own[1]
         if study.task == "same-different":
             shown *= len(study.differences_frames)
         if not study.paired:
             return shown * len(study.methods) * study.repeats
         return shown * study.repeats * (2 if study.order == "both" else 1)
+
+    def fewest_trials_of(self, study: StudySpec) -> int:
+        """How many trials of a study a participant sees at least."""
+        own = study.procedure.trials(len(self.transitions_of(study)), study.repeats)
+        return self.trials_of(study) if own is None else own[0]
 
     def fixed_frames_of(self, study: StudySpec) -> int:
         """The blend length of the method `fixed` in a study: its own, or 0.33 s (2004)."""

@@ -50,7 +50,7 @@ class Row:
     lengths_s
         The same in seconds.
     trials
-        Of a participant, practice and attention checks apart; None for practice.
+        Of a participant at most, practice and attention checks apart; None for practice.
     films, film_s
         How many different films, and the shortest and the longest of them in seconds.
     notes
@@ -78,12 +78,14 @@ class Outlook:
 
     `films` are different films of the whole protocol; `minutes` count films, gaps, answers, pauses, breaks, practice,
     attention checks, the form and reading; `minutes_at_most` with every answer and every film at its longest.
-    `film_times` are what they rest on, for the texts that speak of minutes.
+    `trials` are the most that there may be, `fewest_trials` the fewest. `film_times` are what they rest on, for the
+    texts that speak of minutes.
     """
 
     rows: tuple[Row, ...]
     problems: tuple[str, ...]
     notes: tuple[str, ...]
+    fewest_trials: int
     trials: int
     films: int
     minutes: int
@@ -101,6 +103,7 @@ def look_ahead(protocol: Protocol, library: Library) -> Outlook:
         tuple(_row(protocol, each) for each in planned),
         tuple(problems),
         tuple(_too_alike(protocol, planned)),
+        sum(protocol.fewest_trials_of(study) for study in protocol.studies),
         sum(protocol.trials_of(study) for study in protocol.studies),
         len(films),
         usual,

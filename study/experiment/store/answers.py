@@ -21,6 +21,7 @@ from study.experiment.store.responses import Clock, Responses, rows_of, utc_now
 from study.experiment.store.sessions import SessionRecord, find_session
 from study.experiment.store.tables import answers, events, form_values, presentations
 from study.tasks.answer import Answer, answer_columns
+from study.tasks.trial import Trial
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ def stored_answers(responses: Responses, session_id: int) -> tuple[Answer, ...]:
 def record_answer(
     responses: Responses,
     record: SessionRecord,
+    trial: Trial,
     answer: Answer,
     shown: Sequence[Presentation] = (),
     *,
@@ -86,7 +88,7 @@ def record_answer(
     """
     try:
         with responses.engine.begin() as connection:
-            insert_rows(connection, answer_rows(record, answer, shown, clock()))
+            insert_rows(connection, answer_rows(record, trial, answer, shown, clock()))
     except sa.exc.IntegrityError as error:
         if answer in stored_answers(responses, record.id):
             return False
@@ -104,9 +106,11 @@ def record_answer(
 Row = tuple[sa.Insert, dict[str, Any]]
 
 
-def answer_rows(record: SessionRecord, answer: Answer, shown: Sequence[Presentation], at: datetime) -> list[Row]:
+def answer_rows(
+    record: SessionRecord, trial: Trial, answer: Answer, shown: Sequence[Presentation], at: datetime
+) -> list[Row]:
     """The rows of one answer, for a transaction of the caller's (`insert_rows`)."""
-    values = answer_columns(record.plan.trial(answer.trial), answer)
+    values = answer_columns(trial, answer)
     presented = [(_INSERT_PRESENTATION, {"session_id": record.id, "at": at, **_presentation_values(o)}) for o in shown]
     return [(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values}), *presented]
 

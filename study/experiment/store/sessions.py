@@ -52,8 +52,7 @@ def refuse_other_stimuli(responses: Responses, identifiers: Collection[str]) -> 
     """Refuse a database whose sessions show stimuli that are not among these: their answers would be about nothing."""
     known = set(identifiers)
     for record in all_sessions(responses):
-        shown_there = {name for trial in record.plan.trials for name in trial.stimuli}
-        if missing := shown_there - known:
+        if missing := record.plan.stimuli - known:
             raise SessionError(
                 f"{responses.place}: expected sessions with the stimuli of this results folder, found that of "
                 f"{record.participant!r}, which shows others ({len(missing)}, made from other motions, or by another "

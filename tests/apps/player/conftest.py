@@ -17,6 +17,7 @@ from study.experiment.stimuli.stimulus import StimulusSet
 from study.experiment.store.answers import Presentation
 from study.motion.library import open_library
 from study.tasks.answer import Answer
+from study.tasks.trial import Trial
 
 SMALL = """\
 name = "small"
@@ -130,7 +131,8 @@ class ListStore:
     def begin(self) -> None:
         self.log.append(("begin", None))
 
-    def answer(self, answer: Answer, shown: Sequence[Presentation]) -> None:
+    def answer(self, trial: Trial, answer: Answer, shown: Sequence[Presentation]) -> None:
+        assert trial.trial == answer.trial
         self.log.append(("answer", answer))
         self.log.extend(("shown", one) for one in shown)
 

@@ -44,7 +44,7 @@ def test_a_session_stores_every_answer_with_its_time_and_how_it_was_shown(make_s
     shown = store.all("shown")
     assert len(shown) == 12
     assert all(one.shown_well and one.method == "swap" for one in shown)
-    trial = small.plan.trial(1)
+    trial = small.plan.trials[0]
     assert [(one.place, one.stimulus) for one in shown[:2]] == [
         ("first", trial.stimuli[0]),
         ("second", trial.stimuli[1]),
@@ -61,7 +61,7 @@ def test_stimuli_of_30_fps_hold_each_frame_for_two_flips_and_gaps_last_as_writte
     sit(small, window, store)
     kinds = [kind for kind, _, _ in window.shown]
     start = kinds.index("frame")
-    trial = small.plan.trial(1)
+    trial = small.plan.trials[0]
     first, second = (len(small.stimuli.stimulus(one).positions) for one in trial.stimuli)
     frames = [thing[1] for kind, thing, _ in window.shown[start:] if kind == "frame"]
     assert frames[: 2 * first] == [frame for frame in range(first) for _ in range(2)]
@@ -356,7 +356,7 @@ def test_an_example_plays_and_counts_for_nothing(make_small: Any, store: Any) ->
     assert len(store.all("shown")) == 12
     frames = sum(kind == "frame" for kind, _, _ in window.shown)
     shown = sum(one.frames_presented for one in store.all("shown"))
-    example = len(small.stimuli.stimulus(small.plan.trial(1).stimuli[0]).positions)
+    example = len(small.stimuli.stimulus(small.plan.trials[0].stimuli[0]).positions)
     assert frames == 2 * (shown + example)
 
 

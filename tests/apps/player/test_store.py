@@ -49,7 +49,7 @@ def test_answers_outlive_a_killed_postgresql(
                 name = f"p{number:05d}"
                 store = participant(responses, small, name)
                 for trial in draw_plan(small.protocol, small.stimuli.pairs, name).trials:
-                    store.answer(Answer(trial.trial, "", 1, "same", 1.0), ())
+                    store.answer(trial, Answer(trial.trial, "", 1, "same", 1.0), ())
                     kept.append((name, trial.trial))
                 number += 1
 

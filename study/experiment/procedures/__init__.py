@@ -1,0 +1,1 @@
+"""Procedures: which trial comes next, given the answers so far."""

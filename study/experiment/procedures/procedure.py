@@ -1,0 +1,176 @@
+"""What a procedure is: the choice of a study's next trial, as a pure fold over the answers so far.
+
+`Settings` are what a protocol says of one (`[studies.procedure]`), a frozen dataclass whose fields are its keys. A plan
+draws with them: trials that are known beforehand, or a `Course`, which is all that has to be stored to find the trials
+again from the answers. A `Procedure` says which trial comes next; it keeps no state, so that resuming a session is the
+same as running it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Iterator, Sequence
+from dataclasses import MISSING, dataclass, field
+from typing import Any, ClassVar
+from typing import Protocol as Shape
+
+import numpy as np
+
+from study.tasks.answer import Answer
+from study.tasks.trial import Pair, Trial
+
+Members = tuple[int, ...]
+"""Which of a pair's stimuli each slot of a trial shows."""
+
+
+def setting(words: str, default: Any = MISSING) -> Any:
+    """A field of settings, with the words that explain it to who writes a protocol; `[unit]` may stand at their end."""
+    if default is MISSING:
+        return field(metadata={"words": words})
+    return field(default=default, metadata={"words": words})
+
+
+class SettingsError(ValueError):
+    """What is wrong with a setting, and the key of it; empty where it is all of them."""
+
+    def __init__(self, key: str, words: str) -> None:
+        self.key = key
+        super().__init__(words)
+
+
+class Asked(Shape):
+    """What a procedure reads of a study."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def task(self) -> str:
+        """The task's name."""
+
+    @property
+    def order(self) -> str:
+        """How the order within pairs is found."""
+
+    @property
+    def attention_checks(self) -> int:
+        """Trials that ask for a stated answer."""
+
+
+class Procedure(Shape):
+    """Which trial of a study comes next.
+
+    All methods take one answer for each trial that is finished (of a trial that was shown again, the last one), in the
+    order in which they were finished.
+    """
+
+    def next(self, answers: Sequence[Answer]) -> tuple[Trial, ...]:
+        """The trials that come next whatever is answered to them; none where the study is over."""
+
+    def candidates(self, answers: Sequence[Answer]) -> tuple[Trial, ...]:
+        """The trials of which one may follow the next, so that films can be loaded ahead."""
+
+    def progress(self, answers: Sequence[Answer]) -> tuple[int, int]:
+        """How far the study is, and how far it goes: in trials, of the most that there may be."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What a plan gives to a procedure.
+
+    Parameters
+    ----------
+    study
+        Its name.
+    pairs
+        All that its trials may show, in the protocol's order, which matters: a draw counts on it.
+    order
+        Of the stimuli in a pair: `both`, `random`, `balanced`, `by-group`; or of stimuli that are shown one by one:
+        `random`, `by-group`.
+    repeats
+        How often the whole set is shown.
+    group
+        The participant's, for `by-group`.
+    """
+
+    study: str
+    pairs: tuple[Pair, ...]
+    order: str
+    repeats: int
+    group: int
+
+
+@dataclass(frozen=True)
+class Course:
+    """What a plan keeps of a study whose trials depend on the answers.
+
+    Parameters
+    ----------
+    study
+        Its name.
+    first, most
+        Number of its first trial, and how many numbers are kept for it.
+    settings
+        Of the procedure.
+    pairs
+        All that may be shown.
+    arrangements
+        Which member of a pair each slot shows: a trial draws one of these.
+    repeats
+        How often the whole set is shown.
+    """
+
+    study: str
+    first: int
+    most: int
+    settings: Settings
+    pairs: tuple[Pair, ...]
+    arrangements: tuple[Members, ...]
+    repeats: int
+
+
+@dataclass(frozen=True)
+class Settings(ABC):
+    """What the settings of every procedure answer; subclasses are frozen dataclasses that refuse bad values.
+
+    `name` is what a protocol calls the procedure, `title` what a Methods section does, `sources` are its references.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    sources: ClassVar[tuple[str, ...]] = ()
+
+    def problems(self, asked: Asked) -> Iterator[tuple[str, str]]:
+        """What does not fit between the procedure and other keys of its study: the key, and what
+        was expected, found, and to do.
+        """
+        del asked
+        yield from ()
+
+    def differences(self) -> tuple[int, ...] | None:
+        """The differences in frames that may come, where the procedure finds them; None where the protocol does."""
+        return None
+
+    def trials(self, transitions: int, repeats: int) -> tuple[int, int] | None:
+        """The fewest and the most trials of a study; None where they are known beforehand."""
+        del transitions, repeats
+        return None
+
+    def in_words(self) -> str:
+        """What there is to say of it beside its title; empty for nothing."""
+        return ""
+
+    def drawn(self, draw: Draw, rng: np.random.Generator) -> list[Trial]:
+        """The trials that are known beforehand, drawn with the plan's own generator; the plan numbers them."""
+        del draw, rng
+        return []
+
+    def course(self, draw: Draw, first: int) -> Course | None:
+        """What a plan keeps where trials depend on the answers, numbered from `first` on; else None."""
+        del draw, first
+        return None
+
+    def begun(self, course: Course, rng: np.random.Generator) -> Procedure:
+        """The procedure of a stored course; `rng` is the same whenever it is begun."""
+        raise NotImplementedError(f"{self.name} draws its trials beforehand")
