@@ -123,7 +123,7 @@ def test_the_fixed_blend_takes_a_third_of_a_second_at_any_rate(toy_library: ToyL
     (fixed,) = [record for record in made.records if record.method == "fixed"]
     assert fixed.blend_frames == frames
     own = parse_protocol(text + "fixed_frames = 7\n")
-    assert own.fixed_frames_of(own.studies[0]) == 7
+    assert own.methods_of(own.studies[0])["fixed"].in_words(fps) == "blends of 7 frames"
 
 
 @pytest.mark.mocap

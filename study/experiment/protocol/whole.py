@@ -140,12 +140,6 @@ class Protocol(Part):
         own = study.procedure.trials(len(self.transitions_of(study)), study.repeats)
         return self.trials_of(study) if own is None else own[0]
 
-    def fixed_frames_of(self, study: StudySpec) -> int:
-        """The blend length of the method `fixed` in a study: its own, or 0.33 s (2004)."""
-        from study.transitions.blend_length import FIXED_S, default_frames
-
-        return study.fixed_frames or default_frames(self.fps, FIXED_S)
-
     @property
     def method_names(self) -> tuple[str, ...]:
         """The methods that studies can name: those built in, and the protocol's own."""
@@ -155,7 +149,7 @@ class Protocol(Part):
         """The methods of a study by name, with their settings: the method's own, the study's, those of `[stimuli]`."""
         hop = study.one_hop.model_dump()
         settings = {key: getattr(self.stimuli, key) for key in ("weight", "clean_feet")}
-        settings |= {"hop_weight": hop.pop("weight"), **hop, "fixed_frames": self.fixed_frames_of(study)}
+        settings |= {"hop_weight": hop.pop("weight"), **hop, "fixed_frames": study.fixed_frames}
         own = {one.name: one for one in self.methods}
         return {
             name: own[name].method(settings) if name in own else METHODS[name].with_settings(settings)

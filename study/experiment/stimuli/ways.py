@@ -6,24 +6,20 @@ such as the hop of a one-hop transition or the weight of its stays, is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from study.errors import MotionError, MotionFileError, StimulusError, TransitionError
 from study.experiment.chance import generator
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.motion.clip import Clip, retarget
-from study.transitions.methods.method import Method, Place, Way
+from study.transitions.methods.method import Method, Motions, Place, Way
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from study.experiment.stimuli.points import Settled
     from study.motion.library import Library
-
-Kept = TypeVar("Kept")
 
 
 class Ways:
@@ -57,52 +53,20 @@ class Ways:
 
     def place(self, study: StudySpec, settled: Settled) -> Place:
         """Where a transition of a study is made."""
-        source, destination = settled.source, settled.destination
-        return Place(
-            settled.transition.name,
-            (source.name, destination.name),
-            source.clip,
-            destination.clip,
-            settled.start_frame,
-            settled.end_frame,
-            _Motions(self.protocol, study, self.library, self._kept),
+        protocol, source, destination = self.protocol, settled.source, settled.destination
+        shown = (name for one in protocol.transitions_of(study) for name in (one.source, one.destination))
+        motions = Motions(
+            tuple(dict.fromkeys(shown)),
+            partial(self._clip, study),
+            protocol.path_of,
+            partial(generator, protocol.seed),
+            self._kept,
         )
+        names, points = (source.name, destination.name), (settled.start_frame, settled.end_frame)
+        return Place(settled.transition.name, names, source.clip, destination.clip, *points, motions)
 
-
-@dataclass(frozen=True, eq=False)
-class _Motions:
-    """What a make may ask for: other motions, files, chance, and what it found before."""
-
-    protocol: Protocol
-    study: StudySpec
-    library: Library
-    kept: dict[Hashable, Any]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The motions of the study's transitions."""
-        shown = self.protocol.transitions_of(self.study)
-        return tuple(dict.fromkeys(name for one in shown for name in (one.source, one.destination)))
-
-    def clip(self, name: str, like: Clip) -> Clip:
-        """A motion of the library."""
+    def _clip(self, study: StudySpec, name: str, like: Clip) -> Clip:
         try:
-            clip = self.once(("clip", name), lambda: replace(self.library.clip(name, fps=like.fps), name=name))
-            return retarget(clip, like.skeleton)
+            return retarget(replace(self.library.clip(name, fps=like.fps), name=name), like.skeleton)
         except MotionError as error:
-            raise StimulusError(f"study {self.study.name!r}, hop {name!r}: {error}") from error
-
-    def path(self, file: str) -> Path:
-        """A file as the protocol names it: from the folder of the protocol's file."""
-        return self.protocol.path_of(file)
-
-    def generator(self, purpose: str) -> np.random.Generator:
-        """A generator of the protocol's seed."""
-        return generator(self.protocol.seed, purpose)
-
-    def once(self, key: Hashable, find: Callable[[], Kept]) -> Kept:
-        """What was found before, or is found now."""
-        if key not in self.kept:
-            self.kept[key] = find()
-        found: Kept = self.kept[key]
-        return found
+            raise StimulusError(f"study {study.name!r}, hop {name!r}: {error}") from error

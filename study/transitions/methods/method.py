@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -50,42 +50,34 @@ def required(words: str) -> Any:
     return field(metadata={"words": words})
 
 
-class Motions(Protocol):
-    """What a make may ask for beside the two clips that it joins."""
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """What a make may ask for beside the two clips that it joins.
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The motions of the study."""
+    `names` are the motions of the study. `clip` gives a motion of the library at the frame rate and on the skeleton of
+    another, `path` the place of a file that the protocol names, `generator` chance that depends on the protocol's seed
+    and on a purpose alone. What takes long to find is `kept`.
+    """
 
-    def clip(self, name: str, like: Clip) -> Clip:
-        """A motion of the library at the frame rate and on the skeleton of another."""
-
-    def path(self, file: str) -> Path:
-        """Where a file is that the protocol names."""
-
-    def generator(self, purpose: str) -> np.random.Generator:
-        """A generator that depends on the protocol's seed and on the purpose alone."""
+    names: tuple[str, ...]
+    clip: Callable[[str, Clip], Clip]
+    path: Callable[[str], Path]
+    generator: Callable[[str], np.random.Generator]
+    kept: dict[Hashable, Any]
 
     def once(self, key: Hashable, find: Callable[[], Kept]) -> Kept:
         """What was found before under a key, else what `find` returns, which is kept."""
+        if key not in self.kept:
+            self.kept[key] = find()
+        found: Kept = self.kept[key]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a transition is made.
+    """Where a transition is made: its name in the protocol, the two motions by name and as clips of one rig and rate.
 
-    Parameters
-    ----------
-    transition
-        Its name in the protocol.
-    names
-        The motions' names in the library.
-    source, destination
-        Clips of one rig at one frame rate.
-    start_frame, end_frame
-        First blended frame of the source, last blended frame of the destination.
-    motions
-        Other motions and files.
+    The blend takes the source from `start_frame` on and the destination up to `end_frame`.
     """
 
     transition: str
@@ -101,16 +93,9 @@ class Place:
 class Room:
     """Frames that a method needs around its points, besides entry and exit.
 
-    Parameters
-    ----------
-    blend
-        From the start point on and up to the end point, at least.
-    search
-        The same, where the motions have them, so that long blends can be found.
-    entry
-        Before the start point, at least.
-    stay, after
-        Beyond the blend in both motions, and beyond the exit in the destination.
+    `blend` from the start point on and up to the end point; `search` the same where the motions have as many, so that
+    long blends can be found. `entry` before the start point. `stay` beyond the blend in both motions, and `after`
+    beyond the exit in the destination.
     """
 
     blend: int = 1
@@ -143,9 +128,9 @@ class Way(ABC):
         """Frames from the start point until the destination plays alone."""
 
     @property
-    @abstractmethod
     def blend_frames(self) -> int:
         """The blend length, in frames; 0 for a cut."""
+        return self.frames
 
     @property
     def lead(self) -> int:
@@ -205,14 +190,8 @@ class Points(MethodPart):
     ) -> tuple[int, int]:
         """The start and the end frame, for points of the method's own.
 
-        Parameters
-        ----------
-        source, destination
-            Clips of one rig at one frame rate.
-        windows
-            The frames of each clip that may be chosen, as slices count them.
-        shift
-            Where both clips show one motion, the destination's frame number of the source's frame 0; else None.
+        `windows` are the frames of each clip that may be chosen, as slices count them. Where both clips show one
+        motion, `shift` is the destination's frame number of the source's frame 0.
         """
         raise NotImplementedError(f"{self.name} has no points of its own")
 
@@ -231,13 +210,7 @@ class Length(MethodPart):
 
     @abstractmethod
     def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> BlendLength | WarpLength:
-        """The length at two points.
-
-        Raises
-        ------
-        TransitionError
-            Where the clips do not supply it.
-        """
+        """The length at two points; `TransitionError` where the clips do not supply it."""
 
     def room(self, fps: float, longest_frames: int | None) -> Room:
         """What it needs around its points, where no blend beyond a length is wanted."""
@@ -265,10 +238,7 @@ class Make(MethodPart):
     def way(self, place: Place, windows: tuple[int, int]) -> Way:
         """Decide how a transition is made over so many frames of the source and of the destination.
 
-        Raises
-        ------
-        TransitionError, MotionError
-            Where it can't be made.
+        `TransitionError` or `MotionError` where it can't be made.
         """
 
     def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from study.transitions.methods.lengths.none import NoLength
-from study.transitions.methods.lengths.one_window import Fixed, Geodesic, Velocity
-from study.transitions.methods.lengths.two_windows import Timewarp
+from study.transitions.methods.lengths.wang2004 import Fixed, Geodesic, Timewarp, Velocity
 from study.transitions.methods.makes.blends import Cut, Slerp, Warped
 from study.transitions.methods.makes.given import Given
 from study.transitions.methods.makes.one_hop import OneHop

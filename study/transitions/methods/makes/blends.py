@@ -21,11 +21,6 @@ class Blended(Way):
         """The longer of the two windows."""
         return max(self.windows)
 
-    @property
-    def blend_frames(self) -> int:
-        """The longer of the two windows."""
-        return max(self.windows)
-
     def made(self, place: Place) -> Made:
         """Cut, blend, or warp and blend; then plant the feet."""
         from study.transitions.blending import blend, cut

@@ -55,11 +55,6 @@ class Read(Way):
         return self.stop - self.start
 
     @property
-    def blend_frames(self) -> int:
-        """Frames of the blend."""
-        return self.frames
-
-    @property
     def note(self) -> str:
         """What was found and done."""
         return self.told

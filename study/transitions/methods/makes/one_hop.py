@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from annotated_types import Ge, Le
 
 from study.errors import TransitionError
-from study.transitions.methods.lengths.one_window import Fixed
+from study.transitions.methods.lengths.wang2004 import Fixed
 from study.transitions.methods.makes.blends import Blended, Blending
 from study.transitions.methods.method import SHOEMAKE_1985, Length, Made, Place, Room, Way, setting
 
@@ -33,24 +33,10 @@ _SOURCE, _DESTINATION = " (source)", " (destination)"
 class Hop(Way):
     """A one-hop transition between two points.
 
-    Parameters
-    ----------
-    name
-        The hop's motion.
-    frame
-        Its frame at the start of the first blend.
-    stay_source, stay_hop
-        Frames to wait before each blend.
-    direct
-        Whether it is the direct transition itself.
-    hop_blend_frames
-        Frames of each blend.
-    cost, direct_cost
-        Eq. 2 and the distance of the direct transition, square metres.
-    weight
-        Cost a frame of stay, square metres.
-    curve, clean_feet
-        How the blends are made.
+    `frame` is that of the motion `name` at the start of the first blend; `stay_source` and `stay_hop` are the frames
+    to wait before each blend of `hop_blend_frames`. `direct` says whether it is the direct transition itself. Costs
+    are Eq. 2 and the distance of the direct transition, `weight` the cost of a frame of stay, all in square metres.
+    `curve` and `clean_feet` say how the blends are made.
     """
 
     name: str
