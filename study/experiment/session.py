@@ -140,8 +140,8 @@ def near(session: Session) -> tuple[list[Step], list[Step]]:
     if own and not (after and after[0].study == own[0].study):
         study, folded = own[0].study, session.folded
         candidates = folded.procedures[study].candidates(folded.given[study])
-        may_come = [step for one in candidates for step in trial_steps(session.protocol, one, 1, frozenset())]
-        after = may_come or after
+        may_come = [trial_steps(session.protocol, one, 1, frozenset()) for one in candidates if one is not None]
+        after = [*(step for steps in may_come for step in steps), *(after if None in candidates else ())]
     return own, [step for step in after if step.slot]
 
 

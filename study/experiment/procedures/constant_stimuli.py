@@ -39,9 +39,9 @@ class ConstantStimuli:
         done = {answer.trial for answer in answers}
         return tuple(trial for trial in self.trials if trial.trial not in done)
 
-    def candidates(self, answers: Sequence[Answer]) -> tuple[Trial, ...]:
-        """The one trial that follows the next."""
-        return self.next(answers)[1:2]
+    def candidates(self, answers: Sequence[Answer]) -> tuple[Trial | None, ...]:
+        """The one trial that follows the next; None where that is the last."""
+        return self.next(answers)[1:2] or (None,)
 
     def progress(self, answers: Sequence[Answer]) -> tuple[int, int]:
         """Trials finished and trials in all."""

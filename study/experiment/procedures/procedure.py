@@ -68,8 +68,8 @@ class Procedure(Shape):
     def next(self, answers: Sequence[Answer]) -> tuple[Trial, ...]:
         """The trials that come next whatever is answered to them; none where the study is over."""
 
-    def candidates(self, answers: Sequence[Answer]) -> tuple[Trial, ...]:
-        """The trials of which one may follow the next, so that films can be loaded ahead."""
+    def candidates(self, answers: Sequence[Answer]) -> tuple[Trial | None, ...]:
+        """The trials of which one may follow the next, for films to be loaded ahead; None where the study may end."""
 
     def progress(self, answers: Sequence[Answer]) -> tuple[int, int]:
         """How far the study is, and how far it goes: in trials, of the most that there may be."""

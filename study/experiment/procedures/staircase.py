@@ -200,14 +200,14 @@ class Staircases:
         """The next trial; none once all staircases have stopped."""
         return self._trials(self._tracks(answers), len(answers))
 
-    def candidates(self, answers: Sequence[Answer]) -> tuple[Trial, ...]:
+    def candidates(self, answers: Sequence[Answer]) -> tuple[Trial | None, ...]:
         """The trials that may follow the next one: after a right answer, a wrong one, and none."""
         tracks, number = self._tracks(answers), len(answers)
         if not self._running(tracks):
-            return ()
+            return (None,)
         key, _ = self._due(tracks, number)
         later = (self._trials(self._moved(tracks, key, right), number + 1) for right in (True, False, None))
-        return tuple(dict.fromkeys(trial for trials in later for trial in trials))
+        return tuple(dict.fromkeys(trials[0] if trials else None for trials in later))
 
     def progress(self, answers: Sequence[Answer]) -> tuple[int, int]:
         """Trials, of the most that there may be; what a staircase did not need counts as done once it has stopped."""

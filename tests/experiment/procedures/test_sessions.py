@@ -124,7 +124,7 @@ def test_all_stimuli_that_come_were_named_ahead() -> None:
             own, after = near(state)
             assert {one.trial for one in own} == {step.trial}
             ahead = {(one.slot, one.trial, one.stimulus) for one in (*own, *after) if one.slot}
-            assert len({one.trial for one in after}) <= 1
+            assert len({one.trial for one in after}) <= 2
             assert len(after) <= 6
 
 

@@ -106,7 +106,8 @@ def test_candidates_name_the_trial_that_comes(settings: Staircase) -> None:
         candidates = procedure.candidates(answers[:place])
         assert trials[place + 1] in candidates
         assert len(candidates) <= 3
-    assert procedure.candidates(answers) == ()
+    assert None in procedure.candidates(answers[:-1])
+    assert procedure.candidates(answers) == (None,)
 
 
 @pytest.mark.parametrize("seed", range(8))
