@@ -14,6 +14,7 @@ from walking import (
     QUESTION,
     ROLES,
     SHORT,
+    STAIRCASES,
     answers,
     check_frames,
     details,
@@ -25,8 +26,12 @@ from walking import (
     to_question,
 )
 
+from study.experiment.session import advanced, current, open_session
+from study.experiment.store.answers import stored_answers
 from study.experiment.store.frames import answers_frame
+from study.experiment.store.sessions import all_sessions
 from study.experiment.store.tables import presentations
+from study.tasks.trial import PLACES
 
 pytestmark = pytest.mark.gl
 
@@ -76,6 +81,34 @@ def test_reloads_lose_nothing(make_site, make_tab):
     table = answers(site)
     assert len(table) == TRIALS
     assert not table.duplicated(["trial", "item"]).any()
+
+
+def test_staircases_go_on_with_the_trial_that_was_due(make_site, make_tab):
+    """The page is loaded again, the server started again; every trial is the one that the responses before led to."""
+    site, tab = make_site(STAIRCASES), make_tab()
+    tab.open(site.address)
+    for number in range(6):
+        to_question(tab)
+        press(tab, which=int(number % 3 != 0))
+        eventually(lambda number=number: len(answers(site, all_attempts=True)) > number)
+        if number == 1:
+            tab.reload()
+        if number == 3:
+            site.stop()
+            site.start()
+    go_on(tab)
+    (record,) = all_sessions(site.responses)
+    given = stored_answers(site.responses, record.id)
+    shown = {(row["trial"], row["attempt"], row["place"]): row["stimulus"] for row in details(site)}
+    for place, answer in enumerate(given):
+        state = open_session(site.host.protocol, record.plan, given[:place], passed=("debrief",))
+        while current(state).kind != "answer":
+            state = advanced(state)
+        assert (current(state).trial, current(state).attempt) == (answer.trial, answer.attempt)
+        for name, stimulus in zip(PLACES, state.trial(answer.trial).stimuli, strict=False):
+            assert shown[answer.trial, answer.attempt, name] == stimulus
+    assert current(open_session(site.host.protocol, record.plan, given, passed=("debrief",))).kind == "done"
+    assert len(set(answers(site)["difference_frames"])) > 2
 
 
 def test_a_restarted_server_gets_the_answer_that_waited(make_site, make_tab):

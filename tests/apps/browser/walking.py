@@ -73,6 +73,22 @@ question = "How noticeable was the passage?"
 """
 )
 
+STAIRCASES = (
+    SHORT.replace('differences_frames = [-2, 0]\norder = "both"\n', "")
+    + """
+[studies.procedure]
+name = "staircase"
+start_frames = 3
+most_frames = 4
+steps_frames = [2, 1]
+side = "longer"
+reversals = 3
+averaged = 2
+most_trials = 10
+catch_every = 4
+"""
+)
+
 # For what happens when the time to answer is over.
 HURRIED = SHORT.replace("answer_s = 20.0", "answer_s = 3.0")
 PATIENT = PROTOCOL.replace("answer_s = 3.0", "answer_s = 20.0")
@@ -96,10 +112,10 @@ LOOK = """(() => {
 })()"""
 
 
-def press(tab, keys=True):
+def press(tab, keys=True, which=0):
     """Answer the question that is asked, by key or by button, and wait until it is gone; False where it was gone."""
     asked = tab.run(
-        "(() => { const b = document.querySelector('button.answer:not(:disabled)'); if (!b) return null;"
+        f"(() => {{ const b = document.querySelectorAll('button.answer:not(:disabled)')[{which}]; if (!b) return null;"
         " b.dataset.mark = 'x'; return [b.innerText.split('\\n')[0], b.getAttribute('aria-keyshortcuts')]; })()"
     )
     if asked is None:
