@@ -15,6 +15,8 @@ import pytest
 from playing import Playing
 
 from study.experiment.plan import draw_plan
+from study.experiment.protocol.whole import load_protocol
+from study.experiment.session import advanced, current, open_session
 from study.experiment.store.answers import has_event, stored_answers
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
@@ -166,6 +168,45 @@ def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, se
 def test_a_killed_session_loses_nothing_and_goes_on(start: Start, protocol_file: Path, tmp_path: Path) -> None:
     kills, _ = kill_again_and_again(3, start, protocol_file, tmp_path / "results")
     assert kills == 3
+
+
+def test_a_killed_staircase_goes_on_with_the_trial_that_was_due(
+    start: Start, protocol_file: Path, texts: Any, tmp_path: Path
+) -> None:
+    small = texts["small"].replace('differences_frames = [-3, 0, 4]\norder = "both"\n', "")
+    protocol_file.write_text(small + STAIRCASE)
+    out = tmp_path / "results"
+    for answers in (3, 4, 100):
+        playing = start(protocol_file, "--participant", "p1", "--out", out)
+        playing.opened()
+        playing.press_all(("space", "s", "d"), 60, answers=answers)
+        playing.kill() if playing.running else playing.ended()
+    assert is_finished(out, "p1")
+    protocol = load_protocol(protocol_file)
+    with open_responses(out) as responses:
+        record = find_session(responses, "p1")
+        assert record is not None
+        given = stored_answers(responses, record.id)
+    assert len(given) > 7
+    for place, answer in enumerate(given):
+        state = open_session(protocol, record.plan, given[:place], passed=("debrief",))
+        while (step := current(state)).kind != "answer":
+            state = advanced(state)
+        assert (step.trial, step.attempt) == (answer.trial, answer.attempt)
+    assert current(open_session(protocol, record.plan, given, passed=("debrief",))).kind == "done"
+
+
+STAIRCASE = """
+[studies.procedure]
+name = "staircase"
+start_frames = 3
+most_frames = 5
+steps_frames = [1]
+side = "longer"
+reversals = 3
+averaged = 2
+most_trials = 10
+"""
 
 
 @pytest.mark.slow
