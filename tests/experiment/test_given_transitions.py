@@ -184,6 +184,13 @@ def test_only_the_transitions_of_its_studies_need_a_file(tmp_path: Path, library
     [
         (80, 79, ("", ""), "expected start_frame <= end_frame for the transition 'slow_quick', found 80 and 79; exch"),
         (-1, 79, ("", ""), r"methods\[0\].files.slow_quick.start_frame: expected at least 0 in frames, found -1"),
+        (
+            60,
+            79,
+            ("files.slow_quick", "files.slow_quik"),
+            r"methods\[0\]: .*found 'slow_quik'; did you mean 'slow_quick'",
+        ),
+        (60, 79, ("[methods.files.slow_quick]", "files = 3\n[other]"), r"files: expected a table of tables, found 3"),
         (60, 79, ("start_frame", "strat_frame"), r"strat_frame: unknown key; did you mean 'start_frame'\?"),
         (
             60,

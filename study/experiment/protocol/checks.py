@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from study.counting import counted
 from study.experiment.protocol.errors import KeyMismatchError, short
+from study.experiment.protocol.methods import OwnMethod
 from study.experiment.protocol.stimuli import Points, Timing, TransitionSpec
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec, check_once, repeated
 from study.experiment.protocol.texts import LONGEST_NAME
@@ -40,6 +41,10 @@ class Whole(Shape):
     @property
     def analysis(self) -> AnalysisSettings:
         """Decisions about the analysis."""
+
+    @property
+    def methods(self) -> tuple[OwnMethod, ...]:
+        """The protocol's own methods."""
 
     @property
     def method_names(self) -> tuple[str, ...]:
@@ -79,6 +84,8 @@ def _check_names(protocol: Whole) -> None:
             message = f"expected each name in {kind} once, found {names[index]!r} twice; rename one"
             raise KeyMismatchError(message, kind, index, "name")
     known = [transition.name for transition in protocol.transitions]
+    for index, own in enumerate(protocol.methods):
+        _check_known(own.method({}).make.transitions(), known, "transitions", "methods", index)
     for index, study in enumerate(protocol.studies):
         for key in ("transitions", "practice_transitions"):
             names = getattr(study, key)

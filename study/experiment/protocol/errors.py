@@ -68,6 +68,7 @@ _EXPECTED = {
     "bool_type": "true or false",
     "tuple_type": "a list in brackets",
     "model_type": "a table of keys",
+    "dict_type": "a table of tables",
     "model_attributes_type": "a table of keys",
     "finite_number": "a finite number",
 }

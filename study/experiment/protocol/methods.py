@@ -123,7 +123,7 @@ def _checked(annotation: Any, required: bool) -> Any:
     if get_origin(annotation) is tuple:
         bounds = (*bounds, Field(strict=False, max_length=MOST_PARTS))
     if get_origin(annotation) is abc.Mapping:
-        annotation = dict[Slug, _table(get_args(annotation)[1])]  # type: ignore[misc]
+        annotation = dict[str, _table(get_args(annotation)[1])]  # type: ignore[misc]
     if not required:
         annotation = annotation | None
     return Annotated[(annotation, *bounds)] if bounds else annotation

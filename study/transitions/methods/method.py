@@ -258,6 +258,10 @@ class Make(MethodPart):
         """The files that it reads, as the protocol names them."""
         return ()
 
+    def transitions(self) -> tuple[str, ...]:
+        """The transitions of the protocol that its settings name."""
+        return ()
+
     def lacks(self, transition: str) -> str:
         """What its settings lack to make a transition of the protocol, in words; empty where they lack nothing."""
         del transition

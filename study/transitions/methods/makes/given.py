@@ -124,6 +124,10 @@ class Given(Make):
         """The given files."""
         return tuple(given.file for given in self.files.values())
 
+    def transitions(self) -> tuple[str, ...]:
+        """Those that there are files for."""
+        return tuple(self.files)
+
     def lacks(self, transition: str) -> str:
         """A file for the transition, or frames in their order."""
         if transition not in self.files:
