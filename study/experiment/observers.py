@@ -1,13 +1,13 @@
 """Observers: simulated participants whose sensitivity, criterion, lapses and preferences are known.
 
 A protocol's pairs and a database come in; sessions that are marked as simulated for ever go out, with the truth that
-an analysis should find (`observer_models.truth`). They go through the same `session` as real front ends.
+an analysis should find (`truth`). They go through the same `session` as real front ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 from typing import Protocol as Shape
@@ -16,18 +16,6 @@ import numpy as np
 
 from study.errors import SessionError
 from study.experiment.chance import generator
-from study.experiment.observer_models import (
-    LEAST_CRITERION,
-    ObserverSettings,
-    PreferenceObserver,
-    RatingObserver,
-    SameDifferentObserver,
-    default_observer,
-    knowing,
-    lean,
-    probability_different,
-    truth,
-)
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import open_session, walk
@@ -35,34 +23,30 @@ from study.experiment.steps import Step
 from study.experiment.store.answers import has_event, record_answer, record_event, stored_answers
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
+from study.models.population import LEAST_CRITERION
+from study.tasks.observer import ObserverSettings, Person, default_observer
+from study.tasks.registry import task_of, task_of_trial
 from study.tasks.trial import Pair, Trial
 
-__all__ = [
-    "ObserverSettings",
-    "PreferenceObserver",
-    "RatingObserver",
-    "SameDifferentObserver",
-    "SimulationSummary",
-    "StimulusSource",
-    "default_observer",
-    "person",
-    "respond",
-    "shown_well",
-    "simulate",
-    "truth",
-]
+
+def knowing(settings: ObserverSettings, protocol: Protocol) -> ObserverSettings:
+    """The observer with the utilities that a protocol gives to methods of its own, where it has none for them."""
+    own = {method.name: method.utility for method in protocol.methods}
+    if not own:
+        return settings
+    preference = replace(settings.preference, utility={**own, **settings.preference.utility})
+    return replace(settings, preference=preference)
 
 
-@dataclass(frozen=True)
-class Person:
-    """One simulated participant: the settings with this person's deviations, and where their chance comes from."""
+def truth(protocol: Protocol, settings: ObserverSettings) -> dict[str, Any]:
+    """What an analysis should find: the observer's parameters, and study by study what follows from them.
 
-    name: str
-    seed: int
-    settings: ObserverSettings
-    lean: float
-    leniency: float
-    careless: bool = False
+    Rounded to six digits, so that it is the same everywhere.
+    """
+    level = protocol.analysis.threshold
+    known = {study.name: task_of(study).truth(settings, study, level) for study in protocol.studies}
+    studies = {name: found for name, found in known.items() if found is not None}
+    return {"observer": asdict(settings), "studies": studies}
 
 
 def person(settings: ObserverSettings, name: str, seed: int) -> Person:
@@ -106,7 +90,12 @@ def respond(who: Person, trial: Trial, step: Step) -> tuple[str | None, float | 
     have gone.
     """
     rng = generator(who.seed, "answer", who.name, trial.trial, step.item, step.attempt)
-    value, ease = _judge(who, trial, step, rng)
+    if who.careless:
+        value, ease = str(rng.choice(step.legal)), 1.0
+    elif trial.role == "check":
+        value, ease = trial.expected, 1.0
+    else:
+        value, ease = task_of_trial(trial).judge(who, trial, step.legal, rng)
     # Near the threshold people take longer: up to half as long again.
     median = _CARELESS_S if who.careless else who.settings.response_median_s * (1.5 - 0.5 * ease)
     response_s = float(median * np.exp(who.settings.response_log_sd * rng.standard_normal()))
@@ -114,37 +103,6 @@ def respond(who: Person, trial: Trial, step: Step) -> tuple[str | None, float | 
     if step.duration_s is not None and (inattentive or response_s > step.duration_s):
         return None, None
     return value, round(response_s, 4)
-
-
-def _judge(who: Person, trial: Trial, step: Step, rng: np.random.Generator) -> tuple[str, float]:
-    """The answer, and how easy it was from 0 to 1."""
-    if who.careless:
-        return str(rng.choice(step.legal)), 1.0
-    if trial.role == "check":
-        return trial.expected, 1.0
-    if trial.task == "same-different":
-        different = float(probability_different(who.settings.same_different, float(trial.difference_frames or 0)))
-        return ("different" if rng.random() < different else "same"), abs(2 * different - 1)
-    if trial.task == "preference":
-        from scipy.special import expit
-
-        preference = who.settings.preference
-        leaning = lean(preference, *trial.methods) + who.lean
-        towards_first = (leaning if trial.a_first else -leaning) + preference.order_bias
-        chance = preference.lapse / 2 + (1 - preference.lapse) * float(expit(towards_first))
-        return ("first" if rng.random() < chance else "second"), abs(2 * chance - 1)
-    rating = who.settings.rating
-    higher = rating.utility_weight * _rated(who.settings.preference, trial) + who.leniency
-    middle = (len(step.legal) - 1) / 2 + (higher if trial.a_first else -higher)
-    point = int(np.clip(round(middle + rating.noise_sd * float(rng.standard_normal())), 0, len(step.legal) - 1))
-    return step.legal[point], 0.5
-
-
-def _rated(preference: PreferenceObserver, trial: Trial) -> float:
-    """Utility of what is rated: of the one stimulus, or of method b over method a."""
-    if len(trial.methods) > 1:
-        return lean(preference, trial.methods[1], trial.methods[0])
-    return preference.utility.get(trial.methods[0], 0.0)
 
 
 class StimulusSource(Shape):

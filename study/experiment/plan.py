@@ -17,10 +17,11 @@ import numpy as np
 
 from study.errors import SessionError
 from study.experiment.chance import generator
-from study.experiment.procedures.constant_stimuli import ConstantStimuli
+from study.experiment.procedures.constant_stimuli import ConstantStimuli, drawn_orders
 from study.experiment.procedures.procedure import Course, Draw, Procedure
 from study.experiment.procedures.registry import course_from_json, course_to_json
 from study.experiment.protocol.whole import Protocol, StudySpec
+from study.tasks.registry import task_of
 from study.tasks.trial import Pair, Trial, trial_from_json, trial_of
 
 PLAN_VERSION = 2
@@ -129,7 +130,7 @@ def draw_plan(
             raise SessionError(
                 f"Expected pairs for the study {study.name!r}, found none; prepare this protocol's stimuli."
             )
-        draw = Draw(study.name, tuple(own), study.order, study.repeats, group)
+        draw = Draw(study.name, tuple(own), task_of(study).orders, study.order, study.repeats, group)
         shown = study.procedure.drawn(draw, rng)
         # Practice and checks draw from generators of their own, so that they leave the trials as they are.
         practice = _draw_practice(
@@ -154,24 +155,14 @@ def _pairs_of(study: StudySpec, pairs: Sequence[Pair]) -> tuple[list[Pair], list
 
 
 def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Generator) -> list[Trial]:
-    """Practice trials: at random, but in same-different studies half the same and half as different as can be."""
+    """Practice trials, of the pairs that the task takes for it, in orders at random."""
     if not study.practice:
         return []
-    chosen = [pairs[i] for i in rng.permutation(len(pairs))]
-    if study.task == "same-different":
-        same = [pair for pair in chosen if not pair.difference_frames]
-        differ = sorted(
-            (pair for pair in chosen if pair.difference_frames), key=lambda pair: -abs(pair.difference_frames or 0)
-        )
-        kinds = [kind for kind in (differ, same) if kind]
-        chosen = [kind[i % len(kind)] for i in range(study.practice) for kind in kinds][: study.practice]
-    chosen = [chosen[i % len(chosen)] for i in range(study.practice)]
+    task = task_of(study)
+    chosen = task.practice([pairs[i] for i in rng.permutation(len(pairs))], study.practice)
     order = rng.permutation(study.practice)
-    sides = rng.integers(0, 2, study.practice)
-    if study.paired:
-        trials = [trial_of(chosen[i], _both(bool(sides[i])), 0) for i in order]
-    else:
-        trials = [trial_of(chosen[i], (0,), 0) for i in order]
+    drawn = drawn_orders(len(task.orders), study.practice, "random", rng)
+    trials = [trial_of(chosen[i % len(chosen)], task.orders[drawn[i]], 0) for i in order]
     return [replace(trial, role="practice") for trial in trials]
 
 
@@ -180,19 +171,10 @@ def _with_checks(study: StudySpec, trials: Sequence[Trial], rng: np.random.Gener
     mixed = list(trials)
     for _ in range(study.attention_checks):
         model = trials[int(rng.integers(len(trials)))]
-        legal = legal_answers(study)
+        legal = task_of(study).legal(study)
         check = replace(model, role="check", expected=legal[int(rng.integers(len(legal)))])
         mixed.insert(int(rng.integers(1, len(mixed) + 1)), check)
     return mixed
-
-
-def legal_answers(study: StudySpec) -> tuple[str, ...]:
-    """The answers that count in a study."""
-    if study.task == "same-different":
-        return ("same", "different")
-    if study.task == "preference":
-        return ("first", "second")
-    return tuple(str(point) for point in range(study.scale_points))
 
 
 def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
@@ -201,10 +183,6 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
     for study in protocol.studies:
         if study.order == "by-group":
             own = len(_pairs_of(study, pairs)[0])
-            groups = math.lcm(groups, 2 if study.paired else max(own, 1))
+            orders = len(task_of(study).orders)
+            groups = math.lcm(groups, orders if orders > 1 else max(own, 1))
     return groups
-
-
-def _both(a_first: bool) -> tuple[int, int]:
-    """The members of a pair in their slots, where both are shown."""
-    return (0, 1) if a_first else (1, 0)

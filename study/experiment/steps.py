@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from study.experiment import wording
-from study.experiment.plan import Plan, legal_answers
+from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol
-from study.tasks.answer import Answer, right_answer
+from study.tasks.answer import Answer
+from study.tasks.registry import right_answer, task_of
 from study.tasks.trial import PLACES, Trial
 
 Kind = Literal[
@@ -241,10 +242,9 @@ def trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset[
         if slot > 1:
             steps.append(replace(base, kind="gap", duration_s=timing.gap_s))
         steps.append(replace(base, stimulus=stimulus, slot=slot))
-    legal = legal_answers(study)
-    # A rating is a questionnaire: it has no answer window (2003 section 4.2).
-    window_s = None if study.task == "rating" else timing.answer_s
-    ask = replace(base, kind="answer", text=wording.question_text(protocol, study), duration_s=window_s, legal=legal)
+    task, question = task_of(study), wording.question_text(protocol, study)
+    window_s = timing.answer_s if task.timed else None
+    ask = replace(base, kind="answer", text=question, duration_s=window_s, legal=task.legal(study))
     if trial.role == "check":
         words = protocol.texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected))
         steps.append(replace(ask, text=words))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from study.experiment.protocol.languages import words
+from study.tasks.registry import task_of
 
 if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol, StudySpec
@@ -59,8 +60,8 @@ def welcome_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
 
 def _welcome_standard(protocol: Protocol) -> str:
     """The built-in welcome: by whether films are shown in pairs, one at a time, or both."""
-    kinds = {study.paired for study in protocol.studies}
-    name = "welcome_films_and_pairs" if len(kinds) > 1 else "welcome_pairs" if kinds == {True} else "welcome_films"
+    kinds = {task_of(study).welcome for study in protocol.studies}
+    name = kinds.pop() if len(kinds) == 1 else "welcome_films_and_pairs"
     parts = ["parts"] if len(protocol.studies) > 1 else []
     return "\n\n".join(_standard(protocol, each) for each in (name, *parts))
 
@@ -71,13 +72,13 @@ def instructions_text(protocol: Protocol, study: StudySpec, films: Films = NO_FI
 
 
 def _instructions_standard(protocol: Protocol, study: StudySpec) -> str:
-    task = "rating_pairs" if study.task == "rating" and study.paired else study.task
-    return "\n\n".join(_standard(protocol, each) for each in (task, *(["practice"] if study.practice else [])))
+    own = task_of(study).instructions
+    return "\n\n".join(_standard(protocol, each) for each in (own, *(["practice"] if study.practice else [])))
 
 
 def question_text(protocol: Protocol, study: StudySpec) -> str:
     """What is asked after each pair; the items of a rating study ask for themselves."""
-    return _filled(study.question, _standard(protocol, f"question_{study.task}"), {})
+    return _filled(study.question, _standard(protocol, task_of(study).question), {})
 
 
 def debrief_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
@@ -144,7 +145,7 @@ def _estimated(protocol: Protocol, study: StudySpec) -> FilmTimes:
     stimuli = protocol.stimuli
     usual_s = (method.make.usual_s(method.length, protocol.fps) for method in protocol.methods_of(study).values())
     film_s = stimuli.entry_s + stimuli.exit_s + max(usual_s)
-    shown_s = (2 if study.paired else 1) * film_s
+    shown_s = task_of(study).slots * film_s
     return FilmTimes(shown_s, shown_s)
 
 
@@ -152,7 +153,7 @@ def _besides_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
     """What a trial takes besides its films."""
     timing = protocol.timing
     answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
-    gap_s = timing.gap_s if study.paired else 0.0
+    gap_s = timing.gap_s * (task_of(study).slots - 1)
     return gap_s + (_ITEM_S * len(study.items) or answer_s) + timing.pause_s
 
 

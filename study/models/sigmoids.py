@@ -91,14 +91,15 @@ def _normal_slope(value: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-0.5 * value * value) / np.sqrt(2 * np.pi), dtype=np.float64)
 
 
-def _logistic(value: FloatArray) -> FloatArray:
+def logistic(value: FloatArray) -> FloatArray:
+    """The logistic distribution function: the chance that goes with log-odds."""
     from scipy.special import expit
 
     return np.asarray(expit(value), dtype=np.float64)
 
 
 def _logistic_slope(value: FloatArray) -> FloatArray:
-    share = _logistic(value)
+    share = logistic(value)
     return share * (1 - share)
 
 
@@ -121,7 +122,7 @@ def _logistic_inverse(share: FloatArray) -> FloatArray:
 
 SIGMOIDS = {
     "normal": Sigmoid("normal", _normal, _normal_slope, _normal_inverse),
-    "logistic": Sigmoid("logistic", _logistic, _logistic_slope, _logistic_inverse),
+    "logistic": Sigmoid("logistic", logistic, _logistic_slope, _logistic_inverse),
     "gumbel": Sigmoid("gumbel", _gumbel, _gumbel_slope, _gumbel_inverse),
     "weibull": Sigmoid("weibull", _gumbel, _gumbel_slope, _gumbel_inverse, logarithmic=True),
 }

@@ -17,16 +17,13 @@ from numpy.typing import NDArray
 
 from study.analysis.exclusions import Rules, exclude
 from study.analysis.preference.participants import default_p_values, student_p_values
-from study.experiment.observer_models import (
-    ObserverSettings,
-    PreferenceObserver,
-    RatingObserver,
-    default_observer,
-    probability_different,
-)
 from study.experiment.observers import person, respond
+from study.models.choice import PreferenceObserver
+from study.models.ordinal import RatingObserver
+from study.models.population import probability_different
 from study.power.curve import Run, logit_normal
-from study.tasks.answer import answer_columns
+from study.tasks.observer import ObserverSettings, default_observer
+from study.tasks.registry import answer_columns, task_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,7 +68,7 @@ class Design:
     @property
     def window_s(self) -> float | None:
         """How long an answer may take; ratings have no limit."""
-        return None if self.study.task == "rating" else self.protocol.timing.answer_s
+        return self.protocol.timing.answer_s if task_of(self.study).timed else None
 
 
 def preference_observer(
@@ -141,7 +138,7 @@ def rating_study(design: Design, alpha: float, difference: float) -> Run:
     Of each participant's own difference of the two methods' ratings; where pairs are rated, of the mean score less the
     middle of the scale.
     """
-    if design.study.paired:
+    if task_of(design.study).slots > 1:
         return _pair_rating_study(design, alpha, difference)
     trials, rating = design.trials(), design.settings.rating
     sides = np.array([[1.0 if trial.methods[0] == design.study.comparison else 0.0 for trial in own] for own in trials])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from study.counting import counted
 from study.report import words
+from study.tasks.registry import task_of
 from study.transitions.methods.makes.blends import Blending
 from study.transitions.methods.method import WANG_2003, WANG_2004
 from study.transitions.methods.registry import METHODS
@@ -121,29 +122,10 @@ def _design(protocol: Protocol, analysis: Result, who: str) -> str:
 
 def _study(protocol: Protocol, study: StudySpec) -> str:
     title = words.readable(study.title or study.name)
-    if study.task == "same-different":
-        levels = ", ".join(f"{value:+d}".replace("-", "−") if value else "0" for value in study.differences_frames)
-        what = (
-            f"participants judged whether two transitions were the same or different: "
-            f"{_blends(protocol, study, study.reference)}, "
-            f"against blends longer by {levels} frames"
-        )
-    elif study.task == "preference":
-        what = f"participants chose the more natural of two transitions, {_against(protocol, study)}"
-    else:
-        asked = counted(len(study.items), "question")
-        done = "compared the second of two transitions with the first," if study.paired else "rated"
-        what = (
-            f"participants {done} {_against(protocol, study)}, on a scale of 0 to {study.scale_points - 1} in {asked}"
-        )
+    what = task_of(study).in_words(study, lambda method: _blends(protocol, study, method))
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
-    order = (ORDERS if study.paired else SINGLE_ORDERS)[study.order]
-    return f"In “{title}”, {what}. {order}{repeated}."
-
-
-def _against(protocol: Protocol, study: StudySpec) -> str:
-    first = _blends(protocol, study, study.reference)
-    return first if study.comparison is None else f"{first} and {_blends(protocol, study, study.comparison)}"
+    order = (ORDERS if task_of(study).slots > 1 else SINGLE_ORDERS)[study.order]
+    return f"In “{title}”, participants {what}. {order}{repeated}."
 
 
 def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:
@@ -193,15 +175,15 @@ def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:
 
 def _procedure(protocol: Protocol, analysis: Result, presentations: pd.DataFrame) -> str:
     timing = protocol.timing
-    paired = any(study.paired for study in protocol.studies)
+    paired = any(task_of(study).slots > 1 for study in protocol.studies)
     pair = f"The two stimuli of a pair followed each other after {timing.gap_s:g} s. " if paired else ""
     rest = f" A break was offered after every {counted(timing.break_after, 'trial')}." if timing.break_after else ""
     limit = (
         f"Participants had {timing.answer_s:g} s to answer; an answer not given in time was recorded as missed. "
-        if any(study.task != "rating" for study in protocol.studies)
+        if any(task_of(study).timed for study in protocol.studies)
         else ""
     )
-    free = "Ratings had no time limit. " if any(study.task == "rating" for study in protocol.studies) else ""
+    free = "Ratings had no time limit. " if any(not task_of(study).timed for study in protocol.studies) else ""
     return f"{pair}{limit}{free}A pause of {timing.pause_s:g} s followed.{rest} {_shown(analysis, presentations)}"
 
 

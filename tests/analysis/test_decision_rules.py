@@ -13,6 +13,7 @@ from scipy.stats import norm
 from study.analysis.same_different import fits as differencing
 from study.analysis.same_different.independent import compare_rules, fit_independent, order_test, profile_intervals
 from study.analysis.same_different.interpolation import Counts, count_answers
+from study.models.differencing import probability_different, threshold_delta
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
 
@@ -66,9 +67,9 @@ def test_profile_intervals_end_where_the_likelihood_has_fallen_by_1_92() -> None
 
         def loss(point: np.ndarray, end: float = end) -> float:
             criterion, lapse = np.exp(point[:1]), np.clip(point[1:2], 0, 0.1)
-            delta = differencing.threshold_delta(criterion, lapse, "different")
+            delta = threshold_delta(criterion, lapse, "different")
             slopes = np.array([[np.exp(point[2]), delta[0] / end]])
-            p = np.clip(differencing.probability_different(both, criterion, lapse, slopes)[0], 1e-9, 1 - 1e-9)
+            p = np.clip(probability_different(both, criterion, lapse, slopes)[0], 1e-9, 1 - 1e-9)
             return -float((different * np.log(p) + (shown - different) * np.log1p(-p)).sum())
 
         found = minimize(loss, [np.log(2.2), 0.01, np.log(0.35)], method="Nelder-Mead", options={"maxiter": 2000})

@@ -14,6 +14,7 @@ from study.analysis.same_different import fits as differencing
 from study.analysis.same_different.analyse import d_prime
 from study.analysis.same_different.interpolation import Counts, count_answers, crossings
 from study.analysis.same_different.model import ModelFit, fit_model
+from study.models.differencing import criterion_free_delta, detected
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
 CRITERION, LAPSE = 2.2, 0.02
@@ -48,9 +49,9 @@ def fitted(counts: Counts) -> ModelFit:
 def test_the_model_is_the_published_one() -> None:
     """Macmillan & Creelman 2005, chapter 9: false alarms are 2 Phi(-k / sqrt 2); hits the two tails about d'."""
     criterion = np.array([1.5])
-    assert differencing.detected(np.zeros(1), criterion)[0] == pytest.approx(2 * norm.cdf(-1.5 / np.sqrt(2)))
+    assert detected(np.zeros(1), criterion)[0] == pytest.approx(2 * norm.cdf(-1.5 / np.sqrt(2)))
     expected = norm.cdf((2 - 1.5) / np.sqrt(2)) + norm.cdf((-2 - 1.5) / np.sqrt(2))
-    assert differencing.detected(np.array([2.0]), criterion)[0] == pytest.approx(expected)
+    assert detected(np.array([2.0]), criterion)[0] == pytest.approx(expected)
 
 
 def test_d_prime_of_a_table_inverts_the_model() -> None:
@@ -74,7 +75,7 @@ def test_d_prime_stays_finite(hits: int, alarms: int, expected: float | None) ->
 
 
 def test_the_criterion_free_threshold_is_where_the_best_criterion_gives_three_in_four() -> None:
-    delta = differencing.criterion_free_delta(0.75)
+    delta = criterion_free_delta(0.75)
     criteria = np.linspace(0, 8, 40001)
     gained = norm.sf(criteria, delta, np.sqrt(2)) + norm.cdf(-criteria, delta, np.sqrt(2))
     correct = 0.5 * gained + 0.5 * (1 - 2 * norm.sf(criteria / np.sqrt(2)))

@@ -15,21 +15,16 @@ import pandas as pd
 import pytest
 
 from study.errors import SessionError
-from study.experiment.observer_models import (
-    PreferenceObserver,
-    SameDifferentObserver,
-    population_different,
-    preference_probability,
-    probability_different,
-    truth,
-)
-from study.experiment.observers import ObserverSettings, default_observer, person, simulate
+from study.experiment.observers import person, simulate, truth
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import open_session, walk
 from study.experiment.store.answers import has_event
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import all_sessions
+from study.models.choice import PreferenceObserver, preference_probability
+from study.models.population import SameDifferentObserver, population_different, probability_different
+from study.tasks.observer import ObserverSettings, default_observer
 
 
 def alike(settings: ObserverSettings) -> ObserverSettings:
@@ -90,7 +85,9 @@ def test_the_default_preferences_are_those_of_table_2():
 
     for name, percent in (("geodesic_vs_fixed", 96.4), ("velocity_vs_fixed", 65.7)):
         study = load_protocol(find_protocol(name)).studies[0]
-        assert 100 * preference_probability(default_observer().preference, study) == pytest.approx(percent, abs=1.0)
+        assert 100 * preference_probability(default_observer().preference, *study.methods) == pytest.approx(
+            percent, abs=1.0
+        )
 
 
 def test_an_observer_without_threshold_is_refused(jnd_protocol):
@@ -121,7 +118,7 @@ def test_simulated_preferences_follow_the_known_ones(tmp_path, toy_protocol, toy
     for first, rows in chosen.groupby("a_first"):
         chance = 0.05 + 0.9 / (1 + math.exp(-(1.0 + (0.4 if first else -0.4))))
         assert rows["chose_a"].mean() == pytest.approx(chance, abs=0.12)
-    expected = preference_probability(preference, toy_protocol.study("liking"))
+    expected = preference_probability(preference, *toy_protocol.study("liking").methods)
     assert chosen["chose_a"].mean() == pytest.approx(expected, abs=0.09)
 
 
@@ -192,6 +189,9 @@ import toys as c
 from study.experiment.observers import simulate
 from study.experiment.protocol.whole import find_protocol, load_protocol
 from study.experiment.store.responses import open_responses
+from study.models.choice import PreferenceObserver, preference_probability
+from study.models.population import SameDifferentObserver, population_different, probability_different
+from study.tasks.observer import ObserverSettings, default_observer
 protocol = load_protocol(find_protocol("blend_length_jnd"))
 say = lambda done, total: print(done, flush=True)
 simulate(protocol, c.FakeStimuli(c.pairs_of(protocol)), open_responses(sys.argv[1]), 4, 9, say)

@@ -9,11 +9,13 @@ import pytest
 from toys import TOY_PROTOCOL, ToyLibrary
 
 from study.errors import ProtocolError, StimulusError
-from study.experiment.observer_models import default_observer, knowing, preference_probability
+from study.experiment.observers import knowing
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.stimuli.outlook import look_ahead
 from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.stimuli.stimulus import Stimulus
+from study.models.choice import preference_probability
+from study.tasks.observer import default_observer
 from study.transitions.methods.registry import METHODS
 
 TEXT = """
@@ -126,7 +128,7 @@ def test_simulated_observers_find_it_as_natural_as_it_says() -> None:
     assert observer.preference.utility == {**default_observer().preference.utility, "ours": 2.5}
     # Log-odds of 2.5 over a fixed blend, at an even order bias: 1 / (1 + exp(-2.5)) is 0.924.
     unbiased = replace(observer.preference, order_bias=0.0, lapse=0.0)
-    assert preference_probability(unbiased, protocol.studies[0]) == pytest.approx(1 / (1 + np.exp(-2.5)))
+    assert preference_probability(unbiased, *protocol.studies[0].methods) == pytest.approx(1 / (1 + np.exp(-2.5)))
     assert knowing(default_observer(), parse_protocol(TOY_PROTOCOL)) == default_observer()
 
 

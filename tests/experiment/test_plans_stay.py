@@ -13,7 +13,8 @@ from toys import TOY_PAIR_RATING, TOY_PROTOCOL, TOY_RATING, pairs_of
 
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
-from study.tasks.answer import Answer, answer_columns
+from study.tasks.answer import Answer
+from study.tasks.registry import answer_columns
 from study.tasks.trial import Trial
 
 THIRD = """

@@ -10,6 +10,7 @@ import pytest
 
 from study.errors import ProtocolError
 from study.experiment.protocol.whole import find_protocol, load_protocol, parse_protocol, protocols_folder
+from study.tasks.registry import task_of
 
 GOOD = Path(__file__).parents[2].joinpath("protocols", "demo.toml").read_text()
 
@@ -147,7 +148,7 @@ def test_rating_studies_have_items_and_single_stimuli(rating_protocol):
 
 def test_ratings_of_pairs_compare_two_methods_in_any_order(pair_rating_protocol, rating_protocol):
     study, single = pair_rating_protocol.study("compared"), rating_protocol.study("rating")
-    assert (study.paired, single.paired) == (True, False)
+    assert (task_of(study).slots, task_of(single).slots) == (2, 1)
     base = pair_rating_protocol.text
     for order, trials in (("both", 4), ("random", 2), ("balanced", 2), ("by-group", 2)):
         other = parse_protocol(base.replace('order = "by-group"', f'order = "{order}"'))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from study.motion.clip import Clip
 from study.motion.library import Entry, Library
 from study.motion.skeleton import Skeleton
 from study.tasks.answer import Answer
+from study.tasks.registry import task_of
 from study.tasks.trial import Pair
 
 _JOINTS = (
@@ -177,25 +178,18 @@ def pairs_of(protocol: Protocol) -> tuple[Pair, ...]:
     pairs = []
     for study in protocol.studies:
         for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
-            base = Pair(
-                f"{study.name}/{transition.name}",
-                study.name,
-                study.task,
-                transition.name,
-                transition.category,
-                (f"{transition.name}-k", f"{transition.name}-fixed"),
-                (study.reference, study.comparison or study.reference),
-            )
-            if study.task == "same-different":
-                for d in study.levels_of(transition.name):
-                    shown = base.stimuli[0], f"{transition.name}{d:+d}" if d else base.stimuli[0]
-                    pairs.append(replace(base, name=f"{base.name}/{d:+d}", stimuli=shown, difference_frames=d))
-            elif study.paired:
-                pairs.append(base)
-            else:
-                for m in study.methods:
-                    alone = (f"{transition.name}-{m}",)
-                    pairs.append(replace(base, name=f"{base.name}/{m}", stimuli=alone, methods=(m,)))
+            for condition in task_of(study).conditions(study, transition.name in study.practice_transitions):
+                if len(condition.methods) == 1:
+                    shown: tuple[str, ...] = (f"{transition.name}-{condition.methods[0]}",)
+                elif condition.difference_frames is None:
+                    shown = f"{transition.name}-k", f"{transition.name}-fixed"
+                else:
+                    shown = tuple(
+                        f"{transition.name}{d:+d}" if d else f"{transition.name}-k" for d in condition.added_frames
+                    )
+                name = "/".join(filter(None, (study.name, transition.name, condition.name)))
+                meaning = condition.methods, condition.difference_frames
+                pairs.append(Pair(name, study.name, study.task, transition.name, transition.category, shown, *meaning))
     return tuple(pairs)
 
 

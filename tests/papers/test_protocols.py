@@ -6,8 +6,7 @@ from collections import Counter
 
 import pytest
 
-from study.experiment.observer_models import default_observer, truth
-from study.experiment.observers import simulate
+from study.experiment.observers import simulate, truth
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.proofreading import to_do
 from study.experiment.protocol.whole import find_protocol, load_protocol, protocols_folder
@@ -16,6 +15,7 @@ from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.experiment.wording import all_texts
 from study.motion.library import open_library
+from study.tasks.observer import default_observer
 
 PUBLISHED = ("blend_length_jnd", "geodesic_vs_fixed", "velocity_vs_fixed")
 ALL = tuple(sorted(path.stem for path in protocols_folder().glob("*.toml")))
@@ -199,7 +199,7 @@ def test_the_demo_is_shown_on_cmu_clips(cmu):
 
 def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path, synthetic):
     """35 participants as in the paper; at each level the proportion is the truth's within its sampling error."""
-    from study.experiment.observer_models import population_different
+    from study.models.population import population_different
 
     protocol = published("demo")
     prepared = prepare(protocol, synthetic)

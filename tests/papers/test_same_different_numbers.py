@@ -21,6 +21,7 @@ from scipy.stats import norm
 
 from study.analysis.same_different import fits as differencing
 from study.analysis.same_different.analyse import d_prime
+from study.models.differencing import criterion_free_delta
 
 FRAMES = np.array([[0.0], [1.0]])
 
@@ -99,4 +100,4 @@ def test_the_criterion_free_threshold_is_that_of_the_best_proportion_correct() -
         hit = norm.sf(criteria, delta, math.sqrt(2)) + norm.cdf(-criteria, delta, math.sqrt(2))
         return float((0.5 + 0.5 * (hit - 2 * norm.sf(criteria / math.sqrt(2)))).max())
 
-    assert differencing.criterion_free_delta(0.9) == pytest.approx(brentq(lambda d: best(d) - 0.9, 0.5, 8), abs=1e-4)
+    assert criterion_free_delta(0.9) == pytest.approx(brentq(lambda d: best(d) - 0.9, 0.5, 8), abs=1e-4)

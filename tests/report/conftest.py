@@ -19,6 +19,7 @@ from study.experiment.protocol.whole import Protocol, load_protocol
 from study.experiment.stimuli.manifest import MANIFEST_VERSION, read_manifest
 from study.experiment.stimuli.stimulus import MotionUse, StimulusRecord
 from study.experiment.store.responses import open_responses
+from study.tasks.registry import task_of
 from study.tasks.trial import Pair
 
 sys.path.insert(0, str(Path(__file__).parent))  # tests are imported by path, without packages
@@ -124,7 +125,7 @@ def _pairs(protocol: Protocol, record: Callable[[str, str, int], StimulusRecord]
             if study.comparison:
                 b = record(transition.name, study.comparison, 0)
                 name = f"{study.name}/{transition.name}"
-                if study.paired:
+                if task_of(study).slots > 1:
                     pairs.append(Pair(name, *base, (a.id, b.id), (study.reference, study.comparison)))
                 else:
                     pairs.append(Pair(f"{name}/a", *base, (a.id,), (study.reference,)))

@@ -27,6 +27,7 @@ from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thres
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.counting import counted
 from study.errors import AnalysisError
+from study.models.differencing import ROOT_TWO, detected
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -276,10 +277,10 @@ def d_prime(
     hit, alarm = (hits + 0.5) / (different_pairs + 1), (alarms + 0.5) / (same_pairs + 1)
 
     def solve(hit: float, alarm: float) -> float:
-        criterion = np.full(1, -differencing.ROOT_TWO * ndtri(alarm / 2))
+        criterion = np.full(1, -ROOT_TWO * ndtri(alarm / 2))
         if hit <= alarm:
             return 0.0
-        found = brentq(lambda delta: float(differencing.detected(np.full(1, delta), criterion)[0]) - hit, 0.0, 40.0)
+        found = brentq(lambda delta: float(detected(np.full(1, delta), criterion)[0]) - hit, 0.0, 40.0)
         return float(found)
 
     value, step = solve(hit, alarm), 1e-5
@@ -290,7 +291,7 @@ def d_prime(
         variance = by_hit**2 * hit * (1 - hit) / different_pairs + by_alarm**2 * alarm * (1 - alarm) / same_pairs
         error = float(np.sqrt(variance))
     low, high = differencing.d_prime_interval(hits, different_pairs, alarms, same_pairs, confidence)
-    criterion = float(-differencing.ROOT_TWO * ndtri(alarm / 2))
+    criterion = float(-ROOT_TWO * ndtri(alarm / 2))
     return {"d_prime": value, "criterion": criterion, "standard_error": error, "low": low, "high": high}
 
 

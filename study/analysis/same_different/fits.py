@@ -1,15 +1,8 @@
 """The differencing model of a same-different task: counts of "different" in, sensitivity, criterion and thresholds out.
 
-A participant sees two transitions, takes the difference of two noisy impressions, and answers "different" where it
-exceeds a criterion (Noreen 1981; Macmillan & Creelman 2005, chapter 9). With impressions of unit variance, `delta` of
-them between the two means and the criterion `tau`,
-
-    q(delta) = Phi((delta - tau) / sqrt 2) + Phi((-delta - tau) / sqrt 2)
-    P("different") = lapse / 2 + (1 - lapse) q(delta),
-
-where lapses are answers given by tossing a coin. `delta` is `slope x frames`, with one slope a side (shorter, longer)
-and one criterion, which the pairs with no difference pin down. The threshold that 2004 section 5.1 reads off the raw
-percentages follows from the curve, and so does one that does not depend on the criterion.
+`models.differencing` with `delta` as `slope x frames`: one slope a side (shorter, longer) and one criterion, which the
+pairs with no difference pin down. The threshold that 2004 section 5.1 reads off the raw percentages follows from the
+curve, and so does one that does not depend on the criterion.
 
 Fits are maximum likelihood by damped Fisher scoring, many data sets at once: bootstrap samples, left-out participants.
 """
@@ -17,24 +10,18 @@ Fits are maximum likelihood by damped Fisher scoring, many data sets at once: bo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis.estimates import normal_quantile
 from study.analysis.scoring import maximise
+from study.models.differencing import ROOT_TWO, Kind, density, detected, probability_different, threshold_delta
 
 FloatArray = NDArray[np.float64]
-Kind = Literal["different", "guess_corrected", "criterion_free"]
-KINDS: tuple[Kind, ...] = ("different", "guess_corrected", "criterion_free")
 
-ROOT_TWO = float(np.sqrt(2.0))
 LARGEST_LAPSE = 0.1
 SMALLEST_PROBABILITY = 1e-9
-WIDEST_DELTA = 60.0
-MOST_STEPS = 100
 WIDEST_D_PRIME = 12.0
 D_PRIME_POINTS = 40
 
@@ -65,30 +52,6 @@ class Fits:
     log_likelihood: FloatArray
     held: NDArray[np.bool_]
     settled: NDArray[np.bool_]
-
-
-def detected(delta: FloatArray, criterion: FloatArray) -> FloatArray:
-    """Return q(delta): the probability of "different" of an observer who never lapses."""
-    from scipy.special import ndtr
-
-    share: FloatArray = ndtr((delta - criterion) / ROOT_TWO) + ndtr((-delta - criterion) / ROOT_TWO)
-    return share
-
-
-def probability_different(
-    frames: FloatArray, criterion: FloatArray, lapse: FloatArray, slopes: FloatArray
-) -> FloatArray:
-    """Return P("different"), shape (fits, levels).
-
-    Parameters
-    ----------
-    frames : ndarray, shape (levels, slopes)
-        Size of the difference in the column of the slope that it belongs to, 0 in the other columns.
-    criterion, lapse : ndarray, shape (fits,)
-    slopes : ndarray, shape (fits, slopes)
-    """
-    share = detected(slopes @ frames.T, criterion[:, None])
-    return lapse[:, None] / 2 + (1 - lapse[:, None]) * share
 
 
 def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, largest_lapse: float = LARGEST_LAPSE) -> Fits:
@@ -166,11 +129,6 @@ def _slopes_of_probability(point: FloatArray, frames: FloatArray) -> FloatArray:
     return np.concatenate([by_criterion[:, :, None], by_lapse[:, :, None], by_slopes], axis=2)
 
 
-def density(value: FloatArray) -> FloatArray:
-    """Return the standard normal density."""
-    return np.asarray(np.exp(-0.5 * value * value) / np.sqrt(2 * np.pi), dtype=np.float64)
-
-
 def _scores(
     point: FloatArray, frames: FloatArray, different: FloatArray, shown: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -184,64 +142,6 @@ def _scores(
 
 
 # Thresholds
-
-
-@cache
-def criterion_free_delta(correct: float) -> float:
-    """Return the d-prime at which an observer with the best criterion is right in this share of the pairs.
-
-    Half of the pairs have no difference, half have this one (Macmillan & Creelman 2005, p. 222: the greatest share of
-    correct answers under the differencing rule). Sensitivity alone decides it: no observer's own criterion enters.
-    """
-    from scipy.optimize import brentq
-
-    criteria = np.linspace(0.0, 8.0, 4001)
-
-    def best(delta: float) -> float:
-        gained = detected(np.full(1, delta), criteria) - detected(np.zeros(1), criteria)
-        return float(0.5 + 0.5 * gained.max())
-
-    return float(brentq(lambda delta: best(delta) - correct, 0.1, 10.0, xtol=1e-10))
-
-
-def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind, level: float = 0.75) -> FloatArray:
-    """Return the d-prime at threshold, shape (fits,).
-
-    `different`: this share of the answers is "different". `guess_corrected`: it is so after Abbott's correction,
-    (p - f) / (1 - f), for the share f of "different" at no difference. `criterion_free`: `criterion_free_delta`.
-    0 where the pairs with no difference are above it already, infinite where the lapses keep the curve below it.
-    """
-    if kind == "criterion_free" and level <= 0.5:
-        return np.zeros(len(criterion))  # guessing gets as many right
-    if kind == "criterion_free":
-        return np.full(len(criterion), criterion_free_delta(level))
-    alarms = lapse / 2 + (1 - lapse) * detected(np.zeros(1), criterion)
-    target = np.full(len(criterion), level) if kind == "different" else alarms + level * (1 - alarms)
-    reached = (alarms < target) & (target < 1 - lapse / 2)
-    found = np.zeros(len(criterion))
-    found[reached] = _delta_detected(((target - lapse / 2) / (1 - lapse))[reached], criterion[reached])
-    return np.asarray(np.where(target >= 1 - lapse / 2, np.inf, found), dtype=np.float64)
-
-
-def _delta_detected(share: FloatArray, criterion: FloatArray) -> FloatArray:
-    """The d-prime that is detected in this share of the trials, shape (fits,): Newton's steps, kept between bounds."""
-    from scipy.special import ndtri
-
-    low, high = np.zeros(len(criterion)), np.full(len(criterion), WIDEST_DELTA)
-    # Where the far tail is left out, which is right but for small criteria.
-    delta = np.clip(criterion + ROOT_TWO * ndtri(share), 0.1, WIDEST_DELTA)
-    for _ in range(MOST_STEPS):
-        off = detected(delta, criterion) - share
-        low, high = np.where(off < 0, delta, low), np.where(off < 0, high, delta)
-        above, below = density((delta - criterion) / ROOT_TWO), density((delta + criterion) / ROOT_TWO)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = delta - off * ROOT_TWO / (above - below)
-        following = np.where((step > low) & (step < high), step, (low + high) / 2)
-        settled = np.abs(following - delta) <= 1e-12 * delta
-        delta = np.where(off == 0, delta, following)
-        if (settled | (np.abs(off) < 1e-15)).all():
-            break
-    return delta
 
 
 def threshold_frames(fits: Fits, kind: Kind = "different", level: float = 0.75) -> FloatArray:

@@ -22,6 +22,7 @@ from study.analysis import estimates
 from study.analysis.same_different import fits as differencing
 from study.analysis.same_different.interpolation import SIDES, Counts
 from study.analysis.scoring import Maxima, maximise
+from study.models.differencing import probability_different, threshold_delta
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -295,7 +296,7 @@ def _held_at(
 
     def whole(point: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
         criterion, lapse = np.exp(point[:, 0]), point[:, 1]
-        delta = differencing.threshold_delta(criterion, lapse, "different", level)
+        delta = threshold_delta(criterion, lapse, "different", level)
         slopes = np.empty((len(point), frames.shape[1]))
         slopes[:, others] = point[:, 2:]
         slopes[:, place] = np.log(np.clip(delta, 1e-6, 1e3) / line[rows])
@@ -303,7 +304,7 @@ def _held_at(
 
     def share(point: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
         full = whole(point, rows)
-        found = differencing.probability_different(frames, np.exp(full[:, 0]), full[:, 1], np.exp(full[:, 2:]))
+        found = probability_different(frames, np.exp(full[:, 0]), full[:, 1], np.exp(full[:, 2:]))
         return np.clip(found, 1e-9, 1 - 1e-9)
 
     def value(point: FloatArray, rows: NDArray[np.intp]) -> FloatArray:

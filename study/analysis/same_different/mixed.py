@@ -23,6 +23,7 @@ from study.analysis.same_different.independent import frames_by_side
 from study.analysis.same_different.interpolation import SIDES, Counts, Side, Threshold
 from study.analysis.same_different.model import why_no_fit
 from study.counting import counted
+from study.models.differencing import ROOT_TWO, density, detected
 
 FloatArray = NDArray[np.float64]
 
@@ -187,11 +188,11 @@ def _curves(point: FloatArray, people: _People, frames: FloatArray) -> tuple[Flo
     criterion = np.exp(point[0] + point[-1] * people.criterion)[:, None]
     slopes, lapse = np.exp(point[2:-2]), point[1]
     delta = factor * (frames @ slopes)
-    above, below = (delta - criterion) / differencing.ROOT_TWO, (delta + criterion) / differencing.ROOT_TWO
-    dense_above, dense_below = differencing.density(above), differencing.density(below)
-    share = differencing.detected(delta, criterion)
-    by_criterion = -(1 - lapse) * (dense_above + dense_below) / differencing.ROOT_TWO * criterion
-    by_delta = (1 - lapse) * (dense_above - dense_below) / differencing.ROOT_TWO
+    above, below = (delta - criterion) / ROOT_TWO, (delta + criterion) / ROOT_TWO
+    dense_above, dense_below = density(above), density(below)
+    share = detected(delta, criterion)
+    by_criterion = -(1 - lapse) * (dense_above + dense_below) / ROOT_TWO * criterion
+    by_delta = (1 - lapse) * (dense_above - dense_below) / ROOT_TWO
     by_slopes = [by_delta * factor * (frames[:, place] * slope) for place, slope in enumerate(slopes)]
     by_spreads = [by_delta * delta * people.sensitivity[:, None], by_criterion * people.criterion[:, None]]
     by = np.stack([by_criterion, 0.5 - share, *by_slopes, *by_spreads])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from study.analysis import estimates
 from study.analysis.same_different import fits as model
 from study.analysis.same_different.interpolation import FEWEST_FOR_INTERVAL, SIDES, Counts, Threshold
+from study.models.differencing import KINDS, Kind, probability_different
 
 FloatArray = NDArray[np.float64]
 
@@ -114,12 +115,12 @@ def fit_model(
     frames, total = both[:, sides], (different.sum(axis=0)[None], shown.sum(axis=0)[None])
     best = model.fit(frames, *total, largest_lapse=largest_lapse)
     spread = _spread_of(level, best, frames, different, shown, largest_lapse)
-    thresholds = {kind: _thresholds(best, spread, frames, sides, kind, confidence) for kind in model.KINDS}
+    thresholds = {kind: _thresholds(best, spread, frames, sides, kind, confidence) for kind in KINDS}
     deviance = max(2 * (_saturated_log_likelihood(*total) - float(best.log_likelihood[0])), 0.0)
     freedom = len(differences) - 2 - len(sides)
     line = np.linspace(differences.min(), differences.max(), 201)
-    curve = model.probability_different(_frames_by_side(line)[:, sides], best.criterion, best.lapse, best.slopes)[0]
-    alarms = model.probability_different(np.zeros((1, len(sides))), best.criterion, best.lapse, best.slopes)
+    curve = probability_different(_frames_by_side(line)[:, sides], best.criterion, best.lapse, best.slopes)[0]
+    alarms = probability_different(np.zeros((1, len(sides))), best.criterion, best.lapse, best.slopes)
     return ModelFit(
         criterion=float(best.criterion[0]),
         criterion_error=spread.criterion_error(best),
@@ -155,7 +156,7 @@ class _Spread:
     left_out: model.Fits | None
     covariance: FloatArray
 
-    def log_threshold_error(self, best: model.Fits, kind: model.Kind, place: int) -> float | None:
+    def log_threshold_error(self, best: model.Fits, kind: Kind, place: int) -> float | None:
         """Standard error of the log threshold of one slope; None where it can't be told."""
         if self.left_out is not None:
             others = model.threshold_frames(self.left_out, kind, self.level)[:, place]
@@ -218,7 +219,7 @@ def _saturated_log_likelihood(different: FloatArray, shown: FloatArray) -> float
 
 
 def _thresholds(
-    best: model.Fits, spread: _Spread, frames: FloatArray, sides: Sequence[int], kind: model.Kind, confidence: float
+    best: model.Fits, spread: _Spread, frames: FloatArray, sides: Sequence[int], kind: Kind, confidence: float
 ) -> dict[str, Threshold]:
     """Thresholds of one kind on every side shown."""
     result: dict[str, Threshold] = {}
@@ -228,7 +229,7 @@ def _thresholds(
 
 
 def _threshold(
-    best: model.Fits, spread: _Spread, largest: float, place: int, index: int, kind: model.Kind, confidence: float
+    best: model.Fits, spread: _Spread, largest: float, place: int, index: int, kind: Kind, confidence: float
 ) -> Threshold:
     """One threshold, with Student's interval of its logarithm."""
     side, clustered = SIDES[index], spread.left_out is not None

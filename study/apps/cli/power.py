@@ -59,6 +59,7 @@ def planned(
     """What is simulated, and in words and numbers what is looked for: `effect`, `icc`, `test`, `aim`."""
     from study.analysis.exclusions import rules_of
     from study.power import design as made
+    from study.tasks.registry import task_of
 
     alpha, missed = protocol.analysis.alpha, options["missed"]
     rules = rules_of(protocol.analysis.exclusions.model_dump())
@@ -77,16 +78,16 @@ def planned(
         }
         verdict = _preference_verdict(study.name, options["share"], alpha)
     elif study.task == "rating":
-        effect = {key: options[key] for key in ("difference", "correlation")}
+        effect, paired = {key: options[key] for key in ("difference", "correlation")}, task_of(study).slots > 1
         settings = made.rating_observer(study, **effect, missed=missed)
         run = made.rating_study(design(settings), alpha, options["difference"])
         said = {
             "icc": options["correlation"],
-            "test": f"Student's t of participants' {'mean scores' if study.paired else 'differences'} at {alpha:g}, "
+            "test": f"Student's t of participants' {'mean scores' if paired else 'differences'} at {alpha:g}, "
             "one question",
             "aim": f"find a difference of {options['difference']:g} points in one question at the level {alpha:g}",
         }
-        made_verdict = _pair_rating_verdict if study.paired else _rating_verdict
+        made_verdict = _pair_rating_verdict if paired else _rating_verdict
         verdict = made_verdict(study, options["difference"], alpha)
     else:
         effect = {key: options[key] for key in ("shorter", "longer", "spread", "precision")}

@@ -12,11 +12,11 @@ from functools import lru_cache
 from typing import Any
 
 from study.experiment import session as sitting
-from study.experiment.plan import legal_answers
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Session
 from study.experiment.steps import Step, answer_keys, answer_words
 from study.experiment.store.participants import Participant
+from study.tasks.registry import task_of
 
 FILMS = "films"
 """Relative to the page, which a proxy may show under any path."""
@@ -79,7 +79,8 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
         study = protocol.study(step.study) if step.study else None
         shown["fps"] = protocol.fps
         shown["example"] = _film(step, participant, film_bytes) if step.stimulus else None
-        shown["keys"] = _options(protocol, legal_answers(study)) if study and study.task != "rating" else []
+        words = study is not None and task_of(study).kind == "word"
+        shown["keys"] = _options(protocol, task_of(study).legal(study)) if study and words else []
     return shown
 
 
@@ -119,7 +120,7 @@ def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
         "high": step.high,
         "window_s": step.duration_s,
         "options": _options(protocol, step.legal),
-        "scale": protocol.study(step.study).task == "rating",
+        "scale": task_of(protocol.study(step.study)).kind == "point",
     }
 
 

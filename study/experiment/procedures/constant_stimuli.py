@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.experiment.procedures.procedure import Draw, Settings
 from study.tasks.answer import Answer
 from study.tasks.trial import Trial, trial_of
+
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -50,24 +53,25 @@ class ConstantStimuli:
 
 def _drawn_set(draw: Draw, repeat: int, rng: np.random.Generator) -> list[Trial]:
     """One repeat: each pair in its order or orders, shuffled."""
-    pairs, order, group = draw.pairs, draw.order, draw.group
-    count = len(pairs)
-    if len(pairs[0].stimuli) == 1:
-        if order == "by-group":
-            turn = group % count
-            return [trial_of(pair, (0,), repeat) for pair in [*pairs[turn:], *pairs[:turn]]]
-        return [trial_of(pairs[i], (0,), repeat) for i in rng.permutation(count)]
-    if order == "both":
-        shown = [(pair, a_first) for pair in pairs for a_first in (True, False)]
-    elif order == "random":
-        shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.integers(0, 2, count), strict=True)]
-    elif order == "balanced":
-        # An odd count leaves one pair over; which way it goes is drawn too.
-        halves = (np.arange(count) + int(rng.integers(0, 2))) % 2 == 0
-        shown = [(pair, bool(a)) for pair, a in zip(pairs, rng.permutation(halves), strict=True)]
+    pairs, arrangements, count = draw.pairs, draw.arrangements, len(draw.pairs)
+    if len(arrangements) == 1:
+        turn, by_group = draw.group % count, draw.order == "by-group"
+        turned = [*pairs[turn:], *pairs[:turn]] if by_group else [pairs[i] for i in rng.permutation(count)]
+        return [trial_of(pair, arrangements[0], repeat) for pair in turned]
+    if draw.order == "both":
+        shown = [(pair, members) for pair in pairs for members in arrangements]
     else:
-        shown = [(pair, group % 2 == 0) for pair in pairs]
-    return [
-        trial_of(pair, (0, 1) if a_first else (1, 0), repeat)
-        for pair, a_first in (shown[i] for i in rng.permutation(len(shown)))
-    ]
+        drawn = drawn_orders(len(arrangements), count, draw.order, rng, draw.group)
+        shown = [(pair, arrangements[place]) for pair, place in zip(pairs, drawn, strict=True)]
+    mixed = (shown[i] for i in rng.permutation(len(shown)))
+    return [trial_of(pair, members, repeat) for pair, members in mixed]
+
+
+def drawn_orders(orders: int, count: int, how: str, rng: np.random.Generator, group: int = 0) -> IntArray:
+    """Which of so many orders each of `count` pairs is shown in, from 0."""
+    if how == "random":
+        return np.asarray(orders - 1 - rng.integers(0, orders, count))
+    if how == "balanced":
+        # A count that does not divide leaves pairs over; which way they go is drawn too.
+        return np.asarray(rng.permutation((np.arange(count) + int(rng.integers(0, orders))) % orders))
+    return np.full(count, group % orders)

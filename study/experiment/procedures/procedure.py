@@ -85,9 +85,11 @@ class Draw:
         Its name.
     pairs
         All that its trials may show, in the protocol's order, which matters: a draw counts on it.
+    arrangements
+        Which member of a pair each slot shows: all that the task has.
     order
-        Of the stimuli in a pair: `both`, `random`, `balanced`, `by-group`; or of stimuli that are shown one by one:
-        `random`, `by-group`.
+        How they are drawn: `both`, `random`, `balanced`, `by-group`; of stimuli that are shown one by one: `random`,
+        `by-group`.
     repeats
         How often the whole set is shown.
     group
@@ -96,6 +98,7 @@ class Draw:
 
     study: str
     pairs: tuple[Pair, ...]
+    arrangements: tuple[Members, ...]
     order: str
     repeats: int
     group: int

@@ -15,7 +15,8 @@ import numpy as np
 
 from study.experiment.procedures.procedure import Asked, Course, Draw, Members, Settings, SettingsError, setting
 from study.models.up_down import Track, UpDown, fewest_trials, moved, reachable, stopped, target
-from study.tasks.answer import Answer, right_answer
+from study.tasks.answer import Answer
+from study.tasks.registry import TASKS, right_answer
 from study.tasks.trial import Pair, Trial, trial_of
 
 SIGNS = {"both": (-1, 1), "shorter": (-1,), "longer": (1,)}
@@ -89,8 +90,9 @@ class Staircase(Settings):
     def problems(self, asked: Asked) -> Iterator[tuple[str, str]]:
         """What does not fit the study: its task, its order, lists of differences, attention checks."""
         where = f"with staircases in the study {asked.name!r}"
-        if asked.task != "same-different":
-            yield "procedure", f"expected a same-different task {where}, found {asked.task!r}; change one"
+        takers = [task.asked_as for task in TASKS.values() if "differences_frames" in task.keys]
+        if asked.task not in takers:
+            yield "procedure", f"expected a {' or '.join(takers)} task {where}, found {asked.task!r}; change one"
         if asked.order not in ("random", "by-group"):
             yield "order", f"expected 'random' or 'by-group' {where}, found {asked.order!r}; change it"
         if asked.attention_checks:
@@ -123,9 +125,9 @@ class Staircase(Settings):
     def course(self, draw: Draw, first: int) -> Course:
         """All that finds the trials again from the answers."""
         most = self.trials(len({pair.motion for pair in draw.pairs}), draw.repeats)[1]
-        orders: tuple[Members, ...] = ((0, 1), (1, 0))
+        orders = draw.arrangements
         if draw.order == "by-group":
-            orders = (orders[draw.group % 2],)
+            orders = (orders[draw.group % len(orders)],)
         return Course(draw.study, first, most, self, draw.pairs, orders, draw.repeats)
 
     def begun(self, course: Course, rng: np.random.Generator) -> Staircases:

@@ -17,6 +17,7 @@ from study.experiment.protocol.methods import OwnMethod
 from study.experiment.protocol.stimuli import Points, Timing, TransitionSpec
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec, check_once, repeated
 from study.experiment.protocol.texts import LONGEST_NAME
+from study.tasks.registry import task_of
 from study.transitions.methods.method import Method
 
 MOST_TRIALS = 100_000
@@ -103,7 +104,7 @@ def _check_methods(protocol: Whole, study: StudySpec, index: int) -> None:
         if name := getattr(study, key):
             _check_known([name], protocol.method_names, "methods", *where, key)
     methods = protocol.methods_of(study)
-    if study.task == "same-different" and not methods[study.reference].make.levels:
+    if study.differences_frames and not methods[study.reference].make.levels:
         raise KeyMismatchError(
             f"expected a reference with one blend length in {who}, found {study.reference!r}; change it",
             *where,
@@ -133,7 +134,7 @@ def _check_known(names: Sequence[str], known: Sequence[str], what: str, *locatio
 
 def _check_analysis(protocol: Whole) -> None:
     """Refuse decisions about the analysis that the studies can't carry out."""
-    preferences = [study.name for study in protocol.studies if study.task == "preference"]
+    preferences = [study.name for study in protocol.studies if task_of(study).tested]
     names = protocol.analysis.confirmatory
     _check_known(names, preferences, "preference studies", "analysis", "confirmatory")
     check_once(names, "study", "analysis", "confirmatory")
@@ -144,7 +145,7 @@ def _check_analysis(protocol: Whole) -> None:
             *where,
             "most_failed_checks",
         )
-    timed = any(study.task != "rating" for study in protocol.studies)
+    timed = any(task_of(study).timed for study in protocol.studies)
     if timed and rules.fastest_s is not None and rules.fastest_s >= protocol.timing.answer_s:
         raise KeyMismatchError(
             f"expected less than timing.answer_s, {protocol.timing.answer_s:g} s, found {rules.fastest_s:g}, which "

@@ -10,6 +10,7 @@ import re
 from typing import TYPE_CHECKING
 
 from study.experiment.protocol.languages import has_words
+from study.tasks.registry import task_of
 
 if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol, StudySpec
@@ -77,7 +78,7 @@ def still_english(protocol: Protocol) -> list[str]:
 
 def _asks_by_items(protocol: Protocol, where: str) -> bool:
     """Whether a question's built-in text is empty, since items ask in its place."""
-    return any(where == f"studies.{study.name}.question" and study.task == "rating" for study in protocol.studies)
+    return any(where == f"studies.{study.name}.question" and not task_of(study).question for study in protocol.studies)
 
 
 _NUMBERS = {
@@ -105,7 +106,7 @@ def _other_windows(protocol: Protocol, study: StudySpec) -> list[str]:
     found = []
     for number in _SECONDS.findall(study.instructions):
         seconds = _NUMBERS.get(number.lower()) or _as_number(number)
-        if study.task == "rating" and seconds is not None:
+        if not task_of(study).timed and seconds is not None:
             known -= {timing.answer_s}
         if seconds is not None and seconds not in known:
             found.append(

@@ -7,7 +7,7 @@ Pydantic models and what keeps one study consistent; `protocol_checks` looks at 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 
@@ -17,9 +17,13 @@ from study.experiment.procedures.registry import settings_of
 from study.experiment.protocol.errors import KeyMismatchError
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
+from study.tasks.registry import NAMES, problems_of
 from study.transitions.methods.registry import METHODS
 
-Task = Literal["same-different", "preference", "rating"]
+if TYPE_CHECKING:
+    TaskName = str
+else:
+    TaskName = Literal[NAMES]
 Order = Literal["both", "random", "balanced", "by-group"]
 Show = Literal["single", "pair"]
 Difference = Annotated[int, Field(ge=-600, le=600)]
@@ -68,7 +72,7 @@ class StudySpec(Part):
 
     name: Slug = Field(description="What plans, answers and reports call it; unique.")
     title: str = Field(default="", description="Heading for reports; the name where it is left out.")
-    task: Task = Field(description="What the participant decides.")
+    task: TaskName = Field(description="What the participant decides.")
     transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(), description="Names of the transitions shown; all of them where it is left out."
     )
@@ -163,58 +167,13 @@ class StudySpec(Part):
         """Names of the methods that this study shows."""
         return (self.reference,) if self.comparison is None else (self.reference, self.comparison)
 
-    @property
-    def paired(self) -> bool:
-        """Whether a trial shows two stimuli, one after the other."""
-        return self.task != "rating" or self.show == "pair"
-
-    def levels_of(self, transition: str) -> tuple[int, ...]:
-        """The differences that are shown of a transition: all in trials, the plainest in practice."""
-        levels = self.differences_frames
-        if transition not in self.practice_transitions:
-            return levels
-        return tuple(level for level in levels if level in (0, min(levels), max(levels)))
-
 
 def _check_task(study: StudySpec) -> None:
     """Refuse what doesn't fit between the task and the other keys of a study."""
-    who = f"the {study.task} study {study.name!r}"
-    for key, words in study.procedure.problems(study):
-        raise KeyMismatchError(words, key)
-    if study.task == "same-different":
-        if not study.differences_frames:
-            raise KeyMismatchError(f"expected differences_frames in {who}, found none; write for example [-5, 0, 5]")
-        check_once(study.differences_frames, "difference", "differences_frames")
-        if study.comparison is not None:
-            raise KeyMismatchError(
-                f"expected no comparison in {who}: differences_frames says it; remove it", "comparison"
-            )
-    elif study.differences_frames:
-        raise KeyMismatchError(
-            f"expected this key in same-different studies only; remove it from {who}", "differences_frames"
-        )
-    if study.task != "same-different" and study.paired and study.comparison in (None, study.reference):
-        raise KeyMismatchError(f"expected a comparison other than {study.reference!r} in {who}; name one", "comparison")
-    if study.task == "rating":
-        if not study.items:
-            raise KeyMismatchError(f"expected at least one [[studies.items]] in {who}, found none; add one")
-        check_once([item.name for item in study.items], "item's name", "items")
-        if not study.paired and study.order in ("both", "balanced"):
-            raise KeyMismatchError(
-                f"expected 'random' or 'by-group' in {who}, where stimuli are shown singly, found {study.order!r}; "
-                'change it, or write show = "pair"',
-                "order",
-            )
-        if named := [item.name for item in study.items if item.middle and study.scale_points % 2 == 0]:
-            raise KeyMismatchError(
-                f"expected an odd number of scale_points in {who}, where {named[0]!r} has words for the middle, found "
-                f"{study.scale_points}; change it, or remove middle",
-                "scale_points",
-            )
-        return
-    for key in ("items", "show"):
-        if getattr(study, key):
-            raise KeyMismatchError(f"expected {key} in rating studies only; remove it from {who}", key)
+    for key, problem in (*study.procedure.problems(study), *problems_of(study)):
+        raise KeyMismatchError(problem, *filter(None, (key,)))
+    check_once(study.differences_frames, "difference", "differences_frames")
+    check_once([item.name for item in study.items], "item's name", "items")
 
 
 def check_once(values: Sequence[object], what: str, *location: int | str) -> None:

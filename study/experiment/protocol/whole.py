@@ -27,6 +27,7 @@ from study.experiment.protocol.stimuli import Points, StimulusSettings, Timing, 
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
 from study.files import read_text
+from study.tasks.registry import task_of
 from study.toml_text import LARGEST_TEXT, parse_toml
 from study.transitions.methods.method import Method
 from study.transitions.methods.registry import METHODS
@@ -126,14 +127,11 @@ class Protocol(Part):
 
     def trials_of(self, study: StudySpec) -> int:
         """How many trials of a study a participant sees at most, practice and attention checks apart."""
-        shown = len(self.transitions_of(study))
+        task, shown = task_of(study), len(self.transitions_of(study))
         if (own := study.procedure.trials(shown, study.repeats)) is not None:
             return own[1]
-        if study.task == "same-different":
-            shown *= len(study.differences_frames)
-        if not study.paired:
-            return shown * len(study.methods) * study.repeats
-        return shown * study.repeats * (2 if study.order == "both" else 1)
+        orders = len(task.orders) if study.order == "both" else 1
+        return shown * len(task.conditions(study, False)) * study.repeats * orders
 
     def fewest_trials_of(self, study: StudySpec) -> int:
         """How many trials of a study a participant sees at least."""
@@ -177,7 +175,7 @@ class Protocol(Part):
     @property
     def scale_points(self) -> dict[str, int]:
         """Points of the scale of each rating study, by its name."""
-        return {study.name: study.scale_points for study in self.studies if study.task == "rating"}
+        return {study.name: study.scale_points for study in self.studies if task_of(study).kind == "point"}
 
     def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
         """The transitions that a study's practice alone shows."""

@@ -40,9 +40,9 @@ class Draft:
 def add_drafts(protocol: Protocol, planned: Planned, drafts: dict[Film, Draft], ways: Ways) -> None:
     """Make what is seen in one study of one transition, but for what was made before."""
     for showing in planned.showings:
-        seen = ((showing.a, showing.method_a, 0), (showing.b, showing.method_b, showing.difference_frames or 0))
-        for film, method, difference in seen:
-            if film is not None and film not in drafts:
+        condition = showing.condition
+        for film, method, difference in zip(showing.films, condition.methods, condition.added_frames, strict=True):
+            if film not in drafts:
                 drafts[film] = _draft(protocol, planned, method, difference, film, ways)
 
 

@@ -14,6 +14,8 @@ from study.errors import SegueError, StimulusError
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.points import Settled, settle
 from study.experiment.stimuli.ways import Ways
+from study.tasks.registry import task_of
+from study.tasks.task import Condition
 from study.transitions.methods.method import Way
 
 if TYPE_CHECKING:
@@ -50,19 +52,11 @@ class Film:
 
 @dataclass(frozen=True, eq=False)
 class Showing:
-    """One film, or two that are compared: by `method_a`, and by `method_b` with so many frames of difference."""
+    """The films of one pair: what the task asks for, and how each of them is made."""
 
     settled: Settled
-    a: Film
-    b: Film | None
-    method_a: str
-    method_b: str
-    difference_frames: int | None
-
-    @property
-    def films(self) -> tuple[Film, ...]:
-        """What is seen, in a trial."""
-        return (self.a,) if self.b is None else (self.a, self.b)
+    condition: Condition
+    films: tuple[Film, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,17 +97,9 @@ def plan_all(
 
 def showings(study: StudySpec, settled: Settled, ways: Ways) -> Iterator[Showing]:
     """The pairs of one transition in one study, or its single films where they are rated one by one."""
-    a = _film(study, settled, study.reference, 0, ways)
-    if study.task == "same-different":
-        for difference in study.levels_of(settled.transition.name):
-            other = _film(study, settled, study.reference, difference, ways)
-            yield Showing(settled, a, other, study.reference, study.reference, difference)
-    elif study.paired:
-        method = study.comparison or study.reference
-        yield Showing(settled, a, _film(study, settled, method, 0, ways), study.reference, method, None)
-    else:
-        for method in study.methods:
-            yield Showing(settled, _film(study, settled, method, 0, ways), None, method, method, None)
+    for condition in task_of(study).conditions(study, settled.transition.name in study.practice_transitions):
+        made = zip(condition.methods, condition.added_frames, strict=True)
+        yield Showing(settled, condition, tuple(_film(study, settled, *each, ways) for each in made))
 
 
 def alike(study: StudySpec, settled: Settled, ways: Ways) -> bool:

@@ -16,6 +16,7 @@ from study.experiment.stimuli.supply import Supply
 from study.experiment.stimuli.ways import Ways
 from study.experiment.wording import Films, FilmTimes, duration_s, minutes
 from study.motion.clip import file_frame
+from study.tasks.registry import task_of
 from study.transitions.advice import JND_LONGER_S, JND_SHORTER_S, just_noticeable
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def _row(protocol: Protocol, planned: Planned) -> Row:
     lengths: dict[str, tuple[int, ...]] = {method: _lengths(planned.showings, method) for method in study.methods}
     made = dict.fromkeys(f"{by}: {film.way.note}" for film, by in _seen(planned.showings) if film.way.note)
     gave_up = [f"{method}: {settled.lengths[method].note}" for method in study.methods if settled.lengths[method].note]
-    k_frames = planned.showings[0].a.way.blend_frames
+    k_frames = planned.showings[0].films[0].way.blend_frames
     return Row(
         study.name,
         settled.transition.name,
@@ -151,9 +152,7 @@ def _lengths(showings: Sequence[Showing], method: str) -> tuple[int, ...]:
 def _seen(showings: Sequence[Showing]) -> Iterator[tuple[Film, str]]:
     """Each film with its method."""
     for each in showings:
-        yield each.a, each.method_a
-        if each.b is not None:
-            yield each.b, each.method_b
+        yield from zip(each.films, each.condition.methods, strict=True)
 
 
 def _times(study: StudySpec, protocol: Protocol, planned: Sequence[Planned]) -> FilmTimes | None:
@@ -163,7 +162,8 @@ def _times(study: StudySpec, protocol: Protocol, planned: Sequence[Planned]) -> 
     for each in planned:
         if each.study is study:
             own = practice if each.for_practice else trials
-            own += [sum(film.frames(protocol) for film in showing.films) / protocol.fps for showing in each.showings]
+            shown = task_of(study).orders[0]
+            own += [sum(one.films[i].frames(protocol) for i in shown) / protocol.fps for one in each.showings]
     if not trials:
         return None
     mean = sum(trials) / len(trials)

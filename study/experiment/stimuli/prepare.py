@@ -83,26 +83,21 @@ def versions() -> dict[str, str]:
 
 
 def _pair(study: StudySpec, showing: Showing, stimuli: dict[Film, Stimulus]) -> Pair:
-    transition = showing.settled.transition
-    name = f"{study.name}/{transition.name}"
+    transition, condition = showing.settled.transition, showing.condition
     shown = tuple(stimuli[film].id for film in showing.films)
-    if len(set(shown)) < len(shown) and showing.method_a != showing.method_b:
+    if len(set(shown)) < len(set(condition.methods)):
+        one, other = (repr(method) for method in condition.methods[:2])
         raise StimulusError(
-            f"transition {transition.name!r}: expected two films by the methods {showing.method_a!r} and "
-            f"{showing.method_b!r} of the study {study.name!r}, found that they look the same; choose other motions, "
-            "other points, or another method."
+            f"transition {transition.name!r}: expected two films by the methods {one} and {other} of the study "
+            f"{study.name!r}, found that they look the same; choose other motions, other points, or another method."
         )
-    if study.task == "same-different":
-        name += f"/{showing.difference_frames:+d}"
-    elif not study.paired:
-        name += f"/{showing.method_a}"
     return Pair(
-        name=name,
+        name="/".join(filter(None, (study.name, transition.name, condition.name))),
         study=study.name,
         task=study.task,
         motion=transition.name,
         category=transition.category,
         stimuli=shown,
-        methods=(showing.method_a, showing.method_b)[: len(shown)],
-        difference_frames=showing.difference_frames,
+        methods=condition.methods,
+        difference_frames=condition.difference_frames,
     )

@@ -20,7 +20,8 @@ from study.experiment.store.databases import alone
 from study.experiment.store.responses import Clock, Responses, rows_of, utc_now
 from study.experiment.store.sessions import SessionRecord, find_session
 from study.experiment.store.tables import answers, events, form_values, presentations
-from study.tasks.answer import Answer, answer_columns
+from study.tasks.answer import Answer
+from study.tasks.registry import answer_columns
 from study.tasks.trial import Trial
 
 

@@ -1,0 +1,47 @@
+"""Choice between two methods by their utilities: an observer's parameters in, chances and true shares out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.models.sigmoids import logistic
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PreferenceObserver:
+    """Choice by utilities: log-odds of choosing a over b are the difference of the methods' utilities.
+
+    `order_bias` is the log-odds that the first of two equal stimuli is chosen; `participant_sd` the standard
+    deviation over participants of their preference between methods.
+    """
+
+    utility: Mapping[str, float]
+    order_bias: float = 0.1
+    lapse: float = 0.01
+    participant_sd: float = 0.0
+
+
+def lean(observer: PreferenceObserver, method_a: str, method_b: str) -> float:
+    """Log-odds of choosing method a over b, order apart."""
+    return observer.utility.get(method_a, 0.0) - observer.utility.get(method_b, 0.0)
+
+
+def chance_of_first(observer: PreferenceObserver, towards_first: float) -> float:
+    """Chance that the first of two is chosen, where the log-odds for it are `towards_first` besides the order's."""
+    chance = float(logistic(np.asarray(towards_first + observer.order_bias)))
+    return observer.lapse / 2 + (1 - observer.lapse) * chance
+
+
+def preference_probability(observer: PreferenceObserver, method_a: str, method_b: str) -> float:
+    """Probability over participants and both orders that method a is chosen."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(31)
+    leaning = lean(observer, method_a, method_b) + observer.participant_sd * nodes
+    both = 0.5 * (logistic(leaning + observer.order_bias) + logistic(leaning - observer.order_bias))
+    chosen = float((both * weights).sum() / weights.sum())
+    return observer.lapse / 2 + (1 - observer.lapse) * chosen

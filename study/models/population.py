@@ -1,0 +1,86 @@
+"""Participants of a same-different task who differ from one another: an observer's parameters in, chances out.
+
+Each decides by the differencing model: a difference of `n` frames moves the percepts apart by `n` times the observer's
+d' a frame, which differs between shorter and longer blends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import SessionError
+from study.models.differencing import detected
+
+FloatArray = NDArray[np.float64]
+
+LEAST_CRITERION = 0.2
+"""No participant's criterion lies below this: at 0 a person would say "different" always."""
+
+
+@dataclass(frozen=True)
+class SameDifferentObserver:
+    """Same-different by the differencing model.
+
+    Parameters
+    ----------
+    d_prime_shorter, d_prime_longer
+        Sensitivity a frame of difference, for comparisons shorter and longer than the reference; above 0.
+    criterion
+        Distance of percepts beyond which the answer is "different", in noise units; above 0.
+    lapse
+        Proportion of trials answered without having looked, half of them "different".
+    log_sensitivity_sd, criterion_sd
+        How participants differ: standard deviations of the logarithm of both sensitivities together, and of the
+        criterion.
+    """
+
+    d_prime_shorter: float
+    d_prime_longer: float
+    criterion: float = 2.0
+    lapse: float = 0.02
+    log_sensitivity_sd: float = 0.15
+    criterion_sd: float = 0.15
+
+
+def probability_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
+    """Probability of "different" for one observer without deviations, in the shape of the differences."""
+    differences = np.asarray(difference_frames, dtype=np.float64)
+    slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
+    return _with_lapses(detected(np.abs(differences) * slope, observer.criterion), observer.lapse)
+
+
+def population_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
+    """Probability of "different" over all participants: the mean over their sensitivities and criteria."""
+    differences = np.asarray(difference_frames, dtype=np.float64)
+    slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(31)
+    weights = weights / weights.sum()
+    sensitivity = np.exp(observer.log_sensitivity_sd * nodes)[:, None]
+    criterion = np.maximum(observer.criterion + observer.criterion_sd * nodes, LEAST_CRITERION)[None, :]
+    distance = (np.abs(differences) * slope)[..., None, None] * sensitivity
+    chances = _with_lapses(detected(distance, criterion), observer.lapse)
+    return np.asarray(np.einsum("...sc,s,c->...", chances, weights, weights))
+
+
+def _with_lapses(share: FloatArray, lapse: float) -> FloatArray:
+    return np.asarray(lapse / 2 + (1 - lapse) * share)
+
+
+def crossing(observer: SameDifferentObserver, level: float, slope: float) -> float:
+    """The difference in frames at which the population reaches a level, at a slope in d' a frame."""
+    from scipy.optimize import brentq
+
+    straight = replace(observer, d_prime_shorter=slope, d_prime_longer=slope)
+
+    def above(frames: float) -> float:
+        return float(population_different(straight, frames)) - level
+
+    if above(0.0) >= 0 or above(60.0 / slope) <= 0:
+        raise SessionError(
+            f"Expected an observer that reaches {level:.0%} 'different' at some difference, found "
+            f"{level + above(0.0):.1%} at none and {level + above(60.0 / slope):.1%} at most; change the criterion."
+        )
+    return float(brentq(above, 0.0, 60.0 / slope, xtol=1e-10))

@@ -1,0 +1,32 @@
+"""What tasks over methods share: one pair a transition, of two methods that differ."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from study.tasks.task import Asked, Condition, Problem
+from study.tasks.trial import Pair
+
+
+def both_methods(asked: Asked, for_practice: bool) -> tuple[Condition, ...]:
+    """Both methods of a study, as one pair."""
+    del for_practice
+    return (Condition("", (asked.reference, asked.comparison or asked.reference), (0, 0)),)
+
+
+def any_practice(pairs: Sequence[Pair], count: int) -> list[Pair]:
+    """Pairs as they were shuffled."""
+    return list(pairs[:count])
+
+
+def two_methods(asked: Asked) -> Iterator[Problem]:
+    """A second method that is missing, or the same as the first."""
+    if asked.comparison in (None, asked.reference):
+        who = f"the {asked.task} study {asked.name!r}"
+        yield "comparison", f"expected a comparison other than {asked.reference!r} in {who}; name one"
+
+
+def against(asked: Asked, blends: Callable[[str], str]) -> str:
+    """The method, or both methods, in words."""
+    first = blends(asked.reference)
+    return first if asked.comparison is None else f"{first} and {blends(asked.comparison)}"

@@ -1,0 +1,62 @@
+"""Preference: two methods' transitions, and which is more natural (2004 section 5.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from study.models.choice import chance_of_first, lean, preference_probability
+from study.tasks.answer import Answer
+from study.tasks.methods import against, any_practice, both_methods, two_methods
+from study.tasks.observer import ObserverSettings, Person
+from study.tasks.task import Asked, Task
+from study.tasks.trial import Trial
+
+
+def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
+    counted = not answer.missed and trial.role != "check"
+    return {"a_first": trial.a_first, "chose_a": (answer.value == "first") == trial.a_first if counted else None}
+
+
+def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
+    first, second = legal
+    leaning = lean(who.settings.preference, *trial.methods) + who.lean
+    chance = chance_of_first(who.settings.preference, leaning if trial.a_first else -leaning)
+    return (first if rng.random() < chance else second), abs(2 * chance - 1)
+
+
+def _truth(settings: ObserverSettings, asked: Asked, level: float) -> dict[str, Any]:
+    del level
+    share = preference_probability(settings.preference, asked.reference, asked.comparison or asked.reference)
+    return {"favouring_a": round(share, 6)}
+
+
+def _in_words(asked: Asked, blends: Callable[[str], str]) -> str:
+    return f"chose the more natural of two transitions, {against(asked, blends)}"
+
+
+PREFERENCE = Task(
+    name="preference",
+    asked_as="preference",
+    decides="which of two transitions is more natural",
+    layout="one after another",
+    kind="word",
+    orders=((0, 1), (1, 0)),
+    timed=True,
+    tested=True,
+    keys=frozenset(),
+    instructions="preference",
+    question="question_preference",
+    welcome="welcome_pairs",
+    legal=lambda _: ("first", "second"),
+    right=lambda _: None,
+    columns=_columns,
+    problems=two_methods,
+    conditions=both_methods,
+    practice=any_practice,
+    judge=_judge,
+    truth=_truth,
+    in_words=_in_words,
+)

@@ -1,0 +1,100 @@
+"""Rating: one transition, and points of a scale for it, a question each (2003 section 4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from study.counting import counted
+from study.tasks.answer import Answer
+from study.tasks.methods import against, any_practice
+from study.tasks.observer import ObserverSettings, Person
+from study.tasks.task import Asked, Condition, Problem, Task
+from study.tasks.trial import Trial
+
+
+def points(asked: Asked) -> tuple[str, ...]:
+    """The points of the scale, from 0."""
+    return tuple(str(point) for point in range(asked.scale_points))
+
+
+def scale_problems(asked: Asked) -> Iterator[Problem]:
+    """Questions that are missing, and a middle that the scale does not have."""
+    who = f"the {asked.task} study {asked.name!r}"
+    if not asked.items:
+        yield "", f"expected at least one [[studies.items]] in {who}, found none; add one"
+    if named := [item.name for item in asked.items if item.middle and asked.scale_points % 2 == 0]:
+        yield (
+            "scale_points",
+            f"expected an odd number of scale_points in {who}, where {named[0]!r} has words for the middle, found "
+            f"{asked.scale_points}; change it, or remove middle",
+        )
+
+
+def rated_point(who: Person, higher: float, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
+    """The point that a person gives to what lies `higher` points above the middle of the scale."""
+    noise = who.settings.rating.noise_sd * float(rng.standard_normal())
+    return legal[int(np.clip(round((len(legal) - 1) / 2 + higher + noise), 0, len(legal) - 1))], 0.5
+
+
+def scale_in_words(asked: Asked, blends: Callable[[str], str]) -> str:
+    """What is rated, on which scale."""
+    asked_items = counted(len(asked.items), "question")
+    return f"{against(asked, blends)}, on a scale of 0 to {asked.scale_points - 1} in {asked_items}"
+
+
+def _problems(asked: Asked) -> Iterator[Problem]:
+    yield from scale_problems(asked)
+    if asked.order in ("both", "balanced"):
+        yield (
+            "order",
+            f"expected 'random' or 'by-group' in the {asked.task} study {asked.name!r}, where stimuli are shown "
+            f'singly, found {asked.order!r}; change it, or write show = "pair"',
+        )
+
+
+def _conditions(asked: Asked, for_practice: bool) -> tuple[Condition, ...]:
+    del for_practice
+    methods = (asked.reference,) if asked.comparison is None else (asked.reference, asked.comparison)
+    return tuple(Condition(method, (method,), (0,)) for method in methods)
+
+
+def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
+    del trial, answer
+    return {}
+
+
+def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
+    utility = who.settings.preference.utility.get(trial.methods[0], 0.0)
+    return rated_point(who, who.settings.rating.utility_weight * utility + who.leniency, legal, rng)
+
+
+def _no_truth(settings: ObserverSettings, asked: Asked, level: float) -> None:
+    del settings, asked, level
+
+
+RATING = Task(
+    name="rating",
+    asked_as="rating",
+    decides="points of a scale for one transition",
+    layout="one after another",
+    kind="point",
+    orders=((0,),),
+    timed=False,
+    tested=False,
+    keys=frozenset({"items", "show"}),
+    instructions="rating",
+    question="",
+    welcome="welcome_films",
+    legal=points,
+    right=lambda _: None,
+    columns=_columns,
+    problems=_problems,
+    conditions=_conditions,
+    practice=any_practice,
+    judge=_judge,
+    truth=_no_truth,
+    in_words=lambda asked, blends: f"rated {scale_in_words(asked, blends)}",
+)

@@ -1,0 +1,79 @@
+"""Every task by name. A new one is a module and one line here; everything else asks this registry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from study.tasks.answer import Answer
+from study.tasks.pair_rating import PAIR_RATING
+from study.tasks.preference import PREFERENCE
+from study.tasks.rating import RATING
+from study.tasks.same_different import SAME_DIFFERENT
+from study.tasks.task import Asked, Problem, Task
+from study.tasks.trial import Trial
+
+TASKS: Mapping[str, Task] = {task.name: task for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING)}
+
+NAMES: tuple[str, ...] = tuple(dict.fromkeys(task.asked_as for task in TASKS.values()))
+"""What a protocol may call a task."""
+
+
+def task_of(asked: Asked) -> Task:
+    """The task of a study; of those that are asked as one, a study that shows a `pair` has the one of that name."""
+    own = [task for task in TASKS.values() if task.asked_as == asked.task]
+    return next((task for task in own if task.name == f"{asked.show}-{asked.task}"), own[0])
+
+
+def task_of_trial(trial: Trial) -> Task:
+    """The task of a trial: of those that are asked as one, the one with as many slots."""
+    own = (task for task in TASKS.values() if task.asked_as == trial.task)
+    return next(task for task in own if task.slots == len(trial.stimuli))
+
+
+def problems_of(asked: Asked) -> Iterator[Problem]:
+    """What does not fit between a study's task and its other keys."""
+    task = task_of(asked)
+    for key in sorted(frozenset().union(*(one.keys for one in TASKS.values())) - task.keys):
+        if getattr(asked, key):
+            takers = dict.fromkeys(one.asked_as for one in TASKS.values() if key in one.keys)
+            who = f"the {asked.task} study {asked.name!r}"
+            yield key, f"expected {key} in {' and '.join(takers)} studies only; remove it from {who}"
+    yield from task.problems(asked)
+
+
+def right_answer(trial: Trial) -> str | None:
+    """The right answer to a trial; None where none is right."""
+    return trial.expected if trial.role == "check" else task_of_trial(trial).right(trial)
+
+
+def answer_columns(trial: Trial, answer: Answer) -> dict[str, Any]:
+    """A row of the table of answers: the trial, what was answered, and what that means to the task."""
+    right = right_answer(trial)
+    return {
+        "trial": trial.trial,
+        "item": answer.item,
+        "attempt": answer.attempt,
+        "study": trial.study,
+        "task": trial.task,
+        "repeat": trial.repeat,
+        "pair": trial.pair,
+        "motion": trial.motion,
+        "category": trial.category,
+        "first": trial.stimuli[0],
+        "second": trial.stimuli[1] if len(trial.stimuli) > 1 else "",
+        "difference_frames": trial.difference_frames,
+        "reference_first": None,
+        "method_a": trial.methods[0],
+        "method_b": trial.methods[1] if len(trial.methods) > 1 else "",
+        "a_first": None,
+        "answer": answer.value,
+        "missed": answer.missed,
+        "correct": None if answer.missed or right is None else answer.value == right,
+        "chose_a": None,
+        "response_s": answer.response_s,
+        "shown_well": answer.shown_well,
+        "role": trial.role,
+        "expected": trial.expected,
+        **task_of_trial(trial).columns(trial, answer),
+    }

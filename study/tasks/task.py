@@ -1,0 +1,177 @@
+"""What the house asks of a task. A task is one `Task`, in a module of its own; `registry` finds it by name.
+
+A task knows no protocol, session or database. What it reads of a study is `Asked`: plain keys of the protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from study.tasks.answer import Answer
+from study.tasks.observer import ObserverSettings, Person
+from study.tasks.trial import Pair, Trial
+
+Layout = Literal["one after another"]
+"""How the slots of a trial are shown."""
+
+Kind = Literal["word", "point"]
+"""What is answered: a word, each with a button and a key, or a point of a scale."""
+
+
+class Item(Protocol):
+    """One question of a rating."""
+
+    @property
+    def name(self) -> str:
+        """What the answers call it."""
+
+    @property
+    def middle(self) -> str:
+        """Words at the middle of the scale."""
+
+
+class Asked(Protocol):
+    """What a task reads of a study: its keys in the protocol."""
+
+    @property
+    def name(self) -> str:
+        """What plans and answers call it."""
+
+    @property
+    def task(self) -> str:
+        """What the protocol calls the task."""
+
+    @property
+    def show(self) -> str | None:
+        """`single` or `pair`, for ratings."""
+
+    @property
+    def reference(self) -> str:
+        """Method of the reference, method a, or of what is rated."""
+
+    @property
+    def comparison(self) -> str | None:
+        """Method b, or a second one to rate."""
+
+    @property
+    def differences_frames(self) -> Sequence[int]:
+        """Comparison minus reference, a pair each."""
+
+    @property
+    def order(self) -> str:
+        """How the orders within a pair are drawn."""
+
+    @property
+    def repeats(self) -> int:
+        """How often the whole set is shown."""
+
+    @property
+    def scale_points(self) -> int:
+        """Points of the rating scale."""
+
+    @property
+    def items(self) -> Sequence[Item]:
+        """Questions of a rating."""
+
+
+Problem = tuple[str, str]
+"""A key of the study (empty for the study itself), and what is wrong with it: expected, found, what to do."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """The stimuli of one pair, before any is made.
+
+    Parameters
+    ----------
+    name
+        What tells the pair from the others of its transition, such as `+5`; empty where there is one alone.
+    methods
+        How the blend length of each stimulus is found.
+    added_frames
+        What is added to each of these lengths.
+    difference_frames
+        Comparison minus reference; None where methods are compared.
+    """
+
+    name: str
+    methods: tuple[str, ...]
+    added_frames: tuple[int, ...]
+    difference_frames: int | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """One task: every question that the house asks.
+
+    Parameters
+    ----------
+    name
+        Unique. Analyses, report sections and power know it by this.
+    asked_as
+        What the protocol and the table of answers call it; `rating` is two tasks, by how many stimuli are shown.
+    decides
+        What is decided, as a clause: "whether two transitions are the same".
+    layout, kind
+        How its slots are shown, and what is answered.
+    orders
+        The orders in which a pair can be shown: for each slot, which of the pair's stimuli it shows.
+    timed
+        Whether the answer has a time limit.
+    tested
+        Whether its studies have a test that can be confirmatory.
+    keys
+        Keys of a study that only some tasks take, this one among them.
+    instructions, question, welcome
+        Names of its built-in words: what is read before a study, what is asked after each trial (empty where items
+        ask), and the welcome of a session that has no other kind of trial.
+    legal
+        The answers that count.
+    right
+        The right answer to a trial; None where none is right.
+    columns
+        Columns of the table of answers that it gives a meaning; empty ones are left out.
+    problems
+        What does not fit between the task and the other keys of a study.
+    conditions
+        The pairs of one transition, in order; those of practice where asked for.
+    practice
+        Pairs for so many practice trials, out of shuffled ones; fewer are repeated.
+    judge
+        How a simulated person answers: the answer, and how easy it was from 0 to 1.
+    truth
+        What an analysis of a simulated study should find, at a threshold; None where nothing is known.
+    in_words
+        What participants did, as a clause for a Methods section, given words for the methods.
+    """
+
+    name: str
+    asked_as: str
+    decides: str
+    layout: Layout
+    kind: Kind
+    orders: tuple[tuple[int, ...], ...]
+    timed: bool
+    tested: bool
+    keys: frozenset[str]
+    instructions: str
+    question: str
+    welcome: str
+    legal: Callable[[Asked], tuple[str, ...]]
+    right: Callable[[Trial], str | None]
+    columns: Callable[[Trial, Answer], Mapping[str, Any]]
+    problems: Callable[[Asked], Iterator[Problem]]
+    conditions: Callable[[Asked, bool], tuple[Condition, ...]]
+    practice: Callable[[Sequence[Pair], int], list[Pair]]
+    judge: Callable[[Person, Trial, Sequence[str], np.random.Generator], tuple[str, float]]
+    truth: Callable[[ObserverSettings, Asked, float], dict[str, Any] | None]
+    in_words: Callable[[Asked, Callable[[str], str]], str]
+
+    @property
+    def slots(self) -> int:
+        """How many stimuli a trial shows."""
+        return len(self.orders[0])
