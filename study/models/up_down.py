@@ -29,6 +29,8 @@ class UpDown:
         How many times as large as steps down the steps up are.
     reversals, trials
         A staircase stops after so many changes of direction, or after so many trials.
+    averaged
+        Its threshold is the mean of so many reversals, the last ones.
     """
 
     start: int
@@ -40,6 +42,7 @@ class UpDown:
     up_times: int = 1
     reversals: int = 8
     trials: int = 50
+    averaged: int = 6
 
 
 @dataclass(frozen=True)

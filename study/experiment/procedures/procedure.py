@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from abc import ABC
 from collections.abc import Iterator, Sequence
-from dataclasses import MISSING, dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 from typing import Protocol as Shape
 
 import numpy as np
@@ -21,13 +21,6 @@ from study.tasks.trial import Pair, Trial
 
 Members = tuple[int, ...]
 """Which of a pair's stimuli each slot of a trial shows."""
-
-
-def setting(words: str, default: Any = MISSING) -> Any:
-    """A field of settings, with the words that explain it to who writes a protocol; `[unit]` may stand at their end."""
-    if default is MISSING:
-        return field(metadata={"words": words})
-    return field(default=default, metadata={"words": words})
 
 
 class SettingsError(ValueError):

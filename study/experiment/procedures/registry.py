@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, asdict, fields
 from difflib import get_close_matches
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from annotated_types import Ge
 
 from study.experiment.procedures.constant_stimuli import Constant
 from study.experiment.procedures.procedure import Course, Settings, SettingsError
@@ -30,7 +32,7 @@ def settings_of(table: Mapping[str, Any]) -> Settings:
     if name not in PROCEDURES:
         raise SettingsError("name", _expected_one_of(PROCEDURES, name))
     member = PROCEDURES[name]
-    hints, known = get_type_hints(member), {field.name: field for field in fields(member)}
+    hints, known = get_type_hints(member, include_extras=True), {field.name: field for field in fields(member)}
     for key, value in own.items():
         if key not in known:
             near = get_close_matches(key[:80], known, n=1)
@@ -59,7 +61,16 @@ def course_from_json(data: Mapping[str, Any]) -> Course:
 
 
 def _checked(key: str, value: Any, wanted: Any) -> Any:
-    """A value of the type that a field has."""
+    """A value of the type that a field has, and within its bounds."""
+    if get_origin(wanted) is Annotated:
+        kind, *bounds = get_args(wanted)
+        checked, (least, most) = (
+            _checked(key, value, kind),
+            (bound.ge if isinstance(bound, Ge) else bound.le for bound in bounds),
+        )
+        if not least <= checked <= most:
+            raise SettingsError(key, f"expected from {least} to {most}, found {value!r}; change it")
+        return checked
     choices, inner = get_args(wanted), get_origin(wanted)
     if inner is tuple:
         if not isinstance(value, (list, tuple)):

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from annotated_types import Ge, Le
 
-from study.experiment.procedures.procedure import Asked, Course, Draw, Members, Settings, SettingsError, setting
+from study.experiment.procedures.procedure import Asked, Course, Draw, Members, Settings, SettingsError
 from study.models.up_down import Track, UpDown, fewest_trials, moved, reachable, stopped, target
 from study.tasks.answer import Answer
 from study.tasks.registry import TASKS, right_answer
 from study.tasks.trial import Pair, Trial, trial_of
+from study.transitions.methods.method import required, setting
 
 SIGNS = {"both": (-1, 1), "shorter": (-1,), "longer": (1,)}
-MOST_FRAMES = 400
 
 
 @dataclass(frozen=True)
@@ -36,40 +37,49 @@ class Staircase(Settings):
         "49, 227–229.",
     )
 
-    start_frames: int = setting("Difference of the first trial. [frames]")
-    most_frames: int = setting("Largest difference that is shown. [frames]")
-    least_frames: int = setting("Smallest difference that is shown. [frames]", 1)
-    steps_frames: tuple[int, ...] = setting(
+    start_frames: Annotated[int, Ge(1), Le(400)] = required("Difference of the first trial. [frames]")
+    most_frames: Annotated[int, Ge(1), Le(400)] = required("Largest difference that is shown. [frames]")
+    least_frames: Annotated[int, Ge(1), Le(400)] = setting(1, "Smallest difference that is shown. [frames]")
+    steps_frames: tuple[Annotated[int, Ge(1), Le(400)], ...] = setting(
+        (4, 2, 1),
         "Sizes of the steps down: the first until the first reversal, the second until the second, and so on; the last "
         "one stays. [frames]",
-        (4, 2, 1),
     )
-    down: int = setting("Right answers in a row after which the difference becomes smaller.", 2)
-    up: int = setting("Wrong answers in a row after which it becomes larger.", 1)
-    up_times: int = setting(
-        "How many times as large as steps down the steps up are; with `down = 1`, 3 aims at 75% and 4 at 80%.", 1
+    down: Annotated[int, Ge(1), Le(10)] = setting(
+        2, "Right responses in a row after which the difference becomes smaller."
     )
-    side: Literal["both", "shorter", "longer"] = setting("Which blends are compared with the reference.", "both")
-    reversals: int = setting("A staircase stops after so many reversals.", 8)
-    averaged: int = setting("The threshold is the mean of so many reversals, the last ones.", 6)
-    most_trials: int = setting("A staircase stops after so many trials, whatever its reversals. [trials]", 50)
-    catch_every: int = setting("Of so many trials one shows no difference; 0 for none. [trials]", 5)
+    up: Annotated[int, Ge(1), Le(10)] = setting(1, "Wrong responses in a row after which it becomes larger.")
+    up_times: Annotated[int, Ge(1), Le(20)] = setting(
+        1, "How many times as large as steps down the steps up are; with `down = 1`, 3 aims at 75% and 4 at 80%."
+    )
+    side: Literal["both", "shorter", "longer"] = setting("both", "Which blends are compared with the reference.")
+    reversals: Annotated[int, Ge(2), Le(100)] = setting(8, "A staircase stops after so many reversals.")
+    averaged: Annotated[int, Ge(1), Le(100)] = setting(
+        6, "The threshold is the mean of so many reversals, the last ones."
+    )
+    most_trials: Annotated[int, Ge(2), Le(1000)] = setting(
+        50, "A staircase stops after so many trials, whatever its reversals. [trials]"
+    )
+    catch_every: Annotated[int, Ge(0), Le(1000)] = setting(
+        5, "Of so many trials one shows no difference; 0 for none. [trials]"
+    )
 
     def __post_init__(self) -> None:
-        bounds = {
-            "most_frames": (1, MOST_FRAMES), "least_frames": (1, self.most_frames),
-            "start_frames": (self.least_frames, self.most_frames),
-            "down": (1, 10), "up": (1, 10), "up_times": (1, 20), "reversals": (2, 100), "averaged": (1, self.reversals),
-            "most_trials": (2, 1000), "catch_every": (0, 1000),
-        }  # fmt: skip
-        for key, (least, most) in bounds.items():
-            if not least <= (found := getattr(self, key)) <= most:
-                raise SettingsError(key, f"expected a whole number from {least} to {most}, found {found}; change it")
-        if not self.steps_frames or not all(1 <= step <= MOST_FRAMES for step in self.steps_frames):
-            raise SettingsError("steps_frames", f"expected one step or more, from 1 to {MOST_FRAMES} frames; change it")
+        if not self.least_frames <= self.start_frames <= self.most_frames:
+            raise SettingsError(
+                "start_frames",
+                f"expected from least_frames to most_frames, {self.least_frames} to {self.most_frames}, found "
+                f"{self.start_frames}; change one",
+            )
+        if not self.steps_frames:
+            raise SettingsError("steps_frames", "expected one step or more, found none; add one")
+        if self.averaged > self.reversals:
+            raise SettingsError(
+                "averaged", f"expected at most the {self.reversals} reversals, found {self.averaged}; lower it"
+            )
         if self.catch_every == 1:
             raise SettingsError(
-                "catch_every", "expected 0 or at least 2, found 1, which leaves no other trial; raise it"
+                "catch_every", "expected 0 or 2 and more, found 1, which leaves no other trial; raise it"
             )
 
     @property
@@ -85,6 +95,7 @@ class Staircase(Settings):
             self.up_times,
             self.reversals,
             self.most_trials,
+            self.averaged,
         )
 
     def problems(self, asked: Asked) -> Iterator[tuple[str, str]]:

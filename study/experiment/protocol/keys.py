@@ -40,11 +40,11 @@ def _table(path: str) -> str:
 
 
 def _procedure_table(member: type[Settings]) -> str:
-    hints = get_type_hints(member)
+    hints = get_type_hints(member, include_extras=True)
     rows = [
         _row(
             one.name,
-            _annotation(hints[one.name]),
+            ", ".join([_annotation(hints[one.name]), *_bounds(list(get_args(hints[one.name])[1:]))]),
             "required" if one.default is MISSING else f"`{_toml(one.default)}`",
             one.metadata["words"],
         )

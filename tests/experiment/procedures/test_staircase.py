@@ -195,7 +195,9 @@ def test_settings_say_what_is_wrong() -> None:
     table = {"name": "staircase", "start_frames": 12, "most_frames": 20}
     assert settings_of(table) == replace(SETTINGS, steps_frames=(4, 2, 1))
     for bad, key, words in (
-        ({"start_frames": 30}, "start_frames", "from 1 to 20, found 30"),
+        ({"start_frames": 30}, "start_frames", "from least_frames to most_frames, 1 to 20, found 30"),
+        ({"down": 11}, "down", "expected from 1 to 10, found 11"),
+        ({"steps_frames": [4, 0]}, "steps_frames", "expected from 1 to 400, found 0"),
         ({"start_frames": 1.5}, "start_frames", "expected a whole number, found 1.5"),
         ({"start_frames": True}, "start_frames", "expected a whole number, found True"),
         ({"side": "left"}, "side", "'both' or 'shorter' or 'longer', found 'left'"),
@@ -205,7 +207,7 @@ def test_settings_say_what_is_wrong() -> None:
         ({"xyz": 3}, "xyz", "unknown key; valid keys here: name, start_frames"),
         ({"steps_frames": 3}, "steps_frames", "expected a list"),
         ({"steps_frames": []}, "steps_frames", "expected one step or more"),
-        ({"averaged": 9}, "averaged", "from 1 to 8, found 9"),
+        ({"averaged": 9}, "averaged", "at most the 8 reversals, found 9"),
         ({"catch_every": 1}, "catch_every", "leaves no other trial"),
     ):
         with pytest.raises(SettingsError, match=words) as raised:
