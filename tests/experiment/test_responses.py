@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 
 import pandas as pd
 import pytest
 import sqlalchemy as sa
-from toys import keep_answer
+from toys import FakeStimuli, keep_answer
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
-from study.experiment.protocol.whole import parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
 from study.experiment.store.answers import (
@@ -65,6 +66,30 @@ def test_answers_come_back_as_they_were(responses, toy_protocol, plan):
     given = (answer(1), answer(2, "different", 0.123), answer(3, None, None), answer(4, shown_well=False))
     assert all(keep_answer(responses, record, one) for one in given)
     assert stored_answers(responses, record.id) == given
+
+
+def test_the_stimuli_of_earlier_answers_are_listed_when_an_older_database_is_opened(
+    database: str, rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
+    """A database of version 6 had two columns for them; what is listed now is what its trials showed."""
+    plan = draw_plan(rating_protocol, make_stimuli(rating_protocol).pairs, "p01")
+    listed = sa.select(response_tables.answer_stimuli).order_by(*response_tables.answer_stimuli.primary_key)
+    with open_responses(database) as responses:
+        record = begin_session(responses, rating_protocol, plan)
+        for trial in plan.trials:
+            keep_answer(responses, record, answer(trial.trial, None, None))
+        with responses.engine.begin() as connection:
+            written = connection.execute(listed).all()
+            response_tables.answer_stimuli.drop(connection)
+            version = response_tables.schema_version.c.version
+            connection.execute(sa.delete(response_tables.schema_version).where(version == 7))
+    shown = [(trial.trial, *each) for trial in plan.trials for each in zip(trial.stimuli, trial.members, strict=True)]
+    assert [(row.trial, row.stimulus, row.member) for row in written] == shown
+    assert {row.slot for row in written} == {1, 2}
+    with open_responses(database) as responses, responses.engine.connect() as connection:
+        assert connection.execute(listed).all() == written
+        with pytest.raises(sa.exc.IntegrityError, match="answer_stimuli are append-only"):
+            connection.execute(sa.delete(response_tables.answer_stimuli))
 
 
 def test_an_answer_sent_twice_counts_once_and_another_one_is_refused(responses, toy_protocol, plan):

@@ -57,6 +57,24 @@ async function loadAll(view, study, onFault) {
 
 class Unseen extends Error {} // films that were played to nobody
 
+// How the films of a trial are shown, by its layout: resolves with how each was shown, and when the last one ended.
+const LAYOUTS = { "one after another": inTurn };
+
+async function inTurn(view, videos, restarts) {
+  const shown = [];
+  let last = performance.now();
+  for (const [index, film] of view.films.entries()) {
+    if (index > 0) await sleep(view.gap_s * 1000);
+    videos[index].classList.add("now");
+    const { last: lastFrame, ...how } = await play(videos[index], film, view.fps);
+    videos[index].classList.remove("now");
+    if (restarts && unseen()) throw new Unseen();
+    last = lastFrame;
+    shown.push({ slot: film.slot, ...how });
+  }
+  return { shown, last };
+}
+
 async function showFilms(view, study, { restarts, pauseOver, onFault }) {
   const { place, videos } = await loadAll(view, study, onFault);
   const scale = place.clientWidth / study.size[0]; // of the film's own size
@@ -65,25 +83,17 @@ async function showFilms(view, study, { restarts, pauseOver, onFault }) {
   await visible();
   if (restarts === MOST_RESTARTS) attend();
   filmsOn(true);
-  const shown = [];
-  let last = performance.now();
   try {
-    for (const [index, film] of view.films.entries()) {
-      if (index > 0) await sleep(view.gap_s * 1000);
-      videos[index].classList.add("now");
-      const { last: lastFrame, ...how } = await play(videos[index], film, view.fps);
-      videos[index].classList.remove("now");
-      if (restarts && unseen()) throw new Unseen();
-      last = lastFrame;
-      shown.push({ slot: film.slot, ...how });
-    }
+    return { ...(await LAYOUTS[view.layout](view, videos, restarts)), scale };
   } finally {
     filmsOn(false);
     videos.forEach(release);
     place.remove();
   }
-  return { shown, last, scale };
 }
+
+// What the buttons of each kind of answer look like.
+const BUTTONS = { word: "answer", point: "answer point" };
 
 export function options(question, study, chosen) {
   const row = element("div", { class: "buttons centre", role: "group", "aria-label": question.text || question.item });
@@ -92,7 +102,7 @@ export function options(question, study, chosen) {
     const words = [element("span", {}, option.label), hint ? element("small", {}, hint) : null].filter(Boolean);
     const button = element("button", {
       type: "button",
-      class: question.scale ? "answer point" : "answer",
+      class: BUTTONS[question.kind],
       "data-value": option.value,
       "aria-keyshortcuts": option.key || null,
       onclick: (event) => secondClick(event) || chosen(option.value, event.timeStamp),

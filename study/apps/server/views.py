@@ -90,6 +90,7 @@ def _trial(session: Session, participant: Participant, film_bytes: int) -> dict[
     return {
         **_asking(session, question),
         "films": [_film(other, participant, film_bytes) for other in own if other.slot],
+        "layout": task_of(session.protocol.study(question.study)).layout,
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
         "ahead": list({(film := _film(other, participant, film_bytes))["url"]: film for other in ahead}.values()),
     }
@@ -120,7 +121,7 @@ def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
         "high": step.high,
         "window_s": step.duration_s,
         "options": _options(protocol, step.legal),
-        "scale": task_of(protocol.study(step.study)).kind == "point",
+        "kind": task_of(protocol.study(step.study)).kind,
     }
 
 

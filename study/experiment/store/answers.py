@@ -19,7 +19,7 @@ from study.errors import SessionError
 from study.experiment.store.databases import alone
 from study.experiment.store.responses import Clock, Responses, rows_of, utc_now
 from study.experiment.store.sessions import SessionRecord, find_session
-from study.experiment.store.tables import answers, events, form_values, presentations
+from study.experiment.store.tables import answer_stimuli, answers, events, form_values, presentations
 from study.tasks.answer import Answer
 from study.tasks.registry import answer_columns
 from study.tasks.trial import Trial
@@ -113,7 +113,15 @@ def answer_rows(
     """The rows of one answer, for a transaction of the caller's (`insert_rows`)."""
     values = answer_columns(trial, answer)
     presented = [(_INSERT_PRESENTATION, {"session_id": record.id, "at": at, **_presentation_values(o)}) for o in shown]
-    return [(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values}), *presented]
+    which = {"session_id": record.id, "trial": answer.trial, "item": answer.item, "attempt": answer.attempt}
+    listed: list[Row] = [
+        (
+            _INSERT_STIMULUS,
+            {**which, "slot": slot, "stimulus": stimulus, "member": member, "method": trial.methods[member]},
+        )
+        for slot, (stimulus, member) in enumerate(zip(trial.stimuli, trial.members, strict=True), start=1)
+    ]
+    return [(_INSERT_ANSWER, {"session_id": record.id, "answered_at": at, **values}), *listed, *presented]
 
 
 def insert_rows(connection: sa.Connection, rows: Sequence[Row]) -> None:
@@ -141,7 +149,8 @@ def _compiled(statement: sa.Insert, names: tuple[str, ...], dialect: sa.Dialect)
     return str(compiled), bound
 
 
-_INSERT_ANSWER, _INSERT_PRESENTATION, _INSERT_EVENT = sa.insert(answers), sa.insert(presentations), sa.insert(events)
+_INSERT_ANSWER, _INSERT_STIMULUS = sa.insert(answers), sa.insert(answer_stimuli)
+_INSERT_PRESENTATION, _INSERT_EVENT = sa.insert(presentations), sa.insert(events)
 
 
 def _presentation_values(shown: Presentation) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import study
 from study.counting import counted
 from study.errors import SessionError
-from study.experiment.store.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, Variable
+from study.experiment.store.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, STIMULI, Variable
 from study.files import whole_folder
 from study.spreadsheets import safe_table
 
@@ -37,10 +37,11 @@ ROLES = ("trial", "practice", "check")
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """What is exported: three tables whose columns `variables` tells, and words on the whole."""
+    """What is exported: four tables whose columns `variables` tells, and words on the whole."""
 
     protocol: Protocol
     answers: pd.DataFrame
+    stimuli: pd.DataFrame
     presentations: pd.DataFrame
     participants: pd.DataFrame
     variables: Mapping[str, Mapping[str, Variable]]
@@ -93,20 +94,25 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
         raise SessionError(f"{responses.place}: expected answers to export, found none; collect or simulate some first")
     sessions = session_table(responses)
     names = dict(zip(sessions["id"], sessions["participant"], strict=True))
-    wanted = [stored.presentations.c[name] for name in PRESENTATIONS if name != "participant"]
-    shown = rows_of(responses, sa.select(stored.presentations.c.session_id, *wanted))
     form = rows_of(responses, sa.select(stored.form_values))
-    presentations = pd.DataFrame(
-        [{**row, "participant": names[row["session_id"]]} for row in shown], columns=list(PRESENTATIONS)
-    )
+
+    def whole(table: sa.Table, variables: Mapping[str, Variable]) -> pd.DataFrame:
+        wanted = (table.c[name] for name in variables if name != "participant")
+        rows = rows_of(responses, sa.select(table.c.session_id, *wanted))
+        return pd.DataFrame([{**row, "participant": names[row["session_id"]]} for row in rows], columns=list(variables))
+
+    stimuli = whole(stored.answer_stimuli, STIMULI)
+    presentations = whole(stored.presentations, PRESENTATIONS)
     participants = sessions[list(PARTICIPANTS)].copy()
     labels = {f"form_{field.name}": field.label for field in protocol.form}
     for column in labels:
         said = {row["session_id"]: row["value"] for row in form if f"form_{row['name']}" == column}
         participants[column] = sessions["id"].map(said)
     asked = {column: Variable(f"Asked in the form: {label}") for column, label in labels.items()}
-    tables = {"answers": ANSWERS, "presentations": PRESENTATIONS, "participants": {**PARTICIPANTS, **asked}}
-    return Shared(protocol, safe_table(answers), safe_table(presentations), safe_table(participants), tables)
+    tables: dict[str, Mapping[str, Variable]] = {"answers": ANSWERS, "stimuli": STIMULI, "presentations": PRESENTATIONS}
+    tables["participants"] = {**PARTICIPANTS, **asked}
+    frames = {"answers": answers, "stimuli": stimuli, "presentations": presentations, "participants": participants}
+    return Shared(protocol, variables=tables, **{name: safe_table(frame) for name, frame in frames.items()})
 
 
 def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) -> Path:
@@ -182,7 +188,8 @@ def _write_psych_ds(shared: Shared, folder: Path) -> None:
     data = folder / "data"
     data.mkdir()
     parts = [(f"task-{name}", part) for name, part in _by_study(shared)]
-    parts += [("description-participants", shared.participants), ("description-presentations", shared.presentations)]
+    described = {"participants": shared.participants, "stimuli": shared.stimuli, "presentations": shared.presentations}
+    parts += [(f"description-{name}", table) for name, table in described.items()]
     for name, table in parts:
         if len(table):
             table.to_csv(data / f"{name}_data.csv", index=False, lineterminator="\n")

@@ -15,6 +15,7 @@ import sqlalchemy as sa
 from study.errors import SessionError
 from study.experiment.store.databases import alone
 from study.experiment.store.tables import (
+    answer_stimuli,
     answers,
     events,
     form_values,
@@ -30,8 +31,24 @@ from study.experiment.store.tables import (
 def make_tables(connection: sa.Connection) -> None:
     """Make the tables of a new database; from then on it accepts additions only, and no change to what is recorded."""
     metadata.create_all(connection, tables=_FIRST_TABLES)
-    guard = _guard_sqlite if connection.dialect.name == "sqlite" else _guard_postgresql
-    guard(connection)
+    if connection.dialect.name != "sqlite":
+        connection.exec_driver_sql(_REFUSE)
+    for table, column in {**_SESSION_OF, "withdrawals": ""}.items():
+        _guard(connection, table, column)
+
+
+def list_stimuli_of_answers(connection: sa.Connection) -> None:
+    """Make the table of the stimuli that a trial showed, however many; those of earlier answers are entered."""
+    answer_stimuli.create(connection)
+    own, columns = answers.c, [column.name for column in answer_stimuli.c]
+    a_first = sa.func.coalesce(own.a_first, own.reference_first, sa.true())
+    for slot, stimulus, is_a in ((1, own.first, a_first), (2, own.second, sa.not_(a_first))):
+        member, method = sa.case((is_a, 0), else_=1), sa.case((is_a, own.method_a), else_=own.method_b)
+        found = sa.select(
+            own.session_id, own.trial, own.item, own.attempt, sa.literal(slot), stimulus, member, method
+        ).where(stimulus != "")
+        connection.execute(sa.insert(answer_stimuli).from_select(columns, found))
+    _guard(connection, answer_stimuli.name, "session_id")
 
 
 _FIRST_TABLES = [sessions, answers, events, presentations, form_values, participants, withdrawals]
@@ -47,15 +64,20 @@ _SESSION_OF = {
 }
 
 
-def _guard_sqlite(connection: sa.Connection) -> None:
-    for table, column in {**_SESSION_OF, "withdrawals": ""}.items():
-        unless = f"WHEN NOT EXISTS (SELECT 1 FROM withdrawals WHERE session_id = OLD.{column})" if column else ""
-        rules = {"DELETE": unless} if table == "participants" else {"UPDATE": "", "DELETE": unless}
-        for action, condition in rules.items():
-            connection.exec_driver_sql(
-                f"CREATE TRIGGER {table}_no_{action.lower()} BEFORE {action} ON {table} {condition} "
-                f"BEGIN SELECT RAISE(ABORT, '{table} are append-only'); END"
-            )
+def _guard(connection: sa.Connection, table: str, column: str) -> None:
+    """Let the database refuse changes to a table, and deletions but those that a withdrawal allows by this column."""
+    guard = _guard_sqlite if connection.dialect.name == "sqlite" else _guard_postgresql
+    guard(connection, table, column)
+
+
+def _guard_sqlite(connection: sa.Connection, table: str, column: str) -> None:
+    unless = f"WHEN NOT EXISTS (SELECT 1 FROM withdrawals WHERE session_id = OLD.{column})" if column else ""
+    rules = {"DELETE": unless} if table == "participants" else {"UPDATE": "", "DELETE": unless}
+    for action, condition in rules.items():
+        connection.exec_driver_sql(
+            f"CREATE TRIGGER {table}_no_{action.lower()} BEFORE {action} ON {table} {condition} "
+            f"BEGIN SELECT RAISE(ABORT, '{table} are append-only'); END"
+        )
 
 
 # TG_ARGV[0] is the column of the session, or empty where no withdrawal allows anything.
@@ -72,20 +94,18 @@ END $$
 """
 
 
-def _guard_postgresql(connection: sa.Connection) -> None:
-    connection.exec_driver_sql(_REFUSE)
-    for table, column in {**_SESSION_OF, "withdrawals": ""}.items():
-        actions = "DELETE" if table == "participants" else "UPDATE OR DELETE"
-        for name, when, each in (("no_change", actions, "ROW"), ("no_truncate", "TRUNCATE", "STATEMENT")):
-            connection.exec_driver_sql(
-                f"CREATE TRIGGER {table}_{name} BEFORE {when} ON {table} "
-                f"FOR EACH {each} EXECUTE FUNCTION segue_append_only('{column}')"
-            )
+def _guard_postgresql(connection: sa.Connection, table: str, column: str) -> None:
+    actions = "DELETE" if table == "participants" else "UPDATE OR DELETE"
+    for name, when, each in (("no_change", actions, "ROW"), ("no_truncate", "TRUNCATE", "STATEMENT")):
+        connection.exec_driver_sql(
+            f"CREATE TRIGGER {table}_{name} BEFORE {when} ON {table} "
+            f"FOR EACH {each} EXECUTE FUNCTION segue_append_only('{column}')"
+        )
 
 
 # No database of a version below 6 was ever released.
 FIRST_VERSION = 6
-MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (make_tables,)
+MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (make_tables, list_stimuli_of_answers)
 VERSION = FIRST_VERSION + len(MIGRATIONS) - 1
 
 

@@ -24,6 +24,7 @@ from study.experiment.store.databases import alone
 from study.experiment.store.responses import Clock, Responses
 from study.experiment.store.sessions import begin_session
 from study.experiment.store.tables import (
+    answer_stimuli,
     answers,
     events,
     form_values,
@@ -302,7 +303,7 @@ def erase(responses: Responses, session_id: int, *, clock: Clock = _utc_now) -> 
         count = connection.execute(sa.select(sa.func.count()).where(answers.c.session_id == session_id)).scalar_one()
         line = {"session_id": session_id, "answers": count, "at": clock()}
         connection.execute(sa.insert(withdrawals).values(line))
-        for table in (answers, presentations, form_values, events, participants):
+        for table in (answers, answer_stimuli, presentations, form_values, events, participants):
             connection.execute(sa.delete(table).where(table.c.session_id == session_id))
         connection.execute(sa.delete(sessions).where(sessions.c.id == session_id))
     if responses.engine.dialect.name == "sqlite":

@@ -103,6 +103,20 @@ answers = sa.Table(
     sa.CheckConstraint("(answer IS NULL) = missed", name="missed_has_no_answer"),
 )
 
+# What the trial of an answer showed, slot by slot; `member` is which of its pair's stimuli it was, from 0.
+answer_stimuli = sa.Table(
+    "answer_stimuli",
+    metadata,
+    sa.Column("session_id", sa.ForeignKey("sessions.id"), primary_key=True),
+    sa.Column("trial", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("item", StoredText, primary_key=True),
+    sa.Column("attempt", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("slot", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("stimulus", StoredText, nullable=False),
+    sa.Column("member", sa.Integer, nullable=False),
+    sa.Column("method", StoredText, nullable=False),
+)
+
 events = sa.Table(
     "events",
     metadata,

@@ -63,6 +63,17 @@ ANSWERS: Mapping[str, Variable] = {
     "expected": Variable("The answer that an attention check asked for."),
 }
 
+STIMULI: Mapping[str, Variable] = {
+    "participant": ANSWERS["participant"],
+    "trial": ANSWERS["trial"],
+    "item": ANSWERS["item"],
+    "attempt": ANSWERS["attempt"],
+    "slot": Variable("Which stimulus of the trial, from 1, in the order in which they were shown.", "number"),
+    "stimulus": Variable("The stimulus: the SHA-256 of its content."),
+    "member": Variable("Which of its pair's stimuli it was: 0 for the reference or method_a, else 1.", "number"),
+    "method": Variable("Method by which its transition was made."),
+}
+
 PRESENTATIONS: Mapping[str, Variable] = {
     "participant": ANSWERS["participant"],
     "trial": ANSWERS["trial"],
