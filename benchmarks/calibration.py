@@ -24,14 +24,16 @@ import pandas as pd
 from scipy.special import ndtr
 from scipy.stats import beta
 
-from study.analysis.preference.analyse import published_test
-from study.analysis.preference.models import psychometric_mixed
 from study.analysis.preference.participants import participant_tests
+from study.analysis.preference.published import published_test
 from study.analysis.psychometric.analyse import analyse_psychometric
 from study.analysis.psychometric.likelihood import fit_likelihood
-from study.analysis.psychometric.posterior import fit_many, fit_psychometric, make_model
-from study.analysis.same_different import fits as differencing
-from study.analysis.same_different.interpolation import Counts, crossings
+from study.analysis.psychometric.mixed import psychometric_mixed
+from study.analysis.psychometric.model import make_model
+from study.analysis.psychometric.posterior import fit_many, fit_psychometric
+from study.analysis.same_different import fits
+from study.analysis.same_different.counts import Counts
+from study.analysis.same_different.interpolation import crossings
 from study.analysis.same_different.mixed import fit_mixed_thresholds
 from study.analysis.same_different.model import fit_model
 
@@ -126,7 +128,7 @@ def run_preference(options):
             own = beta.rvs(shape, shape, size=35, random_state=rng) if shape else np.full(35, 0.5)
             chose = rng.binomial(8, own).astype(float)
             tests = participant_tests(chose, np.full(35, 8.0))
-            wrong.append((tests["p_value"], tests["robust_p_value"], published_test(int(chose.sum()), 280).p_value))
+            wrong.append((tests.p_value, tests.robust_p_value, published_test(int(chose.sum()), 280).p_value))
         rates = (np.array(wrong, dtype=float) < 0.05).mean(axis=0)
         print(f"{correlation:11} {rates[0]:12.3f} {rates[1]:7.3f} {rates[2]:9.3f}", flush=True)
 
@@ -148,9 +150,9 @@ def run_mixed(options):
             started = time.process_time()
             found = psychometric_mixed(table, guess=0.5)
             spent.append(time.process_time() - started)
-            if found["threshold"] is not None:
-                inside.append(found["low"] <= 3.0 <= found["high"])
-                values.append(found["threshold"])
+            if found.threshold is not None:
+                inside.append(found.low <= 3.0 <= found.high)
+                values.append(found.threshold)
         print(f"mixed, {people} people: {len(inside)} of {options.studies} fitted, mean {np.mean(values):.3f} (true 3)"
               f", covers {np.mean(inside):.3f}, {1000 * np.median(spent):.0f} ms", flush=True)  # fmt: skip
 
@@ -161,8 +163,8 @@ def run_pooled(options):
         rng, inside = np.random.default_rng(options.seed + people), []
         for _ in range(options.studies):
             found = analyse_psychometric(many_people(rng, people))
-            pooled, group, mixed = found["pooled"]["threshold"]["interval"], found["group"], found["mixed"]
-            inside.append([holds(part["low"], part["high"], 3.0) for part in (pooled, group, mixed)])
+            pooled, group, mixed = found.pooled.threshold.interval, found.group, found.mixed
+            inside.append([holds(part.low, part.high, 3.0) for part in (pooled, group, mixed)])
         shares = np.nanmean(inside, axis=0)
         print(f"{people} people cover: all answers as one person's {shares[0]:.3f}, mean over participants "
               f"{shares[1]:.3f}, mixed {shares[2]:.3f}", flush=True)  # fmt: skip
@@ -196,7 +198,7 @@ def run_speed(options):
     weights = rng.multinomial(35, np.full(35, 1 / 35), size=1000).astype(float)
     print(f"35 people, same-different: model with jackknife {clock(fit_model, [counts] * 20):.0f} ms, mixed model "
           f"{clock(fit_mixed_thresholds, [counts] * 20):.0f} ms", flush=True)  # fmt: skip
-    boot = clock(lambda drawn: differencing.fit(frames, drawn @ different, drawn @ asked), [weights] * 5)
+    boot = clock(lambda drawn: fits.fit(frames, drawn @ different, drawn @ asked), [weights] * 5)
     lines = clock(lambda number: crossings(counts, resamples=number), [1000] * 5)
     print(
         f"1,000 bootstraps over participants: of the model {boot:.0f} ms, of straight lines {lines:.0f} ms", flush=True

@@ -21,14 +21,8 @@ import numpy as np
 from scipy.stats import gumbel_l, logistic, norm
 
 from study.analysis.psychometric.likelihood import fit_likelihood
-from study.analysis.psychometric.posterior import (
-    LARGEST_GUESS,
-    LARGEST_LAPSE,
-    even_edges,
-    fit_psychometric,
-    make_model,
-    quantiles,
-)
+from study.analysis.psychometric.model import LARGEST_GUESS, LARGEST_LAPSE, make_model
+from study.analysis.psychometric.posterior import even_edges, fit_psychometric, quantiles
 from study.models import posterior_grid
 
 PEERS = {"normal": norm, "logistic": logistic, "gumbel": gumbel_l, "weibull": gumbel_l}

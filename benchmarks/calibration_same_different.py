@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from study.analysis.same_different.interpolation import Counts, crossing_of_lines, crossings
+from study.analysis.same_different.counts import Counts
+from study.analysis.same_different.interpolation import crossing_of_lines, crossings
 from study.analysis.same_different.mixed import fit_mixed_thresholds
 from study.analysis.same_different.model import fit_model
 

@@ -14,10 +14,12 @@ import numpy as np
 import pandas as pd
 from scipy.special import expit, ndtr
 
-from study.analysis.preference.analyse import published_test
-from study.analysis.preference.models import preference_models, psychometric_mixed
+from study.analysis.preference.models import preference_models
+from study.analysis.preference.motions import motions_as_sample
 from study.analysis.preference.no_effect import no_preference
-from study.analysis.preference.participants import motions_as_sample, participant_tests
+from study.analysis.preference.participants import participant_tests
+from study.analysis.preference.published import published_test
+from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.ratings.comparisons import rating_anova
 
 CORRELATIONS = (0.0, 0.1, 0.2, 0.3)
@@ -48,7 +50,7 @@ def preference(studies, seed):
             chosen = rng.binomial(8, shares(rng, 35, correlation)).astype(float)
             tests = participant_tests(chosen, np.full(35, 8.0))
             pooled = published_test(int(chosen.sum()), 280).p_value
-            rows.append((tests["p_value"], tests["wilcoxon_p_value"], tests["robust_p_value"], pooled))
+            rows.append((tests.p_value, tests.wilcoxon_p_value, tests.robust_p_value, pooled))
             far = rng.binomial(8, shares(rng, 35, correlation, 0.6)) / 8
             edge.append(no_preference(far, 0.1).equivalence_p_value)
         rates = [rate(column) for column in zip(*rows, strict=True)]
@@ -84,8 +86,8 @@ def motions(studies, seed):
             part = part[rng.random(len(part)) > 0.03]
             by = part.groupby("participant")["chose_a"].agg(["sum", "count"]).to_numpy(dtype=float).T
             found = motions_as_sample(part)
-            both = found["both"] or {"p_value": None}
-            rows.append((participant_tests(*by)["p_value"], found["by_motion"]["p_value"], both["p_value"]))
+            both = found.both.p_value if found.both else None
+            rows.append((participant_tests(*by).p_value, found.by_motion.p_value, both))
         rates = [rate(column) for column in zip(*rows, strict=True)]
         print(f"{people:6} {count:7} {own:9} {other:10} " + "{:7.3f} {:8.3f} {:6.3f}".format(*rates), flush=True)
 
@@ -105,9 +107,9 @@ def models(studies, seed):
                 found = preference_models(answers_of(rng.random((35, 8)) < chance, first))
                 spent += time.process_time() - started
                 kept.append(found)
-        gee = [found["gee"] for found in inside if found["gee"]["percent"] is not None]
-        covers = np.mean([one["low"] <= 65 <= one["high"] for one in gee])
-        rates = [rate([found[name]["p_value"] for found in wrong]) for name in ("mixed", "gee")]
+        gee = [found.gee for found in inside if found.gee.percent is not None]
+        covers = np.mean([one.low <= 65 <= one.high for one in gee])
+        rates = [rate([getattr(found, name).p_value for found in wrong]) for name in ("mixed", "gee")]
         print(f"{correlation:11} {rates[0]:6.3f} {rates[1]:6.3f} {covers:10.3f} {1000 * spent / studies / 2:10.1f}",
               flush=True)  # fmt: skip
 
@@ -144,18 +146,18 @@ def ratings(studies, seed):
 
 def _p_values(question):
     """The p-values of the methods, test by test."""
-    within = {row["source"]: row for row in question["mixed_design"]["effects"]}
-    between = {row["source"]: row for row in question["ranks"]["between"]}
-    ordinal = question["ordinal"]
-    people = question["ranks"]["participants"]
+    within = {row.source: row for row in question.mixed_design.effects}
+    between = {row.source: row for row in question.ranks.between}
+    ordinal = question.ordinal
+    people = question.ranks.participants
     return (
-        question["anova"][0]["p_value"] if question["anova"] else None,
-        question["difference"]["p_value"],
-        within["method"]["p_value"] if within else None,
-        people["p_value"] if people else None,
-        between["method"]["p_value"] if between else None,
-        ordinal["effects"][0]["p_value"] if ordinal["effects"] else None,
-        ordinal["p_value"],
+        question.anova[0].p_value if question.anova else None,
+        question.difference.p_value,
+        within["method"].p_value if within else None,
+        people.p_value if people else None,
+        between["method"].p_value if between else None,
+        ordinal.effects[0].p_value if ordinal.effects else None,
+        ordinal.p_value,
     )
 
 
@@ -177,15 +179,21 @@ def mixed(studies, seed):
 
 def power(studies, seed):
     """Time of `segue power` for a preference study of 35 people: simulated and analysed studies a second."""
-    from study.apps.cli.power import AT_ONCE, planned, plans_of
+    from study.analysis.exclusions import Rules
+    from study.apps.cli.power import AT_ONCE, plans_of
     from study.apps.cli.study import load
     from study.power.curve import power_curve
+    from study.power.design import Design
+    from study.power.registry import effect_of
+    from study.power.sessions import whole_sessions
 
     protocol = load("geodesic_vs_fixed")
     plans = plans_of(protocol, None, 35)
-    options = {"share": 0.65, "correlation": 0.1, "order_bias": 0.1, "missed": 0.02, "sessions": False}
-    for words, size in (("at once", studies), ("whole sessions", 10)):
-        run, _ = planned(protocol, protocol.studies[0], plans, {**options, "sessions": words != "at once"})
+    options = {"share": 0.65, "correlation": 0.1, "order_bias": 0.1, "missed": 0.02}
+    effect = effect_of(protocol.studies[0], options, protocol.analysis)
+    design = Design(protocol, protocol.studies[0], plans, effect.observer, Rules())
+    runs = (("at once", studies, effect.study(design)), ("whole sessions", 10, whole_sessions(design, effect.found)))
+    for words, size, run in runs:
         started = time.process_time()
         found = power_curve(run, [35], studies=size, at_once=AT_ONCE, seed=seed)
         spent = time.process_time() - started

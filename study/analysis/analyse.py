@@ -1,57 +1,118 @@
-"""All analyses of all answers: one table in, one JSON-able dictionary out, for the command line and the report."""
+"""All analyses of all answers: one table in, a typed result of each study out."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
 
-from study.analysis import estimates
-from study.analysis.exclusions import Rules, exclude
-from study.analysis.preference.analyse import compare, confirmatory, strengths
-from study.analysis.preference.no_effect import MARGIN
-from study.analysis.quality import quality
-from study.analysis.ratings.cells import rating_cells
-from study.analysis.ratings.comparisons import rating_anova
-from study.analysis.ratings.pairs import of_pairs, pair_ratings
-from study.analysis.ratings.table import rating_table
-from study.analysis.same_different.analyse import analyse_jnd
+from study.analysis.confirmatory import ConfirmatoryTest, confirmatory
+from study.analysis.exclusions import Exclusions, Rules, exclude, rules_of
+from study.analysis.preference.analyse import Preference
+from study.analysis.quality import Quality, quality
+from study.analysis.registry import ANALYSES, analysis_of
+from study.analysis.study_result import Settings, StudyResult
+from study.analysis.to_json import to_json
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-TASKS = ("same-different", "preference", "rating")
+Kind = TypeVar("Kind", bound=StudyResult)
+Data = Literal["collected", "simulated", "mixed", "none"]
+"""Who answered: people, simulated observers, or both."""
+
+
+class Decisions(Protocol):
+    """What a protocol decides about the analysis; see `Settings`."""
+
+    @property
+    def threshold(self) -> float:
+        """Share of "different" at the just noticeable difference."""
+
+    @property
+    def alpha(self) -> float:
+        """Level of significance."""
+
+    @property
+    def equivalence_points(self) -> float:
+        """How far from an even split, in percentage points, a preference may lie and count as none."""
+
+    @property
+    def confirmatory(self) -> Sequence[str]:
+        """Studies whose tests decide; all preference studies where empty."""
+
+    @property
+    def exclusions(self) -> object:
+        """Who and what is left out: the attributes of `Rules`."""
+
+
+class Decided(Protocol):
+    """The part of a protocol that an analysis reads."""
+
+    @property
+    def analysis(self) -> Decisions:
+        """What was decided."""
+
+    @property
+    def scale_points(self) -> Mapping[str, int]:
+        """Points of the scale of each rating study."""
 
 
 @dataclass(frozen=True)
-class _Settings:
-    """What was decided about the analysis, as `analyse` takes it."""
+class Results:
+    """What answers say.
 
-    threshold: float
+    Attributes
+    ----------
+    studies
+        By name.
+    confirmatory
+        The default tests of preference studies, adjusted together by Holm's method.
+    """
+
+    studies: Mapping[str, StudyResult]
+    confirmatory: tuple[ConfirmatoryTest, ...]
+
+    def of(self, kind: type[Kind]) -> dict[str, Kind]:
+        """Return the results of one kind, by name of the study."""
+        return {name: found for name, found in self.studies.items() if isinstance(found, kind)}
+
+
+@dataclass(frozen=True)
+class Analysis(Results):
+    """What answers say, and what it rests on.
+
+    Attributes
+    ----------
+    exclusions, without_exclusions
+        What was left out by which rule, and the same results of all answers; None where none was left out.
+    quality
+        Of all answers.
+    data
+        Who answered.
+    """
+
+    exclusions: Exclusions
+    without_exclusions: Results | None
+    quality: Quality
+    data: Data
     confidence: float
     alpha: float
-    resamples: int
-    seed: int
-    margin: float
-    family: tuple[str, ...] | None
-    scale_points: Mapping[str, int]
+
+    def sentences(self) -> list[str]:
+        """Return the answers of all studies in words."""
+        return [sentence for study in self.studies.values() for sentence in study.sentences(self.alpha)]
 
 
 def analyse(
     answers: pd.DataFrame,
+    settings: Settings | None = None,
     *,
-    threshold: float = 0.75,
-    confidence: float = 0.95,
-    alpha: float = 0.05,
-    resamples: int = 1000,
-    seed: int = 0,
-    margin: float = MARGIN,
     family: Sequence[str] | None = None,
     rules: Rules | None = None,
     checks: pd.DataFrame | None = None,
-    scale_points: Mapping[str, int] | None = None,
-) -> dict[str, Any]:
+) -> Analysis:
     """Analyse every study in a table of answers.
 
     Parameters
@@ -59,35 +120,13 @@ def analyse(
     answers
         One row an answer: `participant`, `task`, `study`, `answer`, and the columns that the tasks need (see
         `docs/analysis.md`). Missed answers have no `answer`.
-    threshold
-        Share of "different" that defines the just noticeable difference; above one half.
-    confidence
-        Of all intervals.
-    alpha
-        Level of significance that sentences speak of.
-    resamples, seed
-        Of the bootstrap over participants behind the standard errors; the same seed gives the same numbers.
-    margin
-        How far from an even split a preference may lie and count as none; 0.1 is 40 to 60%.
+    settings
+        What was decided beforehand; the usual where it is None.
     family
         Names of the studies whose tests were declared confirmatory before there was data; all preference studies where
         it is None.
     rules, checks
         What is left out, as stated before there was data, and the answers to attention checks.
-    scale_points
-        Points of the scale of each rating study, by its name; needed where pairs were rated.
-
-    Returns
-    -------
-    dict
-        `jnd` (by name of a same-different study), `preference` (by name of a preference study, a list of compared
-        pairs of methods), `confirmatory` (their default tests, adjusted together by Holm's method), `bradley_terry`
-        (strengths by study, where more than two methods were compared), `ratings`, `rating_anova` and `rating_cells`
-        (by name of a rating study), `pair_ratings` (by name of a study in which pairs were rated), each empty where
-        there is none;
-        `exclusions` (what was left out by which rule), `without_exclusions` (the same results of all answers; None
-        where none was left out), `quality` (of all answers),
-        `data` ("collected", "simulated", "mixed" or "none"), `confidence`, `alpha`.
 
     Raises
     ------
@@ -97,68 +136,90 @@ def analyse(
     missing = [name for name in ("participant", "task", "answer") if name not in answers.columns]
     if missing:
         raise AnalysisError(f"expected the columns participant, task and answer, found none named {', '.join(missing)}")
-    strange = sorted(set(answers["task"].astype(str)) - set(TASKS))
-    if strange:
-        raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {strange[0]!r}")
-    kept = exclude(answers, rules or Rules(), checks)
-    declared = None if family is None else tuple(family)
-    settings = _Settings(threshold, confidence, alpha, resamples, seed, margin, declared, scale_points or {})
-    result = _studies_analysed(kept.answers, settings)
-    left_out = {name: getattr(kept, name) for name in ("rules", "participants", "answers_left_out")}
-    result |= {
-        "exclusions": left_out,
-        "without_exclusions": _studies_analysed(answers, settings) if kept.answers_left_out else None,
-        "quality": quality(answers),
-        "data": kind_of_data(answers),
-        "confidence": confidence,
-        "alpha": alpha,
-    }
-    return dict(estimates.plain(result))
+    settings, rules = settings or Settings(), rules or Rules()
+    kept, left_out = exclude(answers, rules, checks)
+    found = _results(kept, settings, family)
+    return Analysis(
+        studies=found.studies,
+        confirmatory=found.confirmatory,
+        exclusions=left_out,
+        without_exclusions=_results(answers, settings, family) if left_out.answers_left_out else None,
+        quality=quality(answers),
+        data=kind_of_data(answers),
+        confidence=settings.confidence,
+        alpha=settings.alpha,
+    )
 
 
-def _studies_analysed(answers: pd.DataFrame, settings: _Settings) -> dict[str, Any]:
+def analyse_folder(
+    protocol: Decided,
+    answers: pd.DataFrame,
+    checks: pd.DataFrame,
+    *,
+    resamples: int = Settings.resamples,
+    rules: Rules | None = None,
+) -> Analysis:
+    """Analyse the answers to a protocol as it decided.
+
+    Parameters
+    ----------
+    protocol
+        What was decided.
+    answers, checks
+        One row an answer; answers to attention checks apart.
+    resamples
+        Bootstrap samples behind standard errors.
+    rules
+        What is left out in place of what the protocol states.
+    """
+    decided = protocol.analysis
+    settings = Settings(
+        threshold=decided.threshold,
+        alpha=decided.alpha,
+        resamples=resamples,
+        margin=decided.equivalence_points / 100.0,
+        scale_points=protocol.scale_points,
+    )
+    rules = rules or rules_of(decided.exclusions)
+    return analyse(answers, settings, family=decided.confirmatory or None, rules=rules, checks=checks)
+
+
+def _results(answers: pd.DataFrame, settings: Settings, family: Sequence[str] | None) -> Results:
     """Every study of a table of answers."""
-    confidence = settings.confidence
-    kinds = ("jnd", "preference", "bradley_terry", "ratings", "rating_anova", "rating_cells", "pair_ratings")
-    result: dict[str, Any] = {kind: {} for kind in kinds}
-    for (task, study), part in answers.groupby([answers["task"].astype(str), _studies(answers)], sort=False):
-        if task == "same-different":
-            result["jnd"][study] = analyse_jnd(
-                part,
-                level=settings.threshold,
-                confidence=confidence,
-                resamples=settings.resamples,
-                seed=settings.seed,
-            )
-        elif task == "preference":
-            result["preference"][study] = compare(part, confidence, settings.alpha, margin=settings.margin)
-            result["bradley_terry"][study] = strengths(part, confidence)
-        elif of_pairs(part):
-            result["pair_ratings"][study] = pair_ratings(part, _points(str(study), settings), confidence)
-        else:
-            result["ratings"][study] = rating_table(part, confidence)
-            result["rating_anova"][study] = rating_anova(part, confidence)
-            result["rating_cells"][study] = rating_cells(part, confidence)
-    result["confirmatory"] = confirmatory(result["preference"], settings.family)
-    return result
+    studies: dict[str, StudyResult] = {}
+    names = answers["study" if "study" in answers.columns else "task"].astype(str)
+    for (task, name), part in answers.groupby([answers["task"].astype(str), names], sort=False):
+        if str(name) in studies:
+            raise AnalysisError(f"expected one task a study, found {task!r} in {name!r} too; name the studies apart")
+        studies[str(name)] = analysis_of(str(task)).analyse(part, str(name), settings)
+    found = Results(studies, ())
+    return Results(studies, confirmatory(found.of(Preference), family))
 
 
-def _points(study: str, settings: _Settings) -> int:
-    if study not in settings.scale_points:
-        raise AnalysisError(
-            f"expected how many points the scale of {study!r} has, where pairs were rated, found none; name them in "
-            "scale_points"
-        )
-    return settings.scale_points[study]
+def analysis_json(analysis: Analysis) -> dict[str, Any]:
+    """Return what JSON holds of an analysis: the results of each kind under keys of their own, by name of the study."""
+    other = analysis.without_exclusions
+    return _results_json(analysis) | {
+        "exclusions": to_json(analysis.exclusions),
+        "without_exclusions": None if other is None else _results_json(other),
+        "quality": to_json(analysis.quality),
+        "data": analysis.data,
+        "confidence": analysis.confidence,
+        "alpha": analysis.alpha,
+    }
 
 
-def _studies(answers: pd.DataFrame) -> pd.Series[str]:
-    column = "study" if "study" in answers.columns else "task"
-    return answers[column].astype(str)
+def _results_json(results: Results) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for kind in (kind for task in ANALYSES.values() for kind in task.kinds):
+        own = results.of(kind)
+        for key, attribute in kind.keys.items():
+            found[key] = {name: to_json(getattr(one, attribute) if attribute else one) for name, one in own.items()}
+    return found | {"confirmatory": to_json(results.confirmatory)}
 
 
-def kind_of_data(answers: pd.DataFrame) -> str:
-    """Return who answered: "collected" (people), "simulated", "mixed", or "none"."""
+def kind_of_data(answers: pd.DataFrame) -> Data:
+    """Return who answered."""
     if answers.empty:
         return "none"
     if "simulated" not in answers.columns:

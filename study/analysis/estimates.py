@@ -1,4 +1,4 @@
-"""What every analysis shares: intervals for proportions, tests of participants, clustering, and plain JSON.
+"""What every analysis shares: intervals for proportions, tests of participants, and clustering.
 
 Arrays of counts come in, estimates with their uncertainty go out. Answers of one participant are not independent of
 each other, so whatever pools answers also says how alike the answers of a participant were (intraclass correlation)
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +34,13 @@ class Interval:
     low: float | None
     high: float | None
     confidence: float = 0.95
+
+
+@dataclass(frozen=True)
+class NotFitted:
+    """What stands where a model could not be fitted: why not."""
+
+    note: str
 
 
 @dataclass(frozen=True)
@@ -192,6 +199,31 @@ def mean_test(values: ArrayLike, expected: float = 0.5, confidence: float = 0.95
     )
 
 
+def student_p_values(values: FloatArray, there: NDArray[np.bool_], expected: float) -> FloatArray:
+    """Return the p-values of Student's t of many samples at once; NaN where a sample has no spread to judge by.
+
+    Parameters
+    ----------
+    values, there : ndarray, shape (..., participants)
+        One number a participant, and who is there.
+    expected
+        The mean where there is no effect.
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
+    from scipy.special import stdtr
+
+    count = there.sum(axis=-1)
+    people = np.where(count > 1, count, 2)
+    mean = np.where(there, values, 0.0).sum(axis=-1) / np.maximum(count, 1)
+    variance = np.where(there, (values - mean[..., None]) ** 2, 0.0).sum(axis=-1) / (people - 1)
+    known = (count > 1) & (variance > 1e-24)
+    statistic = np.abs(mean - expected) / np.sqrt(np.where(known, variance, 1.0) / people)
+    return np.asarray(np.where(known, 2 * stdtr(people - 1, -statistic), np.nan), dtype=np.float64)
+
+
 def clustering(successes: ArrayLike, trials: ArrayLike) -> Clustering:
     """Estimate how alike the answers of one participant are, from a one-way analysis of variance of yes-no answers.
 
@@ -224,16 +256,13 @@ def clustering(successes: ArrayLike, trials: ArrayLike) -> Clustering:
     return Clustering(correlation, size, effect, total / effect)
 
 
-def holm(p_values: ArrayLike) -> FloatArray:
-    """Return p-values adjusted by Holm's step-down method (1979), in the order given; NaN stays NaN."""
-    raw = np.asarray(p_values, dtype=np.float64)
-    adjusted = np.full_like(raw, np.nan)
-    known = np.flatnonzero(np.isfinite(raw))
-    order = known[np.argsort(raw[known], kind="stable")]
+def holm(p_values: Sequence[float | None]) -> list[float | None]:
+    """Return p-values adjusted by Holm's step-down method (1979), in the order given; None stays None."""
+    known = sorted((p, place) for place, p in enumerate(p_values) if p is not None)
+    adjusted: list[float | None] = [None] * len(p_values)
     largest = 0.0
-    for rank, index in enumerate(order):
-        largest = max(largest, min(1.0, float(raw[index]) * (len(order) - rank)))
-        adjusted[index] = largest
+    for rank, (p, place) in enumerate(known):
+        adjusted[place] = largest = max(largest, min(1.0, p * (len(known) - rank)))
     return adjusted
 
 
@@ -326,20 +355,3 @@ def finite(value: float | np.floating[Any] | None) -> float | None:
     if value is None or not math.isfinite(float(value)):
         return None
     return float(value)
-
-
-def plain(value: Any) -> Any:
-    """Return `value` as what JSON knows: dataclasses, arrays, mappings and sequences are unpacked, NaN becomes None."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return plain(asdict(value))
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return finite(value)
-    return value

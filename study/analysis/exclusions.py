@@ -6,9 +6,8 @@ the analysis is given with and without them, so that nobody has to trust the rul
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,38 +40,52 @@ class Rules:
     most_too_fast: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Kept:
-    """What is left.
+@dataclass(frozen=True)
+class RuleCount:
+    """A rule in words, and how many participants and answers were left out by it."""
+
+    rule: str
+    participants: int
+    answers: int
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A participant who is left out, and why."""
+
+    participant: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Exclusions:
+    """What is left out.
 
     Attributes
     ----------
-    answers
-        Rows that are kept.
     rules
-        In words, with `participants` and `answers` left out by each.
+        Those that were stated.
     participants
-        Those left out, each with a reason.
+        Who is left out wholly.
     answers_left_out
         All of them, those of participants left out included.
     """
 
-    answers: pd.DataFrame
-    rules: tuple[dict[str, Any], ...]
-    participants: tuple[dict[str, str], ...]
+    rules: tuple[RuleCount, ...]
+    participants: tuple[LeftOut, ...]
     answers_left_out: int
 
 
 IMPOSSIBLE_S = 0.2
 
 
-def rules_of(settings: Mapping[str, Any]) -> Rules:
-    """Return rules from a protocol's table of them."""
-    return Rules(**{name: settings[name] for name in Rules.__dataclass_fields__ if name in settings})
+def rules_of(stated: object) -> Rules:
+    """Return rules from an object with their attributes, such as a protocol's."""
+    return Rules(**{rule.name: getattr(stated, rule.name) for rule in fields(Rules)})
 
 
-def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = None) -> Kept:
-    """Apply the rules.
+def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = None) -> tuple[pd.DataFrame, Exclusions]:
+    """Apply the rules: the answers that are kept, and what is left out.
 
     Parameters
     ----------
@@ -91,19 +104,20 @@ def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = N
 
     who = answers["participant"].astype(str)
     gone = pd.Series(False, index=answers.index)
-    counts: list[dict[str, Any]] = []
-    people: list[dict[str, str]] = []
+    counts: list[RuleCount] = []
+    people: dict[str, str] = {}
     for words, reasons in _participants_out(answers, rules, checks):
-        fresh = {name: reason for name, reason in reasons.items() if name not in {row["participant"] for row in people}}
+        fresh = {name: reason for name, reason in sorted(reasons.items()) if name not in people}
         rows = who.isin(list(fresh)) & ~gone
         gone |= rows
-        people += [{"participant": name, "reason": reason} for name, reason in sorted(fresh.items())]
-        counts.append({"rule": words, "participants": len(fresh), "answers": int(rows.sum())})
+        people |= fresh
+        counts.append(RuleCount(words, len(fresh), int(rows.sum())))
     for words, rows in _answers_out(answers, rules):
         rows &= ~gone
         gone |= rows
-        counts.append({"rule": words, "participants": 0, "answers": int(rows.sum())})
-    return Kept(answers[~gone], tuple(counts), tuple(people), int(gone.sum()))
+        counts.append(RuleCount(words, 0, int(rows.sum())))
+    left_out = tuple(LeftOut(*one) for one in people.items())
+    return answers[~gone], Exclusions(tuple(counts), left_out, int(gone.sum()))
 
 
 def _times(answers: pd.DataFrame) -> pd.Series[float]:

@@ -5,12 +5,12 @@ The rules are few and said in words; they flag participants, they exclude nobody
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study.analysis import estimates
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -41,26 +41,110 @@ def _longest_run(answers: list[str]) -> int:
     return longest
 
 
-def participant_table(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> pd.DataFrame:
-    """Return one row a participant.
+@dataclass(frozen=True)
+class ParticipantQuality:
+    """How complete and plausible the answers of one participant are.
+
+    Attributes
+    ----------
+    median_response_s
+        None where no times are known.
+    too_fast
+        Answers sooner after the question than could answer it.
+    shown_badly
+        Answers after a stimulus that stalled or was hidden.
+    longest_run
+        Of one and the same answer.
+    false_alarms, same_pairs
+        "Different" at same-different pairs with no difference, of so many.
+    flags
+        In words, empty where there is nothing to say.
+    """
+
+    participant: str
+    simulated: bool
+    trials: int
+    answered: int
+    missed: int
+    missed_percent: float
+    median_response_s: float | None
+    too_fast: int
+    shown_badly: int
+    longest_run: int
+    false_alarms: int | None
+    same_pairs: int | None
+    flags: str
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How complete and how plausible the answers are.
+
+    Attributes
+    ----------
+    fastest_s
+        An answer sooner than this after the question can't be an answer to it. [seconds]
+    response_s
+        Quantiles of response times, by percent; empty where no times are known.
+    flagged, rules
+        How many participants are flagged, and by which rules in words.
+    table
+        One entry a participant.
+    """
+
+    participants: int
+    simulated_participants: int
+    trials: int
+    answered: int
+    missed: int
+    missed_percent: float | None
+    too_fast: int
+    shown_badly: int
+    fastest_s: float
+    response_s: dict[str, float]
+    flagged: int
+    rules: tuple[str, ...]
+    table: tuple[ParticipantQuality, ...]
+
+
+def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> Quality:
+    """Return how complete and how plausible the answers are.
 
     Parameters
     ----------
     answers
         The table of answers.
     fastest_s
-        An answer sooner than this after the question can't be an answer to it. [seconds]
-
-    Returns
-    -------
-    DataFrame
-        `participant`, `simulated`, `trials`, `answered`, `missed`, `missed_percent`, `median_response_s`, `too_fast`,
-        `shown_badly` (answers after a stimulus that stalled or was hidden), `longest_run` (of one and the same answer),
-        `false_alarms`, `same_pairs` (same-different pairs with no difference), `flags` (in words, empty where there is
-        nothing to say).
+        See `Quality`.
     """
-    import pandas as pd
+    table = participant_table(answers, fastest_s)
+    given = answers[answers["answer"].notna()]
+    times = _numbers(given, "response_s")
+    times = times[np.isfinite(times)]
+    levels = (5, 25, 50, 75, 95)
+    quantiles: list[float] = np.percentile(times, levels).tolist() if len(times) else []
+    missed = len(answers) - len(given)
+    return Quality(
+        participants=len(table),
+        simulated_participants=sum(row.simulated for row in table),
+        trials=len(answers),
+        answered=len(given),
+        missed=missed,
+        missed_percent=100 * missed / len(answers) if len(answers) else None,
+        too_fast=sum(row.too_fast for row in table),
+        shown_badly=sum(row.shown_badly for row in table),
+        fastest_s=fastest_s,
+        response_s={str(level): value for level, value in zip(levels, quantiles, strict=False)},
+        flagged=sum(bool(row.flags) for row in table),
+        rules=_rules(fastest_s),
+        table=table,
+    )
 
+
+def participant_table(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> tuple[ParticipantQuality, ...]:
+    """Return one row a participant."""
+    if answers.empty:
+        return ()
     # Arrays taken out once: a table cut apart for every participant costs ten times as much.
     columns = {name: answers[name].to_numpy() for name in _COLUMNS if name in answers.columns}
     columns["answer"] = answers["answer"].astype(object).where(answers["answer"].notna(), None).to_numpy()
@@ -69,57 +153,57 @@ def participant_table(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> pd
         columns["difference_frames"] = _numbers(answers, "difference_frames")
     names, person = np.unique(answers["participant"].astype(str).to_numpy(), return_inverse=True)
     parts = np.split(np.argsort(person, kind="stable"), np.cumsum(np.bincount(person))[:-1])
-    return pd.DataFrame(
-        [
-            _row(str(name), {key: values[own] for key, values in columns.items()}, fastest_s)
-            for name, own in zip(names, parts, strict=True)
-        ]
+    return tuple(
+        _row(str(name), {key: values[own] for key, values in columns.items()}, fastest_s)
+        for name, own in zip(names, parts, strict=True)
     )
 
 
 _COLUMNS = ("simulated", "shown_well", "task")
 
 
-def _row(name: str, columns: dict[str, NDArray[Any]], fastest_s: float) -> dict[str, Any]:
+def _row(name: str, columns: dict[str, NDArray[Any]], fastest_s: float) -> ParticipantQuality:
     """One participant's answers, as arrays by column."""
     kept = np.array([answer is not None for answer in columns["answer"]], dtype=bool)
     given = {key: values[kept] for key, values in columns.items()}
     times = given["response_s"][np.isfinite(given["response_s"])]
     trials, answered = len(kept), int(kept.sum())
-    row: dict[str, Any] = {
-        "participant": name,
-        "simulated": bool(columns["simulated"].astype(bool).any()) if "simulated" in columns else False,
-        "trials": trials,
-        "answered": answered,
-        "missed": trials - answered,
-        "missed_percent": 100 * (trials - answered) / trials,
-        "median_response_s": float(np.median(times)) if len(times) else None,
-        "too_fast": int((times < fastest_s).sum()),
-        "shown_badly": int((~given["shown_well"].astype(bool)).sum()) if "shown_well" in given else 0,
-        "longest_run": _longest_run([str(answer) for answer in given["answer"]]),
-    }
-    row |= _false_alarms(given)
-    row["flags"] = "; ".join(_flags(row, given, fastest_s))
-    return row
+    false_alarms, same_pairs = _false_alarms(given)
+    row = ParticipantQuality(
+        participant=name,
+        simulated=bool(columns["simulated"].astype(bool).any()) if "simulated" in columns else False,
+        trials=trials,
+        answered=answered,
+        missed=trials - answered,
+        missed_percent=100 * (trials - answered) / trials,
+        median_response_s=float(np.median(times)) if len(times) else None,
+        too_fast=int((times < fastest_s).sum()),
+        shown_badly=int((~given["shown_well"].astype(bool)).sum()) if "shown_well" in given else 0,
+        longest_run=_longest_run([str(answer) for answer in given["answer"]]),
+        false_alarms=false_alarms,
+        same_pairs=same_pairs,
+        flags="",
+    )
+    return replace(row, flags="; ".join(_flags(row, given, fastest_s)))
 
 
-def _false_alarms(given: dict[str, NDArray[Any]]) -> dict[str, Any]:
+def _false_alarms(given: dict[str, NDArray[Any]]) -> tuple[int, int] | tuple[None, None]:
     if "difference_frames" not in given:
-        return {"false_alarms": None, "same_pairs": None}
+        return None, None
     same = given["difference_frames"] == 0
     if "task" in given:
         same &= given["task"] == "same-different"
-    return {"false_alarms": int((given["answer"][same] == "different").sum()), "same_pairs": int(same.sum())}
+    return int((given["answer"][same] == "different").sum()), int(same.sum())
 
 
-def _flags(row: dict[str, Any], given: dict[str, NDArray[Any]], fastest_s: float) -> list[str]:
+def _flags(row: ParticipantQuality, given: dict[str, NDArray[Any]], fastest_s: float) -> list[str]:
     flags = []
-    if row["missed"] > MANY_MISSED * row["trials"]:
-        flags.append(f"missed {row['missed']} of {row['trials']}")
-    if row["too_fast"] > MANY_FAST * max(row["answered"], 1):
-        flags.append(f"{counted(row['too_fast'], 'answer')} sooner than {fastest_s:g} s")
-    if row["longest_run"] >= LONG_RUN:
-        flags.append(f"{row['longest_run']} times the same answer in a row")
+    if row.missed > MANY_MISSED * row.trials:
+        flags.append(f"missed {row.missed} of {row.trials}")
+    if row.too_fast > MANY_FAST * max(row.answered, 1):
+        flags.append(f"{counted(row.too_fast, 'answer')} sooner than {fastest_s:g} s")
+    if row.longest_run >= LONG_RUN:
+        flags.append(f"{row.longest_run} times the same answer in a row")
     tasks = given["task"] if "task" in given else np.full(len(given["answer"]), "answers")
     for task in sorted(set(tasks)):
         answers = given["answer"][tasks == task]
@@ -128,55 +212,10 @@ def _flags(row: dict[str, Any], given: dict[str, NDArray[Any]], fastest_s: float
     return flags
 
 
-def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> dict[str, Any]:
-    """Return how complete and how plausible the answers are.
-
-    Returns
-    -------
-    dict
-        `participants`, `simulated_participants`, `trials`, `answered`, `missed`, `missed_percent`, `too_fast`,
-        `shown_badly`, `fastest_s`, `response_s` (quantiles 5, 25, 50, 75, 95), `flagged` (participants), `rules` (in
-        words), `table` (one entry a participant, as `participant_table`).
-    """
-    if answers.empty:
-        counts = dict.fromkeys(("participants", "simulated_participants", "trials", "answered", "missed"), 0)
-        rest: dict[str, Any] = {
-            "missed_percent": None,
-            "too_fast": 0,
-            "shown_badly": 0,
-            "fastest_s": fastest_s,
-            "response_s": {},
-            "flagged": 0,
-        }
-        return {**counts, **rest, "rules": _rules(fastest_s), "table": []}
-    table = participant_table(answers, fastest_s)
-    given = answers[answers["answer"].notna()]
-    times = _numbers(given, "response_s")
-    times = times[np.isfinite(times)]
-    levels = (5, 25, 50, 75, 95)
-    quantiles: list[float] = np.percentile(times, levels).tolist() if len(times) else []
-    summary = {
-        "participants": len(table),
-        "simulated_participants": int(table["simulated"].sum()),
-        "trials": len(answers),
-        "answered": len(given),
-        "missed": len(answers) - len(given),
-        "missed_percent": 100 * (len(answers) - len(given)) / len(answers),
-        "too_fast": int(table["too_fast"].sum()),
-        "shown_badly": int(table["shown_badly"].sum()),
-        "fastest_s": fastest_s,
-        "response_s": {str(level): float(value) for level, value in zip(levels, quantiles, strict=False)},
-        "flagged": int((table["flags"] != "").sum()),
-        "rules": _rules(fastest_s),
-        "table": table.to_dict("records"),
-    }
-    return dict(estimates.plain(summary))
-
-
-def _rules(fastest_s: float) -> list[str]:
-    return [
+def _rules(fastest_s: float) -> tuple[str, ...]:
+    return (
         f"more than {100 * MANY_MISSED:g}% of the trials missed",
         f"more than {100 * MANY_FAST:g}% of the answers sooner than {fastest_s:g} s",
         f"the same answer {LONG_RUN} times in a row or more",
         "one and the same answer throughout a task",
-    ]
+    )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,31 @@ FloatArray = NDArray[np.float64]
 
 LARGEST_EXACT = 50
 NO_RANKS = "fewer than two participants lean either way: no test by ranks"
+
+
+@dataclass(frozen=True)
+class Friedman:
+    """Friedman's test; `f` is None where all rank alike.
+
+    The p-value is of F (Iman & Davenport 1980): the chi-square is too careful with few participants.
+    """
+
+    chi_square: float
+    f: float | None
+    degrees_of_freedom: int
+    error_degrees_of_freedom: int
+    p_value: float
+
+
+@dataclass(frozen=True)
+class RankEffect:
+    """An effect between groups, tested on ranks."""
+
+    source: str
+    f: float
+    degrees_of_freedom: float
+    error_degrees_of_freedom: float
+    p_value: float
 
 
 def mid_ranks(values: ArrayLike) -> FloatArray:
@@ -65,19 +90,13 @@ def _exact_signed_rank(ranks: FloatArray, positive: float) -> float:
     return float(min(1.0, ways[distance >= abs(2 * positive - doubled.sum() / 2) - 1e-9].sum()))
 
 
-def friedman(values: ArrayLike) -> dict[str, Any] | None:
+def friedman(values: ArrayLike) -> Friedman | None:
     """Friedman's test of several values a participant; None where every participant gives all of them alike.
 
     Parameters
     ----------
     values : array_like, shape (participants, levels)
         No value missing.
-
-    Returns
-    -------
-    dict
-        `chi_square`, `f`, `degrees_of_freedom`, `error_degrees_of_freedom`, `p_value` (of F: Iman & Davenport 1980;
-        the chi-square is too careful with few participants).
     """
     table = np.asarray(values, dtype=np.float64)
     people, levels = table.shape
@@ -95,16 +114,12 @@ def friedman(values: ArrayLike) -> dict[str, Any] | None:
     alike = left <= 1e-9
     f = math.inf if alike else (people - 1) * chi_square / left
     p_value = math.factorial(levels) ** (1 - people) if alike else estimates.f_probability(f, *degrees)
-    return {
-        "chi_square": chi_square,
-        "f": estimates.finite(f),
-        "degrees_of_freedom": degrees[0],
-        "error_degrees_of_freedom": degrees[1],
-        "p_value": float(p_value),
-    }
+    return Friedman(chi_square, None if alike else f, *degrees, float(p_value))
 
 
-def anova_type(values: ArrayLike, cells: ArrayLike, contrasts: Mapping[str, FloatArray]) -> list[dict[str, Any]] | str:
+def anova_type(
+    values: ArrayLike, cells: ArrayLike, contrasts: Mapping[str, FloatArray]
+) -> tuple[RankEffect, ...] | str:
     """Test contrasts between groups on ranks; a sentence that says why where that can't be.
 
     Parameters
@@ -115,11 +130,6 @@ def anova_type(values: ArrayLike, cells: ArrayLike, contrasts: Mapping[str, Floa
         Group of each, 0 to groups - 1.
     contrasts
         For each effect a matrix, shape (rows, groups), whose rows sum to zero.
-
-    Returns
-    -------
-    list of dict
-        One entry an effect: `source`, `f`, `degrees_of_freedom`, `error_degrees_of_freedom`, `p_value`.
     """
     y, group = np.asarray(values, dtype=np.float64), np.asarray(cells, dtype=np.intp)
     sizes = np.bincount(group)
@@ -130,12 +140,12 @@ def anova_type(values: ArrayLike, cells: ArrayLike, contrasts: Mapping[str, Floa
     spread = np.bincount(group, (ranks - means[group]) ** 2) / (sizes - 1) / sizes
     if spread.sum() <= 1e-12:
         return "the answers of each group are all alike: there is no spread to judge by"
-    return [_one_contrast(name, matrix, means, spread, sizes) for name, matrix in contrasts.items()]
+    return tuple(_one_contrast(name, matrix, means, spread, sizes) for name, matrix in contrasts.items())
 
 
 def _one_contrast(
     name: str, matrix: FloatArray, means: FloatArray, spread: FloatArray, sizes: NDArray[np.int64]
-) -> dict[str, Any]:
+) -> RankEffect:
     projection = matrix.T @ np.linalg.pinv(matrix @ matrix.T) @ matrix
     weighted = projection * spread
     scale = float(np.trace(weighted))
@@ -143,10 +153,4 @@ def _one_contrast(
     degrees = scale**2 / float(np.trace(weighted @ weighted))
     error_degrees = float(own.sum()) ** 2 / float((own**2 / (sizes - 1)).sum())
     f = float(means @ projection @ means) / scale
-    return {
-        "source": name,
-        "f": f,
-        "degrees_of_freedom": degrees,
-        "error_degrees_of_freedom": error_degrees,
-        "p_value": estimates.f_probability(f, degrees, error_degrees),
-    }
+    return RankEffect(name, f, degrees, error_degrees, estimates.f_probability(f, degrees, error_degrees))

@@ -1,18 +1,22 @@
-"""How a study was carried out: presentations, checks and exclusions in; tables, a figure and sentences out."""
+"""How a study was carried out, and by whom: presentations, checks, exclusions and sessions in; tables and words out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from study.counting import counted
-from study.report import tables, words
+from study.counting import counted, noun
+from study.report import tables
 from study.report.drawing import BLUE, FAINT, ORANGE, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.sections.registry import SECTIONS
+from study.report.sections.section import MainResult
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Result = Mapping[str, Any]
+    from study.analysis.analyse import Analysis, Results
+    from study.analysis.quality import Quality
 
 LONGEST_GAP_FRAMES = 1.5
 """A longer time between two frames makes a presentation faulty. [frames]"""
@@ -92,47 +96,61 @@ def checks_sentence(checks: pd.DataFrame) -> str:
     return f"{passed} of {asked} by {counted(people, 'participant')} were passed."
 
 
-def exclusion_sentence(analysis: Result) -> str:
-    """Return what was left out, in words."""
-    found = analysis["exclusions"]
-    if not found["rules"]:
-        return "The protocol states no rules of exclusion; nobody and nothing was left out."
-    if not found["answers_left_out"]:
-        return (
-            f"By the {counted(len(found['rules']), 'rule')} of exclusion that the protocol stated before there "
-            "was "
-            "data, nobody and nothing was left out."
+def quality_sentence(quality: Quality) -> str:
+    """Return how complete and how quick the answers are, and who is flagged."""
+    text = (
+        f"{quality.missed:,} of {counted(quality.trials, 'question')} were missed ({quality.missed_percent:.1f}%), "
+        f"{quality.too_fast:,} answered sooner than {quality.fastest_s:g} s."
+    )
+    if times := quality.response_s:
+        text += (
+            f" Half of the answers came within {times['50']:.2f} s, nine in ten between {times['5']:.2f} and "
+            f"{times['95']:.2f} s."
         )
-    return (
-        f"By rules that the protocol stated before there was data, "
-        f"{counted(found['answers_left_out'], 'answer')} of "
-        f"{analysis['quality']['trials']:,} are left out of all results above; "
-        f"{counted(len(found['participants']), 'participant')} wholly. Results with and without stand side by "
-        "side "
-        "below."
+    if quality.shown_badly:
+        text += f" {counted(quality.shown_badly, 'answer')} followed a stimulus that stalled or was hidden."
+    return text + (
+        f" {counted(quality.flagged, 'participant')} {noun(quality.flagged, 'is', 'are')} flagged, which alone leaves "
+        f"nobody out, for one of these: {'; '.join(quality.rules)}."
     )
 
 
-def exclusion_tables(analysis: Result) -> tuple[tables.Table, ...]:
+def exclusion_sentence(analysis: Analysis) -> str:
+    """Return what was left out, in words."""
+    found = analysis.exclusions
+    if not found.rules:
+        return "The protocol states no rules of exclusion; nobody and nothing was left out."
+    if not found.answers_left_out:
+        return (
+            f"By the {counted(len(found.rules), 'rule')} of exclusion that the protocol stated before there was data, "
+            "nobody and nothing was left out."
+        )
+    return (
+        f"By rules that the protocol stated before there was data, {counted(found.answers_left_out, 'answer')} of "
+        f"{analysis.quality.trials:,} are left out of all results above; "
+        f"{counted(len(found.participants), 'participant')} wholly. Results with and without stand side by side below."
+    )
+
+
+def exclusion_tables(analysis: Analysis) -> tuple[tables.Table, ...]:
     """Return the rules with what each left out, and where anything was, results with and without side by side."""
-    found, everything = analysis["exclusions"], analysis["without_exclusions"]
-    if not found["rules"]:
+    found, everything = analysis.exclusions, analysis.without_exclusions
+    if not found.rules:
         return ()
     rules = tables.make(
         "exclusion_rules",
         "Rules of exclusion, as the protocol stated them before there was data, and what each left out. What breaks "
         "several rules counts under the first.",
         "rule participants answers",
-        found["rules"],
+        [vars(rule) for rule in found.rules],
     )
     if everything is None:
         return (rules,)
-    other = {row["result"]: row for row in _main_results(everything)}
-    rows = []
-    kept = {row["result"]: row for row in _main_results(analysis)}
-    for result in dict.fromkeys([*kept, *other]):
-        beside = {f"all_{key}": value for key, value in other.get(result, {}).items() if key != "result"}
-        rows.append({"result": result, **kept.get(result, {}), **beside})
+    kept, other = ({row.result: vars(row) for row in _main_results(results)} for results in (analysis, everything))
+    rows = [
+        {f"all_{key}": value for key, value in other.get(result, {}).items()} | kept.get(result, {"result": result})
+        for result in dict.fromkeys([*kept, *other])
+    ]
     return rules, tables.make(
         "exclusions",
         "Main results by the rules of exclusion, and of all answers, with 95% intervals over participants.",
@@ -142,28 +160,50 @@ def exclusion_tables(analysis: Result) -> tuple[tables.Table, ...]:
     )
 
 
-def _main_results(analysis: Result) -> Iterator[dict[str, Any]]:
-    """One row a result: thresholds, preferences, comparisons on a scale, mean ratings."""
-    for study, found in analysis["jnd"].items():
-        thresholds = found["model"]["jnd"] if found["model"] else found["published"]
-        for side, threshold in thresholds.items():
-            result = f"{words.readable(study)}: threshold, {side} [frames]"
-            ends = {end: threshold["interval"][end] for end in ("low", "high")}
-            yield {"result": result, "value": threshold["frames"], **ends}
-    for study, comparisons in analysis["preference"].items():
-        for compared in comparisons:
-            people = compared["participants"]
-            methods = f"{words.readable(compared['method_a'])} over {words.readable(compared['method_b'])}"
-            ends = {end: people[end] for end in ("low", "high", "p_value")}
-            yield {"result": f"{words.readable(study)}: {methods} [%]", "value": people["mean_percent"], **ends}
-    for study, questions in analysis["pair_ratings"].items():
-        for question in questions:
-            people = question["participants"]
-            what = words.readable(": ".join(filter(None, (question["item"], question["of"]))))
-            ends = {end: people[end] for end in ("low", "high", "p_value")}
-            yield {"result": f"{words.readable(study)}: {what}", "value": people["mean"], **ends}
-    for study, ratings in analysis["ratings"].items():
-        for rated in ratings:
-            what = words.readable(": ".join(filter(None, (rated["item"], rated["method"]))))
-            ends = {end: rated[end] for end in ("low", "high")}
-            yield {"result": f"{words.readable(study)}: {what}", "value": rated["mean"], **ends}
+def _main_results(results: Results) -> Iterator[MainResult]:
+    """The main results of every study, by kind."""
+    for kind, shown in SECTIONS.items():
+        for study, found in results.of(kind).items():
+            yield from shown.main_results(found, study)
+
+
+def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Table:
+    """Return one row a participant: when, how many answers, how fast, what was noticed."""
+    started = {}
+    if len(sessions) and "started_at" in sessions:
+        started = {str(row.participant): str(row.started_at)[:16] for row in sessions.itertuples()}
+    left_out = {one.participant: one.reason for one in analysis.exclusions.participants}
+    rows = [
+        vars(row)
+        | {"kind": "simulated" if row.simulated else "person"}
+        | {"started": started.get(row.participant, ""), "left_out": left_out.get(row.participant, "")}
+        for row in analysis.quality.table
+    ]
+    hidden = {
+        "kind": analysis.data != "mixed",
+        "left_out": not left_out,
+        "shown_badly": not analysis.quality.shown_badly,
+        "too_fast": not analysis.quality.too_fast,
+        "false_alarms same_pairs": not any(row.same_pairs for row in analysis.quality.table),
+    }
+    return tables.make(
+        "participants",
+        "Participants. Flags follow the rules above and leave nobody out."
+        + (" Who was left out, and why, stands in the last column." if left_out else ""),
+        "participant kind started trials answered missed median_response_s too_fast shown_badly false_alarms "
+        "same_pairs "
+        "flags left_out",
+        rows,
+        files_only=" ".join(keys for keys, hide in hidden.items() if hide),
+    )
+
+
+def known_truth(sessions: pd.DataFrame) -> dict[str, Any]:
+    """Return what is known of the simulated observers by study; empty where sessions disagree or people took part."""
+    if not len(sessions) or "truth_json" not in sessions or not sessions["simulated"].astype(bool).all():
+        return {}
+    texts = set(sessions["truth_json"].dropna())
+    if len(texts) != 1 or sessions["truth_json"].isna().any():
+        return {}
+    studies = json.loads(texts.pop()).get("studies", {})
+    return dict(studies)

@@ -1,4 +1,4 @@
-"""How participants answered over the course of a study: answers in, a table and a figure out."""
+"""How participants answered over the course of a study: answers in, a table and figures out."""
 
 from __future__ import annotations
 
@@ -7,18 +7,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from study.report import tables, words
-from study.report.drawing import BLUE, FAINT, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import BLUE, FAINT, RULE, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.sections.registry import SECTIONS
+from study.report.sections.section import Course
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from study.analysis.analyse import Results
 
 PARTS = 6
 FEWEST_ANSWERS = 12
 
 
-def learning_table(answers: pd.DataFrame) -> tables.Table:
+def learning_table(answers: pd.DataFrame, results: Results) -> tables.Table:
     """Return, for sixths of each study's trials, how participants answered: right (same-different), or the first."""
-    rows = [row for (study, task), part in _studies(answers) for row in _course(str(study), str(task), part)]
+    rows = []
+    for study, part in answers.groupby("study", sort=False):
+        result = results.studies.get(str(study))
+        if result is not None and (course := SECTIONS[type(result)].course):
+            rows += _by_sixths(str(study), course, part)
     return tables.make(
         "learning",
         "Over the course of each study. By sixths of its trials: right answers (same-different) or answers for the one "
@@ -28,34 +36,25 @@ def learning_table(answers: pd.DataFrame) -> tables.Table:
     )
 
 
-def _studies(answers: pd.DataFrame) -> Any:
-    return answers.groupby(["study", "task"], sort=False)
-
-
-def _course(study: str, task: str, part: pd.DataFrame) -> list[dict[str, Any]]:
-    """Percentages by sixth of one study; none for ratings, nor where there are too few trials to part."""
+def _by_sixths(study: str, course: Course, part: pd.DataFrame) -> list[dict[str, Any]]:
+    """Percentages by sixth of one study; none where there are too few trials to part."""
     given = part[part["answer"].notna()]
-    if task not in ("same-different", "preference") or len(given) < FEWEST_ANSWERS:
+    if len(given) < FEWEST_ANSWERS:
         return []
     place = part.groupby("participant")["trial"].rank(method="first")
     most = place.groupby(part["participant"]).transform("max")
     if most.max() < PARTS:
         return []
     sixth = np.ceil(place / most * PARTS).loc[given.index]
-    if task == "same-different":
-        counted = ((given["answer"] == "different") == (given["difference_frames"] != 0)).astype(float)
-    else:
-        counted = (given["answer"] == "first").astype(float)
-    shares = counted.groupby([given["participant"].astype(str), sixth]).mean().unstack()
-    sizes = counted.groupby(sixth).size()
+    counts = course.counts(given).astype(float)
+    shares = counts.groupby([given["participant"].astype(str), sixth]).mean().unstack()
+    sizes = counts.groupby(sixth).size()
     rows = []
     for number in shares.columns:
         column = shares[number].dropna()
         error = 100 * float(column.std(ddof=1)) / len(column) ** 0.5 if len(column) > 1 else None
-        what = "right answers" if task == "same-different" else "answers for the first"
-        mean = 100 * float(column.mean())
-        rows.append({"study": study, "part": int(number), "what": what, "percent": mean})
-        rows[-1] |= {"standard_error": error, "answers": int(sizes[number])}
+        row = {"study": study, "part": int(number), "what": course.what, "percent": 100 * float(column.mean())}
+        rows.append(row | {"standard_error": error, "answers": int(sizes[number])})
     return rows
 
 
@@ -87,3 +86,35 @@ def learning_figure(table: tables.Table, name: str, mark: str) -> str | None:
             axes.set_xlabel("sixth of the study")
         add_mark(figure, mark)
         return to_svg(figure, name, "Answers over the course of each study", "; ".join(spoken))
+
+
+def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
+    """Response times: how they are distributed, and how they change over the session; None without times."""
+    timed = answers[answers["response_s"].notna()] if "response_s" in answers else answers.iloc[:0]
+    if timed.empty:
+        return None
+    times = timed["response_s"].to_numpy(dtype=np.float64)
+    with style():
+        figure, (left, right) = new_figure(7.2, 2.5, 1, 2, width_ratios=(1, 1.25))
+        left.hist(times, bins=np.linspace(0, max(float(times.max()), 1.0), 31).tolist(), color=FAINT, edgecolor="white")
+        middle = float(np.median(times))
+        left.axvline(middle, color=BLUE, linewidth=1.6)
+        left.annotate(f"median {middle:.2f} s", (middle, 0.98), xycoords=("data", "axes fraction"), xytext=(5, 0),
+                      textcoords="offset points", color=BLUE, fontsize=8.5, va="top")  # fmt: skip
+        left.set_xlabel("response time, s")
+        left.set_title("answers")
+        quiet_grid(left)
+        if "trial" in timed:
+            medians = timed.groupby("trial")["response_s"].quantile(np.array([0.25, 0.5, 0.75])).unstack()
+            trials = medians.index.to_numpy(dtype=np.float64)
+            right.fill_between(trials, medians[0.25], medians[0.75], color=RULE, linewidth=0)
+            right.plot(trials, medians[0.5], color=BLUE, linewidth=1.4)
+            right.set_xlabel("trial in the session")
+            right.set_title("response time, s: median and middle half")
+            right.set_ylim(bottom=0)
+            quiet_grid(right)
+        else:
+            right.set_axis_off()
+        add_mark(figure, mark)
+        spoken = f"median {middle:.2f} s, from {times.min():.2f} to {times.max():.2f} s"
+        return to_svg(figure, name, "Response times", spoken)

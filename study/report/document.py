@@ -7,19 +7,19 @@ folder and version of Segue. What participants or protocols wrote is escaped by 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from study.files import write_whole
 from study.report import tables, words
 from study.report.material import gather
 
 if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
     from study.report.page import Page
 
-Result = Mapping[str, Any]
 TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -29,6 +29,7 @@ def write_report(
     out: str | Path | None = None,
     database: str | None = None,
     resamples: int = 1000,
+    analysis: Analysis | None = None,
 ) -> Path:
     """Write `report.html`, `tables/` and `figures/` of a results folder.
 
@@ -43,6 +44,8 @@ def write_report(
         Where the answers are, if not in the folder: a file, or a URL.
     resamples
         Bootstrap samples behind standard errors.
+    analysis
+        Of the folder, where it was made already.
 
     Returns
     -------
@@ -56,26 +59,14 @@ def write_report(
     SegueError
         When a part of the folder is missing or can't be read.
     """
-    from study.analysis.analyse import analyse
-    from study.analysis.exclusions import rules_of
+    from study.analysis.analyse import analyse_folder
     from study.report.media import embedding
     from study.report.page import compose
 
     folder = Path(results_folder)
     material = gather(folder, database)
-    settings = material.protocol.analysis
     with embedding(material.manifest) as pictures:
-        analysis = analyse(
-            material.answers,
-            threshold=settings.threshold,
-            alpha=settings.alpha,
-            margin=settings.equivalence_points / 100.0,
-            family=settings.confirmatory or None,
-            resamples=resamples,
-            rules=rules_of(settings.exclusions.model_dump()),
-            checks=material.checks,
-            scale_points=material.protocol.scale_points,
-        )
+        analysis = analysis or analyse_folder(material.protocol, material.answers, material.checks, resamples=resamples)
         page = replace(compose(material, analysis), pictures=pictures())
     target = folder if out is None else Path(out)
     _write_files(target, page, analysis)
@@ -84,8 +75,9 @@ def write_report(
     return path
 
 
-def _write_files(folder: Path, page: Page, analysis: Result) -> None:
+def _write_files(folder: Path, page: Page, analysis: Analysis) -> None:
     """Write every table as CSV and JSON, every figure as SVG, and the whole analysis as JSON."""
+    from study.analysis.analyse import analysis_json
     from study.report.drawing import as_file
 
     for table in page.tables:
@@ -93,7 +85,7 @@ def _write_files(folder: Path, page: Page, analysis: Result) -> None:
         write_whole(folder / "tables" / f"{table.name}.json", tables.as_json(table))
     for drawing in page.drawings:
         write_whole(folder / "figures" / f"{drawing.name}.svg", as_file(drawing.svg))
-    whole = json.dumps(analysis, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    whole = json.dumps(analysis_json(analysis), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_whole(folder / "tables" / "analysis.json", whole)
 
 

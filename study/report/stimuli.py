@@ -1,9 +1,7 @@
-"""What was shown, and to whom: manifest, sessions and data quality in; tables for the page out."""
+"""What was shown: a manifest in; tables for the page out."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +9,8 @@ from study.report import tables, words
 from study.report.tables import Table
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from study.experiment.stimuli.manifest import Manifest
     from study.experiment.stimuli.stimulus import MotionUse
-
-Result = Mapping[str, Any]
 
 
 def stimulus_table(manifest: Manifest) -> Table:
@@ -80,48 +74,3 @@ def motion_table(manifest: Manifest) -> Table:
         headings={"frames": "of", "notes": "all notes"},
         files_only="notes" if any(row["changes"] for row in rows.values()) else "notes changes",
     )
-
-
-def participant_table(analysis: Result, sessions: pd.DataFrame) -> Table:
-    """Return one row a participant: when, how many answers, how fast, what was noticed."""
-    started = {}
-    if len(sessions) and "started_at" in sessions:
-        started = {str(row.participant): str(row.started_at)[:16] for row in sessions.itertuples()}
-    left_out = {row["participant"]: row["reason"] for row in analysis["exclusions"]["participants"]}
-    rows = [
-        {
-            **row,
-            "kind": "simulated" if row["simulated"] else "person",
-            "started": started.get(row["participant"], ""),
-            "left_out": left_out.get(row["participant"], ""),
-        }
-        for row in analysis["quality"]["table"]
-    ]
-    hidden = {
-        "kind": analysis["data"] != "mixed",
-        "left_out": not left_out,
-        "shown_badly": not any(row["shown_badly"] for row in rows),
-        "too_fast": not any(row["too_fast"] for row in rows),
-        "false_alarms same_pairs": not any(row["same_pairs"] for row in rows),
-    }
-    return tables.make(
-        "participants",
-        "Participants. Flags follow the rules above and leave nobody out."
-        + (" Who was left out, and why, stands in the last column." if left_out else ""),
-        "participant kind started trials answered missed median_response_s too_fast shown_badly false_alarms "
-        "same_pairs "
-        "flags left_out",
-        rows,
-        files_only=" ".join(keys for keys, hide in hidden.items() if hide),
-    )
-
-
-def known_truth(sessions: pd.DataFrame) -> dict[str, Any]:
-    """Return what is known of the simulated observers by study; empty where sessions disagree or people took part."""
-    if not len(sessions) or "truth_json" not in sessions or not sessions["simulated"].astype(bool).all():
-        return {}
-    texts = set(sessions["truth_json"].dropna())
-    if len(texts) != 1 or sessions["truth_json"].isna().any():
-        return {}
-    studies = json.loads(texts.pop()).get("studies", {})
-    return dict(studies)

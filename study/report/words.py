@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from study.counting import counted, noun
 from study.report.tables import p_value
-
-Result = Mapping[str, Any]
 
 
 def readable(name: str) -> str:
@@ -85,9 +82,9 @@ def interval(low: float | None, high: float | None, places: int = 1, unit: str =
     return f"{low:.{places}f} to {high:.{places}f}{unit}"
 
 
-def bare_interval(ends: Mapping[str, Any], places: int = 1) -> str:
+def bare_interval(low: float | None, high: float | None, places: int = 1) -> str:
     """Return an interval as it stands in brackets: "6.3, 7.7", an open end as a dash."""
-    return ", ".join(decimals(ends[end], places) for end in ("low", "high"))
+    return f"{decimals(low, places)}, {decimals(high, places)}"
 
 
 def decimals(value: float | None, places: int) -> str:

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.ratings.comparisons import anova_sentences, rating_anova
+from study.analysis.ratings.comparisons import rating_anova
+from study.analysis.ratings.words import anova_sentences
 from study.analysis.variance.effect_sizes import effect_size
 from study.analysis.variance.two_way import Squares, two_way
 from study.errors import AnalysisError
@@ -22,7 +23,7 @@ def balanced(rng: np.random.Generator, per_cell: int = 13) -> tuple[np.ndarray, 
 
 def test_a_balanced_design_gives_the_textbook_sums() -> None:
     y, a, b = balanced(np.random.default_rng(0))
-    rows = {row["source"]: row for row in two_way(y, a, b, NAMES)}
+    rows = {row.source: row for row in two_way(y, a, b, NAMES)}
     cells = np.array([[y[(a == i) & (b == j)].mean() for j in (0, 1)] for i in (0, 1)])
     within = sum(np.sum((y[(a == i) & (b == j)] - cells[i, j]) ** 2) for i in (0, 1) for j in (0, 1))
     expected = {
@@ -31,13 +32,13 @@ def test_a_balanced_design_gives_the_textbook_sums() -> None:
     }
     expected["cost x order"] = np.sum((y - y.mean()) ** 2) - within - sum(expected.values())
     for name, squares in expected.items():
-        assert rows[name]["sum_of_squares"] == pytest.approx(squares)
-        assert (rows[name]["degrees_of_freedom"], rows[name]["error_degrees_of_freedom"]) == (1, 48)
+        assert rows[name].sum_of_squares == pytest.approx(squares)
+        assert (rows[name].degrees_of_freedom, rows[name].error_degrees_of_freedom) == (1, 48)
         f = squares / (within / 48)
-        assert rows[name]["f"] == pytest.approx(f)
-        assert rows[name]["p_value"] == pytest.approx(stats.f.sf(f, 1, 48))
-    assert rows["residual"]["sum_of_squares"] == pytest.approx(within)
-    assert rows["residual"]["degrees_of_freedom"] == 48
+        assert rows[name].f == pytest.approx(f)
+        assert rows[name].p_value == pytest.approx(stats.f.sf(f, 1, 48))
+    assert rows["residual"].sum_of_squares == pytest.approx(within)
+    assert rows["residual"].degrees_of_freedom == 48
 
 
 def test_an_unbalanced_design_compares_with_and_without_each_effect() -> None:
@@ -51,11 +52,11 @@ def test_an_unbalanced_design_compares_with_and_without_each_effect() -> None:
     counts = np.array([np.sum((a == i) & (b == j)) for i, j in cells])
     within = sum(np.sum((y[(a == i) & (b == j)] - m) ** 2) for (i, j), m in zip(cells, means, strict=True))
     left = len(y) - 4
-    rows = {row["source"]: row for row in two_way(y, a, b, NAMES)}
+    rows = {row.source: row for row in two_way(y, a, b, NAMES)}
     for name, contrast in (("cost", [-1, -1, 1, 1]), ("order", [-1, 1, -1, 1]), ("cost x order", [1, -1, -1, 1])):
         value, variance = np.dot(contrast, means), np.sum(np.square(contrast) / counts)
-        assert rows[name]["f"] == pytest.approx(value**2 / variance / (within / left))
-        assert rows[name]["error_degrees_of_freedom"] == left
+        assert rows[name].f == pytest.approx(value**2 / variance / (within / left))
+        assert rows[name].error_degrees_of_freedom == left
 
 
 @pytest.mark.parametrize(("squares", "typ"), [("II", 2), ("III", 3)])
@@ -69,23 +70,23 @@ def test_both_types_of_squares_against_statsmodels(squares: Squares, typ: int) -
     expected = anova_lm(smf.ols("y ~ C(a, Sum) * C(b, Sum)", data).fit(), typ=typ)
     rows = two_way(data["y"], data["a"], data["b"], ("a", "b"), squares=squares)
     for row, name in zip(rows, ["C(a, Sum)", "C(b, Sum)", "C(a, Sum):C(b, Sum)", "Residual"], strict=True):
-        assert row["sum_of_squares"] == pytest.approx(expected.loc[name, "sum_sq"])
-        assert row["degrees_of_freedom"] == expected.loc[name, "df"]
-    assert rows[0]["p_value"] == pytest.approx(expected.loc["C(a, Sum)", "PR(>F)"])
+        assert row.sum_of_squares == pytest.approx(expected.loc[name, "sum_sq"])
+        assert row.degrees_of_freedom == expected.loc[name, "df"]
+    assert rows[0].p_value == pytest.approx(expected.loc["C(a, Sum)", "PR(>F)"])
 
 
 def test_three_levels_have_two_degrees_of_freedom() -> None:
     rng = np.random.default_rng(2)
     a, b = np.tile([0, 1, 2], 20), np.repeat([0, 1], 30)
     rows = two_way(rng.normal(size=60), a, b, NAMES)
-    assert [row["degrees_of_freedom"] for row in rows] == [2, 1, 2, 54]
+    assert [row.degrees_of_freedom for row in rows] == [2, 1, 2, 54]
 
 
 def test_the_published_f_has_its_degrees_of_freedom() -> None:
     """2003 section 4.2: 26 participants, two sequences each, F = 6.39, p = 0.01: with 1 and 48, p = 0.0148."""
     assert stats.f.sf(6.39, 1, 48) == pytest.approx(0.0148, abs=2e-4)
     y, a, b = balanced(np.random.default_rng(0))
-    assert two_way(y, a, b, NAMES)[0]["error_degrees_of_freedom"] == 26 * 2 - 4
+    assert two_way(y, a, b, NAMES)[0].error_degrees_of_freedom == 26 * 2 - 4
 
 
 @pytest.mark.parametrize(
@@ -119,19 +120,19 @@ def rating_answers(rng: np.random.Generator, participants: int = 26, better: flo
 def test_the_rating_study_is_analysed_as_published_and_by_participants() -> None:
     answers = rating_answers(np.random.default_rng(3))
     found = rating_anova(answers)
-    assert [question["item"] for question in found] == ["realistic", "natural"]
+    assert [question.item for question in found] == ["realistic", "natural"]
     question = found[0]
-    assert [row["source"] for row in question["anova"]] == ["method", "order", "method x order", "residual"]
-    assert question["anova"][0]["error_degrees_of_freedom"] == 48
+    assert [row.source for row in question.anova] == ["method", "order", "method x order", "residual"]
+    assert question.anova[0].error_degrees_of_freedom == 48
     # The method's effect is of the size that was put in, and its test by participants has 25 degrees of freedom.
-    assert question["difference"]["of"] == "cut-wang2003 minus cut-lee2002"
-    assert question["difference"]["mean"] == pytest.approx(0.73, abs=0.5)
-    assert question["difference"]["degrees_of_freedom"] == 25
+    assert question.difference.of == "cut-wang2003 minus cut-lee2002"
+    assert question.difference.mean == pytest.approx(0.73, abs=0.5)
+    assert question.difference.degrees_of_freedom == 25
     one = answers[answers["item"] == "realistic"].assign(answer=lambda rows: rows["answer"].astype(float))
     wide = one.pivot_table(index="participant", columns="method_a", values="answer")
     paired = stats.ttest_rel(wide["cut-wang2003"], wide["cut-lee2002"])
-    assert question["difference"]["t"] == pytest.approx(paired.statistic)
-    assert question["difference"]["p_value"] == pytest.approx(paired.pvalue)
+    assert question.difference.t == pytest.approx(paired.statistic)
+    assert question.difference.p_value == pytest.approx(paired.pvalue)
     sentences = anova_sentences(found, 0.05)
     assert len(sentences) == 8
     assert sum("F(1, 48) = " in sentence for sentence in sentences) == 6
@@ -146,8 +147,8 @@ def test_known_effects_are_found_as_often_as_they_should_be() -> None:
     for better in found:
         for _ in range(60):
             answers = rating_answers(rng, better=better)
-            row = rating_anova(answers[answers["item"] == "natural"], models=False)[0]["anova"][0]
-            found[better] += row["p_value"] < 0.05
+            row = rating_anova(answers[answers["item"] == "natural"], models=False)[0].anova[0]
+            found[better] += row.p_value < 0.05
     assert found[0.0] <= 8
     assert found[0.73] >= 30
 
@@ -156,10 +157,10 @@ def test_a_group_that_is_not_there_is_said() -> None:
     answers = rating_answers(np.random.default_rng(5))
     one_order = answers[answers["participant"].str[1:].astype(int) % 2 == 0]
     question = rating_anova(one_order)[0]
-    assert question["anova"] == []
-    assert "two levels of order" in question["note"]
-    assert not math.isnan(question["difference"]["mean"])
-    assert rating_anova(answers[answers["method_a"] == "cut-lee2002"]) == []
+    assert question.anova == ()
+    assert "two levels of order" in question.note
+    assert not math.isnan(question.difference.mean)
+    assert rating_anova(answers[answers["method_a"] == "cut-lee2002"]) == ()
 
 
 def test_the_interval_of_an_effect_size_is_where_the_noncentral_f_puts_it() -> None:
@@ -182,41 +183,41 @@ def test_the_interval_of_an_effect_size_covers_as_often_as_it_says() -> None:
     inside = []
     for _ in range(600):
         row = two_way(0.7 * a + rng.normal(size=52), a, b, NAMES)[0]
-        inside.append(row["effect_low"] <= truth <= row["effect_high"])
+        inside.append(row.effect_low <= truth <= row.effect_high)
     assert np.mean(inside) == pytest.approx(0.9, abs=0.035)
 
 
 def test_unbalanced_ratings_are_given_by_both_types() -> None:
     answers = rating_answers(np.random.default_rng(8))
-    assert rating_anova(answers)[0]["type_ii"] is None
+    assert rating_anova(answers)[0].type_ii is None
     uneven = answers[answers["participant"] != "p00"]
     question = rating_anova(uneven)[0]
-    assert question["balanced"] is False
-    assert question["type_ii"][2] == question["anova"][2]
-    assert question["type_ii"][0]["sum_of_squares"] != pytest.approx(question["anova"][0]["sum_of_squares"], rel=1e-6)
+    assert question.balanced is False
+    assert question.type_ii[2] == question.anova[2]
+    assert question.type_ii[0].sum_of_squares != pytest.approx(question.anova[0].sum_of_squares, rel=1e-6)
 
 
 def test_tests_over_participants_agree_where_they_ask_the_same() -> None:
     """Two methods, two groups: the mixed design's F of the methods is the square of a t; ranks and points agree."""
     question = rating_anova(rating_answers(np.random.default_rng(3), participants=40, better=1.0))[0]
-    effects = {row["source"]: row for row in question["mixed_design"]["effects"]}
+    effects = {row.source: row for row in question.mixed_design.effects}
     assert list(effects) == ["order", "method", "method x order"]
-    assert effects["method"]["f"] == pytest.approx(question["difference"]["t"] ** 2, rel=0.05)
-    assert effects["method"]["error_degrees_of_freedom"] == 38
-    assert question["ranks"]["participants"]["test"] == "Wilcoxon's signed ranks"
-    between = {row["source"]: row for row in question["ranks"]["between"]}
-    ordinal = question["ordinal"]["effects"][0]
-    assert ordinal["name"] == "cut-wang2003 over cut-lee2002"
-    assert ordinal["odds_ratio"] > 2
+    assert effects["method"].f == pytest.approx(question.difference.t**2, rel=0.05)
+    assert effects["method"].error_degrees_of_freedom == 38
+    assert question.ranks.participants.test == "Wilcoxon's signed ranks"
+    between = {row.source: row for row in question.ranks.between}
+    ordinal = question.ordinal.effects[0]
+    assert ordinal.name == "cut-wang2003 over cut-lee2002"
+    assert ordinal.odds_ratio > 2
     for p_value in (
-        effects["method"]["p_value"],
-        question["ranks"]["participants"]["p_value"],
-        between["method"]["p_value"],
-        ordinal["p_value"],
-        question["ordinal"]["p_value"],
+        effects["method"].p_value,
+        question.ranks.participants.p_value,
+        between["method"].p_value,
+        ordinal.p_value,
+        question.ordinal.p_value,
     ):
         assert p_value < 0.01
-    assert [effect["name"] for effect in question["ordinal"]["effects"]] == [ordinal["name"], "shown second"]
+    assert [effect.name for effect in question.ordinal.effects] == [ordinal.name, "shown second"]
 
 
 def test_motions_within_participants_are_a_factor_where_everybody_saw_them() -> None:
@@ -227,11 +228,11 @@ def test_motions_within_participants_are_a_factor_where_everybody_saw_them() -> 
         for t, (m, n) in enumerate(rng.permutation([(m, n) for m in "abc" for n in "xyz"]))
     ]
     (question,) = rating_anova(pd.DataFrame(rows), models=False)
-    assert question["mixed_design"]["factors"] == ["method", "motion"]
-    effects = {row["source"]: row for row in question["mixed_design"]["effects"]}
-    assert effects["method x motion"]["degrees_of_freedom"] == 4
-    assert 0.25 <= effects["method x motion"]["epsilon"] < 1
-    assert question["ranks"]["participants"]["degrees_of_freedom"] == 2
+    assert question.mixed_design.factors == ("method", "motion")
+    effects = {row.source: row for row in question.mixed_design.effects}
+    assert effects["method x motion"].degrees_of_freedom == 4
+    assert 0.25 <= effects["method x motion"].epsilon < 1
+    assert question.ranks.participants.degrees_of_freedom == 2
     (fewer,) = rating_anova(pd.DataFrame(rows[:-1]), models=False)
-    assert fewer["mixed_design"]["factors"] == ["method"]
-    assert fewer["mixed_design"]["participants"] == 12
+    assert fewer.mixed_design.factors == ("method",)
+    assert fewer.mixed_design.participants == 12

@@ -16,8 +16,11 @@ import pytest
 
 from study.analysis.psychometric.analyse import analyse_psychometric
 from study.analysis.psychometric.likelihood import fit_likelihood
-from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric, make_model, threshold_at
-from study.analysis.same_different.analyse import analyse_jnd, d_prime
+from study.analysis.psychometric.model import make_model
+from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric, threshold_at
+from study.analysis.same_different.analyse import analyse_jnd
+from study.analysis.same_different.d_prime import d_prime
+from study.analysis.to_json import to_json
 from study.errors import AnalysisError
 
 SIGMOIDS = ("normal", "logistic", "gumbel", "weibull")
@@ -106,7 +109,7 @@ def study_of(rng: np.random.Generator) -> pd.DataFrame:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_psychometric_studies(seed: int) -> None:
-    result = analyse_psychometric(study_of(np.random.default_rng(seed)))
+    result = to_json(analyse_psychometric(study_of(np.random.default_rng(seed))))
     without_nan(result)
     assert result["answer"]
     if result["group"]["mean_threshold"] is None:
@@ -132,7 +135,7 @@ def answers_of(rng: np.random.Generator) -> pd.DataFrame:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_same_different_studies(seed: int) -> None:
-    result = analyse_jnd(answers_of(np.random.default_rng(seed)), resamples=40)
+    result = to_json(analyse_jnd(answers_of(np.random.default_rng(seed)), resamples=40))
     without_nan(result)
     assert result["answer"]
     for kind in ("model", "mixed"):
@@ -158,10 +161,10 @@ def test_everybody_answers_alike(answer: str, shown: int) -> None:
         for _ in range(shown)
     ]
     result = analyse_jnd(pd.DataFrame(rows), resamples=20)
-    assert result["model"] is None
-    assert result["mixed"] is None
-    assert f'every answer was "{answer}"' in result["model_note"]
-    assert "No model was fitted" in result["answer"]
+    assert result.model is None
+    assert result.mixed is None
+    assert f'every answer was "{answer}"' in result.model_note
+    assert "No model was fitted" in result.answer
 
 
 def test_perfect_performance_leaves_the_threshold_open_below() -> None:
@@ -177,10 +180,11 @@ def test_perfect_performance_leaves_the_threshold_open_below() -> None:
         for _ in range(6)
     ]
     result = analyse_jnd(pd.DataFrame(rows), resamples=20)
-    for side in ("shorter", "longer"):
-        found = result["model"]["jnd"][side]
-        assert found["frames"] is None or found["interval"]["low"] is None or found["note"]
-    assert result["mixed"] is None
+    assert result.model is not None
+    assert set(result.model.jnd) == {"shorter", "longer"}
+    for found in result.model.jnd.values():
+        assert found.frames is None or found.interval.low is None or found.note
+    assert result.mixed is None
 
 
 @pytest.mark.parametrize(
@@ -191,9 +195,9 @@ def test_perfect_performance_leaves_the_threshold_open_below() -> None:
 def test_tables_of_hits_and_false_alarms(counts: tuple[float, float, float, float]) -> None:
     found = d_prime(*counts)
     if 0 in (counts[1], counts[3]):
-        assert set(found.values()) == {None}
+        assert set(vars(found).values()) == {None}
         return
-    value, low, high = found["d_prime"], found["low"], found["high"]
+    value, low, high = found.d_prime, found.low, found.high
     assert value is not None
     assert low is not None
     assert 0 <= low <= value

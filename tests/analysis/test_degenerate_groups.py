@@ -11,10 +11,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.analyse import analyse
-from study.analysis.preference.analyse import compare, confirmatory, strengths
-from study.analysis.ratings.comparisons import anova_sentences, rating_anova
+from study.analysis.analyse import analyse, analysis_json
+from study.analysis.confirmatory import confirmatory
+from study.analysis.preference.analyse import Preference, compare, strengths
+from study.analysis.ratings.comparisons import rating_anova
 from study.analysis.ratings.table import rating_table
+from study.analysis.ratings.words import anova_sentences
+from study.analysis.study_result import Settings
+from study.analysis.to_json import to_json
 from study.errors import AnalysisError
 
 
@@ -77,6 +81,7 @@ def numbers(value: Any, place: str = "") -> Iterator[tuple[str, float]]:
 
 def check(result: Any) -> None:
     """Plain JSON; p-values are probabilities, percentages shares, spreads and errors above zero."""
+    result = to_json(result)
     json.dumps(result, allow_nan=False)
     for place, number in numbers(result):
         assert math.isfinite(number), place
@@ -95,18 +100,19 @@ def test_unreasonable_preferences(seed: int) -> None:
     results = compare(table)
     check(results)
     check(strengths(table))
-    check(confirmatory({"one": results}))
+    check(confirmatory({"one": Preference(results, None)}))
     for result in results:
-        assert result["answer"]
-        people = result["participants"]
-        if people["participants"] < 2:
-            assert people["p_value"] is None
-            assert result["motions_as_sample"]["both"] is None
-        if people["p_value"] is None or people["low"] is None:
-            assert people["note"] or result["published"]["answers"] == 0
-        for model in ("mixed", "gee"):
-            if result["models"][model]["percent"] is None:
-                assert result["models"][model]["note"]
+        assert result.answer
+        people = result.participants
+        if people.participants < 2:
+            assert people.p_value is None
+            assert result.motions_as_sample.both is None
+        if people.p_value is None or people.low is None:
+            assert people.note or result.published.answers == 0
+        assert result.models is not None
+        for model in (result.models.mixed, result.models.gee):
+            if model.percent is None:
+                assert model.note
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -117,14 +123,14 @@ def test_unreasonable_ratings(seed: int) -> None:
     questions = rating_anova(table)
     check(questions)
     for question in questions:
-        assert question["anova"] or question["note"]
-        design, ordinal = question["mixed_design"], question["ordinal"]
-        assert design["effects"] or design["note"]
-        assert ordinal["effects"] or ordinal["note"]
-        for effect in ordinal["effects"]:
-            if effect["standard_error"] is None:
-                assert effect["p_value"] is None
-                assert ordinal["note"]
+        assert question.anova or question.note
+        design, ordinal = question.mixed_design, question.ordinal
+        assert design.effects or design.note
+        assert ordinal.effects or ordinal.note
+        for effect in ordinal.effects:
+            if effect.standard_error is None:
+                assert effect.p_value is None
+                assert ordinal.note
     anova_sentences(questions, 0.05)
 
 
@@ -132,8 +138,7 @@ def test_unreasonable_ratings(seed: int) -> None:
 def test_both_together_through_the_whole_analysis(seed: int) -> None:
     rng = np.random.default_rng([seed, 3])
     answers = pd.concat([preference_table(rng), rating_answers(rng)], ignore_index=True)
-    result = analyse(answers, resamples=10)
-    check(result)
+    check(analysis_json(analyse(answers, Settings(resamples=10))))
 
 
 def test_a_perfect_preference_is_no_certainty() -> None:
@@ -143,14 +148,14 @@ def test_a_perfect_preference_is_no_certainty() -> None:
         columns=["participant", "motion", "method_a", "method_b", "a_first", "chose_a"],
     )
     (result,) = compare(table)
-    people = result["participants"]
-    assert (people["test"], people["low"], people["high"]) == ("exact sign test", None, None)
-    assert people["p_value"] == pytest.approx(2 * 0.5**6)
-    assert result["published"]["interval"]["low"] < 1
-    assert result["models"]["mixed"]["p_value"] is None
-    assert "all answers alike" in result["models"]["mixed"]["note"]
-    assert "all answers alike" in result["motions_as_sample"]["note"]
-    assert result["no_preference"]["equivalence_p_value"] is None
+    people = result.participants
+    assert (people.test, people.low, people.high) == ("exact sign test", None, None)
+    assert people.p_value == pytest.approx(2 * 0.5**6)
+    assert result.published.interval.low < 1
+    assert result.models.mixed.p_value is None
+    assert "all answers alike" in result.models.mixed.note
+    assert "all answers alike" in result.motions_as_sample.note
+    assert result.no_preference.equivalence_p_value is None
 
 
 @pytest.mark.parametrize("answer", ["good", "", "3 points", "inf", "1e308", True, "nan "])
@@ -166,9 +171,9 @@ def test_nobody_rated_both_methods() -> None:
         {"participant": list("abcdefgh"), "method_a": ["x", "y"] * 4, "trial": 1, "answer": list("12342345")}
     )
     (question,) = rating_anova(table)
-    assert question["anova"] == []
-    assert "no answers for every combination" in question["note"] or "expected answers for every" in question["note"]
-    assert question["mixed_design"]["note"] == "no participant rated every method"
-    assert question["ranks"]["participants"] is None
-    assert question["difference"]["p_value"] is None
+    assert question.anova == ()
+    assert "no answers for every combination" in question.note or "expected answers for every" in question.note
+    assert question.mixed_design.note == "no participant rated every method"
+    assert question.ranks.participants is None
+    assert question.difference.p_value is None
     check(question)

@@ -10,9 +10,10 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import norm
 
-from study.analysis.same_different import fits as differencing
-from study.analysis.same_different.analyse import d_prime
-from study.analysis.same_different.interpolation import Counts, count_answers, crossings
+from study.analysis.same_different import fits
+from study.analysis.same_different.counts import Counts, count_answers
+from study.analysis.same_different.d_prime import d_prime
+from study.analysis.same_different.interpolation import crossings
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.models.differencing import criterion_free_delta, detected
 
@@ -59,19 +60,19 @@ def test_d_prime_of_a_table_inverts_the_model() -> None:
     alarm = 2 * norm.cdf(-criterion / np.sqrt(2))
     hit = norm.cdf((delta - criterion) / np.sqrt(2)) + norm.cdf((-delta - criterion) / np.sqrt(2))
     found = d_prime(hit * pairs, pairs, alarm * pairs, pairs)
-    assert found["d_prime"] == pytest.approx(delta, abs=1e-4)
-    assert found["criterion"] == pytest.approx(criterion, abs=1e-4)
+    assert found.d_prime == pytest.approx(delta, abs=1e-4)
+    assert found.criterion == pytest.approx(criterion, abs=1e-4)
 
 
 @pytest.mark.parametrize(
     ("hits", "alarms", "expected"), [(8, 2, None), (2, 8, 0.0), (10, 0, None)], ids=["usual", "below chance", "perfect"]
 )
 def test_d_prime_stays_finite(hits: int, alarms: int, expected: float | None) -> None:
-    value = d_prime(hits, 10, alarms, 10)["d_prime"]
+    value = d_prime(hits, 10, alarms, 10).d_prime
     assert value is not None
     assert np.isfinite(value)
     assert expected is None or value == expected
-    assert d_prime(3, 10, 0, 0)["d_prime"] is None
+    assert d_prime(3, 10, 0, 0).d_prime is None
 
 
 def test_the_criterion_free_threshold_is_where_the_best_criterion_gives_three_in_four() -> None:
@@ -86,7 +87,7 @@ def test_the_fit_is_the_maximum_that_a_general_search_finds() -> None:
     counts = draw(np.random.default_rng(2), shares_of_group(8, 7), 12)
     different, shown = counts.different.sum(axis=0), counts.shown.sum(axis=0)
     frames = np.column_stack([np.maximum(-LEVELS, 0), np.maximum(LEVELS, 0)])
-    best = differencing.fit(frames, different[None], shown[None])
+    best = fits.fit(frames, different[None], shown[None])
 
     def loss(point: np.ndarray) -> float:
         delta, criterion, lapse = frames @ np.exp(point[2:]), np.exp(point[0]), point[1]
@@ -178,8 +179,8 @@ def test_equal_slopes_are_told_from_unequal_ones() -> None:
     alike = [fitted(draw(rng, shares_of_group(8, 8), 20)).equal_slopes for _ in range(80)]
     other = [fitted(draw(rng, shares_of_group(9, 5), 20)).equal_slopes for _ in range(20)]
     for key in ("p_value_answers_independent", "p_value_participants_independent"):
-        assert np.mean([test[key] < 0.05 for test in alike if test]) < 0.12
-        assert np.mean([test[key] < 0.05 for test in other if test]) > 0.9
+        assert np.mean([getattr(test, key) < 0.05 for test in alike if test]) < 0.12
+        assert np.mean([getattr(test, key) < 0.05 for test in other if test]) > 0.9
 
 
 def test_observers_who_differ_give_a_wider_interval_than_independent_answers() -> None:

@@ -11,7 +11,8 @@ from scipy.integrate import quad
 from scipy.special import expit
 from scipy.stats import norm
 
-from study.analysis.preference.models import preference_models, psychometric_mixed
+from study.analysis.preference.models import preference_models
+from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.regression.mixed import MixedFit, fit_mixed, marginal_share
 from study.errors import AnalysisError
 
@@ -53,10 +54,10 @@ def test_a_known_group_is_found_again_by_random_intercept_and_slope() -> None:
     chance = norm.cdf(own[who, 0] + own[who, 1] * levels)
     trials = pd.DataFrame({"participant": who, "level": levels, "yes": rng.binomial(40, chance), "shown": 40})
     found = psychometric_mixed(trials)
-    assert found["threshold"] == pytest.approx(3.0, abs=0.2)
-    assert found["low"] < 3.0 < found["high"]
-    assert found["slope"] == pytest.approx(1.0, abs=0.12)
-    assert found["slope_spread"] == pytest.approx(0.2, abs=0.07)
+    assert found.threshold == pytest.approx(3.0, abs=0.2)
+    assert found.low < 3.0 < found.high
+    assert found.slope == pytest.approx(1.0, abs=0.12)
+    assert found.slope_spread == pytest.approx(0.2, abs=0.07)
 
 
 def test_a_typical_participant_is_further_from_one_half_than_the_population() -> None:
@@ -67,14 +68,14 @@ def test_a_typical_participant_is_further_from_one_half_than_the_population() ->
     who = np.repeat(np.arange(people), 8)
     chosen = rng.random(people * 8) < expit(np.log(chance / (1 - chance))[who] + np.where(first, 0.4, -0.4))
     found = preference_models(pd.DataFrame({"participant": who, "chose_a": chosen.astype(float), "a_first": first}))
-    mixed, gee = found["mixed"], found["gee"]
-    assert mixed["percent"] == pytest.approx(100 * expit(1.2), abs=6)
-    assert mixed["participants_spread"] == pytest.approx(1.5, abs=0.4)
-    assert mixed["order_logit"] == pytest.approx(0.8, abs=0.4)
-    assert gee["percent"] < mixed["percent"] - 2
-    assert gee["percent"] == pytest.approx(100 * chance.mean(), abs=4)
-    assert mixed["population_percent"] == pytest.approx(gee["percent"], abs=2)
-    assert "nearer to one half" in found["differ"]
+    mixed, gee = found.mixed, found.gee
+    assert mixed.percent == pytest.approx(100 * expit(1.2), abs=6)
+    assert mixed.participants_spread == pytest.approx(1.5, abs=0.4)
+    assert mixed.order_logit == pytest.approx(0.8, abs=0.4)
+    assert gee.percent < mixed.percent - 2
+    assert gee.percent == pytest.approx(100 * chance.mean(), abs=4)
+    assert mixed.population_percent == pytest.approx(gee.percent, abs=2)
+    assert "nearer to one half" in found.differ
 
 
 def test_gee_standard_error_is_that_of_the_participants() -> None:
@@ -82,11 +83,11 @@ def test_gee_standard_error_is_that_of_the_participants() -> None:
     rng = np.random.default_rng(4)
     chosen = rng.random((30, 8)) < rng.beta(3, 2, size=(30, 1))
     data = pd.DataFrame({"participant": np.repeat(np.arange(30), 8), "chose_a": chosen.ravel().astype(float)})
-    found = preference_models(data)["gee"]
+    found = preference_models(data).gee
     shares = chosen.mean(axis=1)
-    assert found["percent"] == pytest.approx(100 * shares.mean(), abs=1e-4)
+    assert found.percent == pytest.approx(100 * shares.mean(), abs=1e-4)
     error = shares.std(ddof=1) / np.sqrt(30)
-    half = (found["high"] - found["low"]) / 200
+    half = (found.high - found.low) / 200
     assert half == pytest.approx(2.045 * error, rel=0.06)
 
 
@@ -116,11 +117,11 @@ def test_missing_cells_and_empty_data() -> None:
     assert isinstance(everyone_the_same, MixedFit)
     assert "spread" in everyone_the_same.note
     three = pd.DataFrame({"participant": list("aabbcc"), "chose_a": [1.0, 0, 1, 1, 0, 1]})
-    assert "too few" in preference_models(three)["gee"]["note"]
+    assert "too few" in preference_models(three).gee.note
     alike = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": 1.0})
-    assert preference_models(alike)["mixed"]["percent"] is None
+    assert preference_models(alike).mixed.percent is None
     separated = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": [1.0, 0] * 5, "a_first": [True, False] * 5})
-    assert preference_models(separated)["mixed"]["note"]
+    assert preference_models(separated).mixed.note
 
 
 def test_refusals() -> None:

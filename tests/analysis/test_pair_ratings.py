@@ -10,7 +10,10 @@ import pytest
 from scipy import stats
 
 from study.analysis.analyse import analyse
-from study.analysis.ratings.pairs import of_pairs, pair_ratings, pair_sentences
+from study.analysis.ratings.analyse import PairRatings, Ratings
+from study.analysis.ratings.answers import of_pairs
+from study.analysis.ratings.pairs import AllAnswers, pair_ratings, pair_sentences
+from study.analysis.study_result import Settings
 from study.errors import AnalysisError
 
 
@@ -33,11 +36,11 @@ def test_answers_are_turned_so_that_the_comparison_is_judged() -> None:
     answers = rows([[4], [4], [3], [2]])
     assert list(answers["answer"]) == ["4", "0", "3", "2"]  # a middle answer stays in the middle
     (found,) = pair_ratings(answers, 5)
-    assert (found["method_a"], found["method_b"], found["of"]) == ("old", "new", "new compared with old")
-    assert found["distribution"] == {"0": 0, "1": 0, "2": 1, "3": 1, "4": 2}
+    assert (found.method_a, found.method_b, found.of) == ("old", "new", "new compared with old")
+    assert found.distribution == {"0": 0, "1": 0, "2": 1, "3": 1, "4": 2}
     spread = pytest.approx(np.std([4, 4, 3, 2], ddof=1))
-    assert found["published"] == {"mean": 3.25, "standard_deviation": spread, "note": ""}
-    assert found["middle"] == 2
+    assert found.published == AllAnswers(mean=3.25, standard_deviation=spread, note="")
+    assert found.middle == 2
 
 
 def test_two_answers_and_both_groups_that_say_the_second_is_better_cancel() -> None:
@@ -45,10 +48,10 @@ def test_two_answers_and_both_groups_that_say_the_second_is_better_cancel() -> N
     answers = rows([[3], [1], [3], [1], [4], [0]])
     assert set(answers["answer"]) == {"3", "4"}
     (found,) = pair_ratings(answers, 5)
-    assert found["participants"]["mean"] == 2
-    assert found["order"]["kind"] == "between"
-    assert [row["mean"] for row in found["order"]["rows"]] == [pytest.approx(10 / 3), pytest.approx(2 / 3)]
-    assert found["order"]["p_value"] < 0.01
+    assert found.participants.mean == 2
+    assert found.order.kind == "between"
+    assert [row.mean for row in found.order.rows] == [pytest.approx(10 / 3), pytest.approx(2 / 3)]
+    assert found.order.p_value < 0.01
 
 
 def test_the_tests_are_those_of_participants_means() -> None:
@@ -57,18 +60,18 @@ def test_the_tests_are_those_of_participants_means() -> None:
     (found,) = pair_ratings(rows(scores), 5)
     means = np.mean(scores, axis=1)
     own = stats.ttest_1samp(means, 2.0)
-    test = found["participants"]
-    assert (test["t"], test["p_value"]) == (pytest.approx(own.statistic), pytest.approx(own.pvalue))
-    assert [test["low"], test["high"]] == pytest.approx(own.confidence_interval(0.95))
-    assert test["standard_deviation"] == pytest.approx(means.std(ddof=1))
+    test = found.participants
+    assert (test.t, test.p_value) == (pytest.approx(own.statistic), pytest.approx(own.pvalue))
+    assert [test.low, test.high] == pytest.approx(own.confidence_interval(0.95))
+    assert test.standard_deviation == pytest.approx(means.std(ddof=1))
     between = stats.f_oneway(means[::2], means[1::2])
-    order = found["order"]
-    assert (order["f"], order["p_value"]) == (pytest.approx(between.statistic), pytest.approx(between.pvalue))
-    assert (order["degrees_of_freedom"], order["error_degrees_of_freedom"]) == (1, 24)
-    assert order["balanced_mean"] == pytest.approx((means[::2].mean() + means[1::2].mean()) / 2)
+    order = found.order
+    assert (order.f, order.p_value) == (pytest.approx(between.statistic), pytest.approx(between.pvalue))
+    assert (order.degrees_of_freedom, order.error_degrees_of_freedom) == (1, 24)
+    assert order.balanced_mean == pytest.approx((means[::2].mean() + means[1::2].mean()) / 2)
     by_motion = [stats.ttest_1samp([row[motion] for row in scores], 2.0).pvalue for motion in range(3)]
-    assert [row["p_value"] for row in found["motions"]] == pytest.approx(by_motion)
-    assert min(row["holm_p_value"] for row in found["motions"]) == pytest.approx(min(1.0, 3 * min(by_motion)))
+    assert [row.p_value for row in found.motions] == pytest.approx(by_motion)
+    assert min(row.holm_p_value for row in found.motions) == pytest.approx(min(1.0, 3 * min(by_motion)))
 
 
 def test_the_signed_ranks_are_those_of_distances_from_the_middle() -> None:
@@ -79,7 +82,7 @@ def test_the_signed_ranks_are_those_of_distances_from_the_middle() -> None:
     signs = np.array(np.meshgrid(*[[0, 1]] * 7)).reshape(7, -1).T
     sums, own = signs @ ranks, ranks[apart > 0].sum()
     exact = np.mean(np.abs(sums - ranks.sum() / 2) >= abs(own - ranks.sum() / 2) - 1e-9)
-    assert found["participants"]["signed_rank_p_value"] == pytest.approx(exact)
+    assert found.participants.signed_rank_p_value == pytest.approx(exact)
 
 
 def test_orders_that_vary_within_participants_are_compared_within_them() -> None:
@@ -88,8 +91,8 @@ def test_orders_that_vary_within_participants_are_compared_within_them() -> None
     (found,) = pair_ratings(rows(scores, by_group=False), 5)
     apart = [row[0] - row[1] if person % 2 == 0 else row[1] - row[0] for person, row in enumerate(scores)]
     own = stats.ttest_1samp(apart, 0.0)
-    assert found["order"]["kind"] == "within"
-    assert (found["order"]["f"], found["order"]["p_value"]) == (
+    assert found.order.kind == "within"
+    assert (found.order.f, found.order.p_value) == (
         pytest.approx(own.statistic**2),
         pytest.approx(own.pvalue),
     )
@@ -98,8 +101,8 @@ def test_orders_that_vary_within_participants_are_compared_within_them() -> None
 @pytest.mark.parametrize("points", [4, 7])
 def test_other_scales_have_their_own_middle(points: int) -> None:
     (found,) = pair_ratings(rows([[points - 1], [0], [points - 1], [0]], points=points), points)
-    assert found["middle"] == (points - 1) / 2 == found["participants"]["mean"]
-    assert len(found["distribution"]) == points
+    assert found.middle == (points - 1) / 2 == found.participants.mean
+    assert len(found.distribution) == points
 
 
 @pytest.mark.parametrize(
@@ -112,10 +115,10 @@ def test_other_scales_have_their_own_middle(points: int) -> None:
 )
 def test_what_little_data_can_not_tell_is_said(scores: list[list[int]], why: str, order: str) -> None:
     (found,) = pair_ratings(rows(scores), 5)
-    assert found["participants"]["note"].startswith(why)
-    assert (found["participants"]["p_value"] is None) == bool(why)
-    assert order in found["order"]["note"]
-    assert found["order"]["p_value"] is None
+    assert found.participants.note.startswith(why)
+    assert (found.participants.p_value is None) == bool(why)
+    assert order in found.order.note
+    assert found.order.p_value is None
     (sentence,) = pair_sentences([found], 0.05)
     assert ("at 0.05" in sentence) != bool(why)
     assert "None" not in sentence
@@ -125,8 +128,8 @@ def test_no_answers_are_no_questions_and_missed_ones_are_left_out() -> None:
     answers = rows([[3], [4], [2]])
     answers.loc[0, "answer"] = None
     (found,) = pair_ratings(answers, 5)
-    assert (found["answers"], found["participants"]["participants"]) == (2, 2)
-    assert pair_ratings(answers.iloc[:1], 5) == []
+    assert (found.answers, found.participants.participants) == (2, 2)
+    assert pair_ratings(answers.iloc[:1], 5) == ()
 
 
 def test_what_makes_no_sense_is_refused() -> None:
@@ -144,10 +147,11 @@ def test_what_makes_no_sense_is_refused() -> None:
 def test_single_ratings_and_pairs_are_told_apart() -> None:
     pairs = rows([[3], [4], [2], [3]])
     singles = pairs.assign(study="single", method_b="", a_first=None)
-    found = analyse(pd.concat([pairs, singles], ignore_index=True), scale_points={"compared": 5, "single": 5})
-    assert (set(found["pair_ratings"]), set(found["ratings"])) == ({"compared"}, {"single"})
+    points = Settings(scale_points={"compared": 5, "single": 5})
+    found = analyse(pd.concat([pairs, singles], ignore_index=True), points)
+    assert (set(found.of(PairRatings)), set(found.of(Ratings))) == ({"compared"}, {"single"})
     assert (of_pairs(pairs), of_pairs(singles), of_pairs(singles.drop(columns="method_b"))) == (True, False, False)
-    assert found["pair_ratings"]["compared"][0]["participants"]["mean"] == 3
+    assert found.of(PairRatings)["compared"].questions[0].participants.mean == 3
 
 
 def test_no_preference_is_found_as_often_as_it_should_be() -> None:
@@ -155,6 +159,6 @@ def test_no_preference_is_found_as_often_as_it_should_be() -> None:
     rng = np.random.default_rng(2003)
     given = np.clip(np.round(2.4 + 0.95 * rng.standard_normal((1000, 26))), 0, 4).astype(int)
     scores = np.where(np.arange(26) % 2 == 0, given, 4 - given)
-    found = [pair_ratings(rows(study[:, None].tolist()), 5)[0]["participants"]["p_value"] for study in scores[:200]]
+    found = [pair_ratings(rows(study[:, None].tolist()), 5)[0].participants.p_value for study in scores[:200]]
     # The order adds to the spread between participants, so the test is careful rather than not.
     assert np.mean(np.array(found) < 0.05) <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 200)

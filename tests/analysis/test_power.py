@@ -10,7 +10,8 @@ from scipy.special import expit
 from scipy.stats import nct, t
 
 from study.errors import AnalysisError
-from study.power.curve import logit_normal, power_curve
+from study.power.curve import power_curve
+from study.power.preference import logit_normal
 
 
 def t_tests(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> np.ndarray:

@@ -11,8 +11,12 @@ import pytest
 from scipy import stats
 
 from study.analysis import estimates
-from study.analysis.preference.analyse import compare, confirmatory, published_test, strengths
-from study.analysis.preference.participants import default_p_values, motions_as_sample, participant_tests
+from study.analysis.confirmatory import confirmatory
+from study.analysis.preference.analyse import Preference, compare, strengths
+from study.analysis.preference.bradley_terry import BradleyTerry
+from study.analysis.preference.motions import motions_as_sample
+from study.analysis.preference.participants import default_p_values, participant_tests
+from study.analysis.preference.published import published_test
 from study.errors import AnalysisError
 
 
@@ -47,15 +51,15 @@ def test_participants_against_scipy() -> None:
     chosen = rng.binomial(8, 0.6, 20).astype(float)
     result = participant_tests(chosen, np.full(20, 8.0))
     expected = stats.ttest_1samp(chosen / 8, 0.5)
-    assert result["t"] == pytest.approx(expected.statistic)
-    assert result["p_value"] == pytest.approx(expected.pvalue)
-    assert result["mean_percent"] == pytest.approx(100 * chosen.mean() / 8)
+    assert result.t == pytest.approx(expected.statistic)
+    assert result.p_value == pytest.approx(expected.pvalue)
+    assert result.mean_percent == pytest.approx(100 * chosen.mean() / 8)
 
 
 def test_the_robust_chi_square_of_equal_numbers_of_trials_is_the_square_of_students_t() -> None:
     chosen = np.array([3.0, 5, 7, 8, 4, 6, 6])
     result = participant_tests(chosen, np.full(7, 8.0))
-    assert result["robust_chi_square"] == pytest.approx(stats.ttest_1samp(chosen / 8, 0.5).statistic ** 2)
+    assert result.robust_chi_square == pytest.approx(stats.ttest_1samp(chosen / 8, 0.5).statistic ** 2)
 
 
 def test_wilcoxon_is_exact_with_ties() -> None:
@@ -66,7 +70,7 @@ def test_wilcoxon_is_exact_with_ties() -> None:
     sums = np.array([ranks[np.array(signs)].sum() for signs in product([False, True], repeat=len(lean))])
     observed = ranks[lean > 0].sum()
     expected = np.mean(np.abs(sums - ranks.sum() / 2) >= abs(observed - ranks.sum() / 2) - 1e-9)
-    found = participant_tests(chosen, np.full(7, 8.0))["wilcoxon_p_value"]
+    found = participant_tests(chosen, np.full(7, 8.0)).wilcoxon_p_value
     assert found == pytest.approx(expected)
 
 
@@ -87,7 +91,7 @@ def test_the_participants_test_keeps_its_level_where_the_pooled_one_does_not(cor
         own = rng.beta(2, 2, size=35) if correlation else np.full(35, 0.5)
         chosen = rng.binomial(8, own).astype(float)
         tests = participant_tests(chosen, np.full(35, 8.0))
-        people[study], robust[study] = tests["p_value"], tests["robust_p_value"]
+        people[study], robust[study] = tests.p_value, tests.robust_p_value
         pooled[study] = published_test(int(chosen.sum()), 280).p_value or 0
     for p_values in (people, robust):
         assert np.mean(p_values < 0.05) == pytest.approx(0.05, abs=0.027)
@@ -97,45 +101,45 @@ def test_the_participants_test_keeps_its_level_where_the_pooled_one_does_not(cor
 
 def test_a_preference_study_end_to_end(preference_study: Callable[..., pd.DataFrame]) -> None:
     (result,) = compare(preference_study(np.random.default_rng(1), share=0.8, correlation=0.1))
-    assert (result["method_a"], result["method_b"]) == ("geodesic", "fixed")
-    assert result["published"]["answers"] == 280
-    assert result["participants"]["p_value"] < 0.001
-    assert result["participants"]["low"] < 80 < result["participants"]["high"]
-    assert len(result["motions"]) == 8
-    assert all(row["holm_p_value"] >= row["exact_p_value"] for row in result["motions"])
-    assert "favoured geodesic over fixed" in result["answer"]
+    assert (result.method_a, result.method_b) == ("geodesic", "fixed")
+    assert result.published.answers == 280
+    assert result.participants.p_value < 0.001
+    assert result.participants.low < 80 < result.participants.high
+    assert len(result.motions) == 8
+    assert all(row.holm_p_value >= row.exact_p_value for row in result.motions)
+    assert "favoured geodesic over fixed" in result.answer
 
 
 def test_order_of_presentation_is_found_and_taken_out(preference_study: Callable[..., pd.DataFrame]) -> None:
     answers = preference_study(np.random.default_rng(2), participants=200, share=0.6, first_bonus=0.15)
     (result,) = compare(answers)
-    order = result["order"]
-    assert order["first_percent"] == pytest.approx(65, abs=3)
-    assert order["p_value"] < 1e-6
-    assert order["balanced_percent"] == pytest.approx(60, abs=3)
+    order = result.order
+    assert order.first_percent == pytest.approx(65, abs=3)
+    assert order.p_value < 1e-6
+    assert order.balanced_percent == pytest.approx(60, abs=3)
 
 
 def test_everybody_of_one_mind(preference_study: Callable[..., pd.DataFrame]) -> None:
     (result,) = compare(preference_study(np.random.default_rng(2), participants=12, share=1.0))
-    people = result["participants"]
-    assert (people["t"], people["low"]) == (None, None)
-    assert people["test"] == "exact sign test"
-    assert people["p_value"] == pytest.approx(2 * 0.5**12)
-    assert result["published"]["interval"]["low"] < 0.97
+    people = result.participants
+    assert (people.t, people.low) == (None, None)
+    assert people.test == "exact sign test"
+    assert people.p_value == pytest.approx(2 * 0.5**12)
+    assert result.published.interval.low < 0.97
 
 
 def test_one_participant(preference_study: Callable[..., pd.DataFrame]) -> None:
     (result,) = compare(preference_study(np.random.default_rng(2), participants=1))
-    assert result["participants"]["p_value"] is None
-    assert "one participant" in result["answer"]
-    assert result["clustering"]["design_effect"] is None
+    assert result.participants.p_value is None
+    assert "one participant" in result.answer
+    assert result.clustering.design_effect is None
 
 
 def test_missed_answers_are_left_out(preference_study: Callable[..., pd.DataFrame]) -> None:
     answers = preference_study(np.random.default_rng(2), participants=10).astype({"chose_a": object})
     answers.loc[:9, "chose_a"] = None
     (result,) = compare(answers)
-    assert result["published"]["answers"] == 70
+    assert result.published.answers == 70
 
 
 def test_holm_by_hand() -> None:
@@ -170,11 +174,11 @@ def test_ties_count_half_and_leave_the_pooled_test(preference_study: Callable[..
     answers.loc[answers.index % 8 == 0, "chose_a"] = 0.5
     (result,) = compare(answers)
     clear = answers[answers["chose_a"] != 0.5]
-    assert result["ties"] == 10
-    assert (result["published"]["answers"], result["published"]["favouring"]) == (70, int(clear["chose_a"].sum()))
+    assert result.ties == 10
+    assert (result.published.answers, result.published.favouring) == (70, int(clear["chose_a"].sum()))
     shares = answers.assign(chose_a=answers["chose_a"].astype(float)).groupby("participant")["chose_a"].mean()
-    assert result["participants"]["mean_percent"] == pytest.approx(100 * shares.mean())
-    assert result["order"]["answers"] == 80
+    assert result.participants.mean_percent == pytest.approx(100 * shares.mean())
+    assert result.order.answers == 80
     answers.loc[3, "chose_a"] = "geodesic"
     with pytest.raises(AnalysisError, match=r"or 0\.5 for a tie .* found 'geodesic'"):
         compare(answers)
@@ -194,12 +198,12 @@ def test_motions_that_differ_widen_what_holds_for_other_motions() -> None:
     )
     found = motions_as_sample(part)
     people = participant_tests(chosen.sum(axis=1), np.full(35, 8.0))
-    assert people["p_value"] < 0.001
+    assert people.p_value < 0.001
     expected = stats.ttest_1samp(chosen.mean(axis=0), 0.5)
-    assert found["by_motion"]["p_value"] == pytest.approx(expected.pvalue)
-    assert found["both"]["p_value"] > 0.1
-    assert found["both"]["degrees_of_freedom"] == 7
-    assert found["both"]["percent"] == pytest.approx(people["mean_percent"])
+    assert found.by_motion.p_value == pytest.approx(expected.pvalue)
+    assert found.both.p_value > 0.1
+    assert found.both.degrees_of_freedom == 7
+    assert found.both.percent == pytest.approx(people.mean_percent)
 
 
 def test_what_holds_for_other_people_and_motions_keeps_its_level() -> None:
@@ -212,28 +216,31 @@ def test_what_holds_for_other_people_and_motions_keeps_its_level() -> None:
         part = pd.DataFrame(
             {"participant": np.repeat(np.arange(35), 8), "motion": np.tile(np.arange(8), 35), "chose_a": chosen.ravel()}
         )
-        wrong.append(motions_as_sample(part[rng.random(280) > 0.05])["both"]["p_value"] < 0.05)
+        wrong.append(motions_as_sample(part[rng.random(280) > 0.05]).both.p_value < 0.05)
     assert 0.015 <= np.mean(wrong) <= 0.08
 
 
 def test_one_motion_can_stand_for_no_other(preference_study: Callable[..., pd.DataFrame]) -> None:
     answers = preference_study(np.random.default_rng(2), participants=9)
     (result,) = compare(answers[answers["motion"] == "motion 0"])
-    assert result["motions_as_sample"]["both"] is None
-    assert "fewer than two motions" in result["motions_as_sample"]["note"]
+    assert result.motions_as_sample.both is None
+    assert "fewer than two motions" in result.motions_as_sample.note
     (alone,) = compare(answers[answers["participant"] == "p00"])
-    assert alone["motions_as_sample"]["both"] is None
-    assert "one participant" in alone["motions_as_sample"]["note"]
+    assert alone.motions_as_sample.both is None
+    assert "one participant" in alone.motions_as_sample.note
 
 
 def test_only_the_declared_family_is_adjusted(preference_study: Callable[..., pd.DataFrame]) -> None:
     rng = np.random.default_rng(3)
-    found = {name: compare(preference_study(rng, share=0.6), models=False) for name in ("main", "second", "extra")}
+    found = {
+        name: Preference(compare(preference_study(rng, share=0.6), models=False), None)
+        for name in ("main", "second", "extra")
+    }
     everything, declared = confirmatory(found), confirmatory(found, ["main", "second"])
-    assert [row["study"] for row in declared] == ["main", "second"]
-    assert [row["p_value"] for row in declared] == [row["p_value"] for row in everything[:2]]
-    smallest = min(row["p_value"] for row in declared)
-    assert min(row["holm_p_value"] for row in declared) == pytest.approx(2 * smallest)
+    assert [row.study for row in declared] == ["main", "second"]
+    assert [row.p_value for row in declared] == [row.p_value for row in everything[:2]]
+    smallest = min(row.p_value for row in declared)
+    assert min(row.holm_p_value for row in declared) == pytest.approx(2 * smallest)
 
 
 def test_strengths_rest_on_who_answered(preference_study: Callable[..., pd.DataFrame]) -> None:
@@ -243,6 +250,6 @@ def test_strengths_rest_on_who_answered(preference_study: Callable[..., pd.DataF
         for one, other, share in (("a", "b", 0.7), ("b", "c", 0.6), ("a", "c", 0.8))
     ]
     found = strengths(pd.concat(parts))
-    assert found is not None
-    assert found["participants"] == 12
-    assert [row["method"] for row in found["strengths"]] == ["a", "b", "c"]
+    assert isinstance(found, BradleyTerry)
+    assert found.participants == 12
+    assert [row.method for row in found.strengths] == ["a", "b", "c"]

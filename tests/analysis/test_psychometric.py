@@ -10,14 +10,8 @@ from scipy.optimize import minimize
 from scipy.stats import betabinom, gumbel_l, logistic, norm
 
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
-from study.analysis.psychometric.posterior import (
-    PsychometricFit,
-    curve_of,
-    fit_many,
-    fit_psychometric,
-    make_model,
-    threshold_at,
-)
+from study.analysis.psychometric.model import make_model
+from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_many, fit_psychometric, threshold_at
 from study.errors import AnalysisError
 from study.models import posterior_grid
 

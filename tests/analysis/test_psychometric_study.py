@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import norm
 
 from study.analysis.psychometric.analyse import analyse_psychometric
-from study.analysis.psychometric.posterior import make_model
+from study.analysis.psychometric.model import make_model
 
 LEVELS = np.arange(1.0, 8.0)
 
@@ -26,27 +26,27 @@ def trials(thresholds: list[float], answers: int = 40, seed: int = 0, guess: flo
 
 def test_people_who_differ_are_not_taken_for_one_person() -> None:
     result = analyse_psychometric(trials([2.6, 3.2, 3.6, 4.2, 4.8, 5.4]))
-    pooled, mixed, group = result["pooled"]["threshold"]["interval"], result["mixed"], result["group"]
-    assert mixed["high"] - mixed["low"] > 1.5 * (pooled["high"] - pooled["low"])
-    assert group["high"] - group["low"] > 1.5 * (pooled["high"] - pooled["low"])
-    assert mixed["low"] < 4.0 < mixed["high"]
-    assert result["answer"].startswith(f"The threshold of a typical one of 6 participants is {mixed['threshold']:.4g}")
-    assert "too sure where people differ" in result["answer"]
+    pooled, mixed, group = result.pooled.threshold.interval, result.mixed, result.group
+    assert mixed.high - mixed.low > 1.5 * (pooled.high - pooled.low)
+    assert group.high - group.low > 1.5 * (pooled.high - pooled.low)
+    assert mixed.low < 4.0 < mixed.high
+    assert result.answer.startswith(f"The threshold of a typical one of 6 participants is {mixed.threshold:.4g}")
+    assert "too sure where people differ" in result.answer
 
 
 def test_one_person_has_the_own_interval() -> None:
     result = analyse_psychometric(trials([4.0]))
-    found = result["participants"][0]["threshold"]
-    assert result["mixed"] is None
-    low, high = found["interval"]["low"], found["interval"]["high"]
-    assert result["answer"] == f"The threshold is {found['value']:.4g} (95% interval {low:.4g} to {high:.4g})."
+    found = result.participants[0].threshold
+    assert result.mixed is None
+    low, high = found.interval.low, found.interval.high
+    assert result.answer == f"The threshold is {found.value:.4g} (95% interval {low:.4g} to {high:.4g})."
 
 
 def test_without_a_mixed_model_the_mean_over_people_stands() -> None:
     result = analyse_psychometric(trials([3.6, 4.0, 4.4]), make_model(sigmoid="gumbel"))
-    assert result["mixed"] is None
-    assert "mean threshold of 3 participants" in result["answer"]
-    assert "by Student's t over them" in result["answer"]
+    assert result.mixed is None
+    assert "mean threshold of 3 participants" in result.answer
+    assert "by Student's t over them" in result.answer
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_a_group_without_a_threshold_gets_none(thresholds: list[float], says: st
     if says == "below the levels shown":
         answers["yes"] = answers["shown"]
     result = analyse_psychometric(answers)
-    assert result["group"]["mean_threshold"] is None
-    assert result["mixed"] is None or result["mixed"]["threshold"] is None
-    assert result["answer"].startswith("No threshold")
-    assert says in str(result["participants"])
+    assert result.group.mean_threshold is None
+    assert result.mixed is None or result.mixed.threshold is None
+    assert result.answer.startswith("No threshold")
+    assert says in str(result.participants)

@@ -23,8 +23,8 @@ def test_friedman_against_scipy() -> None:
     values = np.random.default_rng(2).integers(0, 5, (18, 4)).astype(float)
     found = friedman(values)
     assert found is not None
-    assert found["chi_square"] == pytest.approx(stats.friedmanchisquare(*values.T).statistic)
-    assert (found["degrees_of_freedom"], found["error_degrees_of_freedom"]) == (3, 51)
+    assert found.chi_square == pytest.approx(stats.friedmanchisquare(*values.T).statistic)
+    assert (found.degrees_of_freedom, found.error_degrees_of_freedom) == (3, 51)
 
 
 def test_friedman_keeps_its_level() -> None:
@@ -32,15 +32,15 @@ def test_friedman_keeps_its_level() -> None:
     p_values = []
     for _ in range(1500):
         found = friedman(rng.integers(0, 5, (12, 3)))
-        p_values.append(1.0 if found is None else found["p_value"])
+        p_values.append(1.0 if found is None else found.p_value)
     assert np.mean(np.array(p_values) < 0.05) == pytest.approx(0.05, abs=0.02)
 
 
 def test_friedman_where_all_rank_alike_or_not_at_all() -> None:
     alike = friedman(np.tile([1.0, 2.0, 3.0], (5, 1)))
     assert alike is not None
-    assert alike["f"] is None
-    assert alike["p_value"] == pytest.approx(6.0**-4)
+    assert alike.f is None
+    assert alike.p_value == pytest.approx(6.0**-4)
     assert friedman(np.ones((5, 3))) is None
     assert friedman(np.array([[1.0, 2.0]])) is None
 
@@ -53,9 +53,9 @@ def test_two_groups_are_compared_as_welch_compares_ranks() -> None:
     assert not isinstance(found, str)
     ranks = stats.rankdata(values)
     expected = stats.ttest_ind(ranks[:15], ranks[15:], equal_var=False)
-    assert found[0]["f"] == pytest.approx(expected.statistic**2)
-    assert found[0]["error_degrees_of_freedom"] == pytest.approx(expected.df)
-    assert found[0]["p_value"] == pytest.approx(expected.pvalue)
+    assert found[0].f == pytest.approx(expected.statistic**2)
+    assert found[0].error_degrees_of_freedom == pytest.approx(expected.df)
+    assert found[0].p_value == pytest.approx(expected.pvalue)
 
 
 def test_a_two_by_two_design_keeps_its_level_with_unequal_spread() -> None:
@@ -71,7 +71,7 @@ def test_a_two_by_two_design_keeps_its_level_with_unequal_spread() -> None:
         ]
         found = anova_type(np.concatenate(parts), np.repeat(np.arange(4), sizes), contrasts)
         assert not isinstance(found, str)
-        wrong += [row["p_value"] < 0.05 for row in found]
+        wrong += [row.p_value < 0.05 for row in found]
     assert wrong / 1500 == pytest.approx(np.full(3, 0.05), abs=0.022)
 
 

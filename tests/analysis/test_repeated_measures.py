@@ -13,7 +13,7 @@ from study.analysis.variance.repeated_measures import likeness, mixed_design
 def rows_of(values: np.ndarray, groups: list[int], names: list[str]) -> dict[str, dict[str, float]]:
     found = mixed_design(values, groups, names)
     assert not isinstance(found, str)
-    return {row["source"]: row for row in found}
+    return {row.source: row for row in found}
 
 
 def test_two_factors_within_against_statsmodels() -> None:
@@ -25,9 +25,9 @@ def test_two_factors_within_against_statsmodels() -> None:
     long = pd.DataFrame({"y": values.ravel()}, index=index).reset_index()
     expected = AnovaRM(long, "y", "who", within=["method", "motion"]).fit().anova_table
     for name, row in zip(["method", "motion", "method x motion"], expected.itertuples(), strict=True):
-        assert found[name]["f"] == pytest.approx(row[1])
-        assert (found[name]["degrees_of_freedom"], found[name]["error_degrees_of_freedom"]) == (row[2], row[3])
-        assert found[name]["p_value"] == pytest.approx(row[4])
+        assert found[name].f == pytest.approx(row[1])
+        assert (found[name].degrees_of_freedom, found[name].error_degrees_of_freedom) == (row[2], row[3])
+        assert found[name].p_value == pytest.approx(row[4])
 
 
 def test_unequal_groups_against_contrasts_of_participants() -> None:
@@ -37,14 +37,14 @@ def test_unequal_groups_against_contrasts_of_participants() -> None:
     found = rows_of(values, groups, ["method"])
     total, apart = values.sum(axis=1), values[:, 1] - values[:, 0]
     pooled = stats.ttest_ind(total[:6], total[6:])
-    assert found["group"]["f"] == pytest.approx(pooled.statistic**2)
-    assert found["group"]["p_value"] == pytest.approx(pooled.pvalue)
+    assert found["group"].f == pytest.approx(pooled.statistic**2)
+    assert found["group"].p_value == pytest.approx(pooled.pvalue)
     crossed = stats.ttest_ind(apart[:6], apart[6:])
-    assert found["method x group"]["f"] == pytest.approx(crossed.statistic**2)
-    means, error = [apart[:6].mean(), apart[6:].mean()], found["method"]["error_sum_of_squares"] / 15 * 2
+    assert found["method x group"].f == pytest.approx(crossed.statistic**2)
+    means, error = [apart[:6].mean(), apart[6:].mean()], found["method"].error_sum_of_squares / 15 * 2
     unweighted = np.mean(means) / np.sqrt(error * (1 / 6 + 1 / 11) / 4)
-    assert found["method"]["f"] == pytest.approx(unweighted**2)
-    assert found["method"]["epsilon"] == 1
+    assert found["method"].f == pytest.approx(unweighted**2)
+    assert found["method"].epsilon == 1
 
 
 def test_epsilon_against_box_1954() -> None:
@@ -55,10 +55,10 @@ def test_epsilon_against_box_1954() -> None:
     s = np.cov(values.T)
     top = 25 * (np.diag(s).mean() - s.mean()) ** 2
     below = 4 * ((s**2).sum() - 10 * (s.mean(axis=1) ** 2).sum() + 25 * s.mean() ** 2)
-    assert found["epsilon"] == pytest.approx(top / below)
-    expected = stats.f.sf(found["f"], 4 * found["epsilon"], 52 * found["epsilon"])
-    assert found["corrected_p_value"] == pytest.approx(expected)
-    assert found["epsilon"] <= found["huynh_feldt_epsilon"] <= 1
+    assert found.epsilon == pytest.approx(top / below)
+    expected = stats.f.sf(found.f, 4 * found.epsilon, 52 * found.epsilon)
+    assert found.corrected_p_value == pytest.approx(expected)
+    assert found.epsilon <= found.huynh_feldt_epsilon <= 1
 
 
 def test_the_corrected_test_keeps_its_level_where_the_plain_one_does_not() -> None:
@@ -67,8 +67,8 @@ def test_the_corrected_test_keeps_its_level_where_the_plain_one_does_not() -> No
     plain, corrected = [], []
     for _ in range(1000):
         row = rows_of(rng.normal(size=(12, 4)) @ shape, [0] * 12, ["method"])["method"]
-        plain.append(row["p_value"] < 0.05)
-        corrected.append(row["corrected_p_value"] < 0.05)
+        plain.append(row.p_value < 0.05)
+        corrected.append(row.corrected_p_value < 0.05)
     assert np.mean(corrected) == pytest.approx(0.05, abs=0.022)
     assert np.mean(plain) > 0.075
 
@@ -77,7 +77,7 @@ def test_what_can_not_be_analysed_is_said() -> None:
     assert "too few" in mixed_design(np.ones((2, 2)), [0, 1], ["method"])
     assert "one level" in mixed_design(np.ones((6, 1)), [0] * 6, ["method"])
     same = rows_of(np.tile([1.0, 2.0], (6, 1)), [0, 0, 0, 1, 1, 1], ["method"])
-    assert all(row["f"] is None and row["p_value"] is None for row in same.values())
+    assert all(row.f is None and row.p_value is None for row in same.values())
 
 
 def test_likeness_is_recovered_and_is_that_of_the_error_strata() -> None:
@@ -87,12 +87,12 @@ def test_likeness_is_recovered_and_is_that_of_the_error_strata() -> None:
     values = np.sqrt(0.4) * rng.normal(size=(600, 1)) + np.sqrt(0.6) * rng.normal(size=(600, 3))
     values = values + groups[:, None] + np.array([0, 1, 3])
     found = likeness(values, groups)
-    assert found["intraclass_correlation"] == pytest.approx(0.4, abs=0.06)
+    assert found.intraclass_correlation == pytest.approx(0.4, abs=0.06)
     effects = rows_of(values, list(groups), ["method"])
-    between = effects["group"]["error_sum_of_squares"] / effects["group"]["error_degrees_of_freedom"]
-    within = effects["method"]["error_sum_of_squares"] / effects["method"]["error_degrees_of_freedom"]
+    between = effects["group"].error_sum_of_squares / effects["group"].error_degrees_of_freedom
+    within = effects["method"].error_sum_of_squares / effects["method"].error_degrees_of_freedom
     pooled = (between + 2 * within) / 3
-    assert found["between_effect"] == pytest.approx(between / pooled)
-    assert found["within_effect"] == pytest.approx(within / pooled)
-    assert likeness(np.ones((4, 2)), [0, 0, 1, 1])["intraclass_correlation"] is None
-    assert likeness(np.ones((4, 1)), [0, 0, 1, 1])["intraclass_correlation"] is None
+    assert found.between_effect == pytest.approx(between / pooled)
+    assert found.within_effect == pytest.approx(within / pooled)
+    assert likeness(np.ones((4, 2)), [0, 0, 1, 1]).intraclass_correlation is None
+    assert likeness(np.ones((4, 1)), [0, 0, 1, 1]).intraclass_correlation is None

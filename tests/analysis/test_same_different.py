@@ -8,13 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.same_different.interpolation import (
-    Counts,
-    count_answers,
-    crossing_of_lines,
-    crossings,
-    percent_different,
-)
+from study.analysis.same_different.counts import Counts, count_answers, percent_different
+from study.analysis.same_different.interpolation import crossing_of_lines, crossings
 from study.errors import AnalysisError
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
@@ -34,10 +29,10 @@ def test_percent_and_standard_error_are_over_participants() -> None:
             "answer": ["same", "same", "same", "different", "different", "different"],
         }
     )
-    (row,) = percent_different(answers).to_dict("records")
-    assert (row["participants"], row["answers"], row["different"]) == (3, 6, 3)
-    assert row["percent"] == pytest.approx(50.0)
-    assert row["standard_error"] == pytest.approx(50 / np.sqrt(3))
+    (row,) = percent_different(count_answers(answers))
+    assert (row.participants, row.answers, row.different) == (3, 6, 3)
+    assert row.percent == pytest.approx(50.0)
+    assert row.standard_error == pytest.approx(50 / np.sqrt(3))
 
 
 def test_participants_count_alike_however_many_answers_they_missed() -> None:
@@ -48,9 +43,9 @@ def test_participants_count_alike_however_many_answers_they_missed() -> None:
             "answer": ["different", None, "same", "same"],
         }
     )
-    (row,) = percent_different(answers).to_dict("records")
-    assert row["answers"] == 3
-    assert row["percent"] == pytest.approx(50.0)
+    (row,) = percent_different(count_answers(answers))
+    assert row.answers == 3
+    assert row.percent == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +117,7 @@ def test_no_answers_at_all() -> None:
     answers = pd.DataFrame({"participant": ["a"], "difference_frames": [5], "answer": [None]})
     assert count_answers(answers).participants == ()
     assert {threshold.status for threshold in crossings(count_answers(answers)).values()} == {"not estimable"}
-    assert percent_different(answers).empty
+    assert percent_different(count_answers(answers)) == ()
 
 
 def test_refusals_name_what_was_found() -> None:

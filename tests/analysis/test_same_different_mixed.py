@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import norm
 
 from study.analysis.same_different.analyse import analyse_jnd
-from study.analysis.same_different.interpolation import Counts, count_answers
+from study.analysis.same_different.counts import Counts, count_answers
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
 
@@ -154,8 +154,8 @@ def test_a_study_reports_the_median_observer(same_different_study: Callable[...,
     answers = same_different_study(np.random.default_rng(8), participants=10, spread=0.3)
     result = analyse_jnd(answers, resamples=50)
     expected = fitted(count_answers(answers))
-    assert result["mixed"]["typical"]["longer"]["frames"] == pytest.approx(expected.typical["longer"].frames)
-    assert "the median observer's is k +" in result["answer"]
+    assert result.mixed.typical["longer"].frames == pytest.approx(expected.typical["longer"].frames)
+    assert "the median observer's is k +" in result.answer
     alone = analyse_jnd(answers[answers["participant"] == "p00"], resamples=50)
-    assert alone["mixed"] is None
-    assert "too few to tell how people differ" in alone["mixed_note"]
+    assert alone.mixed is None
+    assert "too few to tell how people differ" in alone.mixed_note

@@ -15,11 +15,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.analyse import analyse
+from study.analysis.analyse import analyse, analysis_json
 from study.analysis.foreign.answers import AnswerColumns, read_preferences, read_ratings
 from study.analysis.foreign.trials import Columns, read_trials
 from study.analysis.psychometric.analyse import analyse_psychometric
-from study.analysis.psychometric.posterior import make_model
+from study.analysis.psychometric.model import make_model
+from study.analysis.study_result import Settings
+from study.analysis.to_json import to_json
 from study.errors import AnalysisError
 
 TABLES = int(os.environ.get("SEGUE_TABLES", "300"))
@@ -53,7 +55,7 @@ def preferences(rng: np.random.Generator) -> dict[str, Any]:
     table = pd.DataFrame(rows, columns=["who", "first", "second", "motion", "answer"])
     motion = "motion" if rng.random() < 0.7 else None
     columns = AnswerColumns("answer", "first", "second", participant="who", motion=motion, tie=("tie",))
-    return analyse(read_preferences(table, columns).table)
+    return analysis_json(analyse(read_preferences(table, columns).table))
 
 
 def ratings(rng: np.random.Generator) -> dict[str, Any]:
@@ -68,7 +70,7 @@ def ratings(rng: np.random.Generator) -> dict[str, Any]:
             rows.append((who, f"m{method}", f"motion {trial % 2}", item, sometimes(rng, str(rated))))
     table = pd.DataFrame(rows, columns=["who", "method", "motion", "item", "answer"])
     asked = {name: name for name in ("method", "motion", "item") if rng.random() < 0.8}
-    return analyse(read_ratings(table, AnswerColumns("answer", participant="who", **asked)).table)
+    return analysis_json(analyse(read_ratings(table, AnswerColumns("answer", participant="who", **asked)).table))
 
 
 def rated_pairs(rng: np.random.Generator) -> dict[str, Any]:
@@ -82,7 +84,7 @@ def rated_pairs(rng: np.random.Generator) -> dict[str, Any]:
                 (who, "rating", "s", "a", "b", a_first, f"motion {trial % 2}", sometimes(rng, str(point)) or None)
             )
     names = ["participant", "task", "study", "method_a", "method_b", "a_first", "motion", "answer"]
-    return analyse(pd.DataFrame(rows, columns=names), scale_points={"s": points})
+    return analysis_json(analyse(pd.DataFrame(rows, columns=names), Settings(scale_points={"s": points})))
 
 
 def levels_answered(rng: np.random.Generator, levels: list[float]) -> pd.DataFrame:
@@ -101,7 +103,7 @@ def psychometric(rng: np.random.Generator) -> dict[str, Any]:
     task, sigmoid = str(rng.choice(["2afc", "yes-no"])), str(rng.choice(["normal", "logistic", "gumbel", "weibull"]))
     levels = [0.001, 0.5, 1, 2, 3, 5, 100, *([] if sigmoid == "weibull" else [0, -4])]
     read = read_trials(levels_answered(rng, levels), Columns("level", "answer", participant="who"), task)
-    return analyse_psychometric(read.table, make_model(task, sigmoid=sigmoid), simulations=20)
+    return dict(to_json(analyse_psychometric(read.table, make_model(task, sigmoid=sigmoid), simulations=20)))
 
 
 def same_different(rng: np.random.Generator) -> dict[str, Any]:
@@ -112,7 +114,7 @@ def same_different(rng: np.random.Generator) -> dict[str, Any]:
     answers["reference_first"] = read["order"] == "AB"
     if rng.random() < 0.5:
         answers["motion"] = [f"motion {place % 2}" for place in range(len(answers))]
-    return analyse(answers, resamples=30)
+    return analysis_json(analyse(answers, Settings(resamples=30)))
 
 
 def silent(node: Any, path: str = "", said: bool = False) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The whole analysis as one JSON-able dictionary, on usual and on hopeless data."""
+"""The whole analysis and its JSON, on usual and on hopeless data."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.analyse import analyse, kind_of_data
+from study.analysis.analyse import analyse, analysis_json, kind_of_data
+from study.analysis.preference.analyse import Preference
 from study.analysis.quality import quality
-from study.analysis.same_different.analyse import across_motions
+from study.analysis.ratings.analyse import Ratings
+from study.analysis.same_different.analyse import SameDifferent
+from study.analysis.same_different.motions import across_motions
+from study.analysis.study_result import Settings
+from study.analysis.to_json import to_json
 from study.errors import AnalysisError
 
 Simulate = Callable[..., pd.DataFrame]
@@ -25,7 +30,7 @@ def test_all_tasks_in_one_table(same_different_study: Simulate, preference_study
          "method_a": ["geodesic"] * 4 + ["fixed"] * 2, "answer": ["4", "5", "3", "4", "1", "2"]}
     )  # fmt: skip
     answers = pd.concat([same_different_study(rng, participants=6), preference_study(rng, participants=6), rating])
-    result = analyse(answers, resamples=100)
+    result = analysis_json(analyse(answers, Settings(resamples=100)))
     text = json.dumps(result, allow_nan=False)
     assert json.loads(text) == result
     assert set(result) >= {"jnd", "preference", "ratings", "quality", "data"}
@@ -39,7 +44,7 @@ def test_all_tasks_in_one_table(same_different_study: Simulate, preference_study
 
 def test_the_same_seed_gives_the_same_result(same_different_study: Simulate) -> None:
     answers = same_different_study(np.random.default_rng(0), participants=5)
-    assert analyse(answers, resamples=50) == analyse(answers, resamples=50)
+    assert analyse(answers, Settings(resamples=50)) == analyse(answers, Settings(resamples=50))
 
 
 @pytest.mark.parametrize("answer", ["same", "different", None])
@@ -49,20 +54,21 @@ def test_hopeless_answers_give_a_statement(
 ) -> None:
     answers = same_different_study(np.random.default_rng(0), participants=participants)
     answers["answer"] = answer
-    result = analyse(answers, resamples=50)["jnd"]["jnd"]
-    assert result["model"] is None
-    assert result["model_note"]
-    for threshold in result["published"].values():
-        assert threshold["frames"] is None
-        assert threshold["note"]
-    json.dumps(result, allow_nan=False)
+    result = analyse(answers, Settings(resamples=50)).of(SameDifferent)["jnd"]
+    assert result.model is None
+    assert result.model_note
+    for threshold in result.published.values():
+        assert threshold.frames is None
+        assert threshold.note
+    json.dumps(to_json(result), allow_nan=False)
 
 
 def test_no_rows() -> None:
     result = analyse(pd.DataFrame({name: [] for name in COLUMNS}))
-    assert (result["jnd"], result["preference"], result["ratings"]) == ({}, {}, {})
-    assert result["data"] == "none"
-    assert result["quality"]["trials"] == 0
+    assert (result.of(SameDifferent), result.of(Preference), result.of(Ratings)) == ({}, {}, {})
+    assert result.data == "none"
+    assert result.quality.trials == 0
+    assert {"jnd", "preference", "ratings", "pair_ratings"} <= set(analysis_json(result))
 
 
 def test_refusals() -> None:
@@ -81,17 +87,17 @@ def test_who_answered(simulated: list[bool], kind: str) -> None:
 
 def test_motions_that_differ_are_told_from_motions_that_do_not(same_different_study: Simulate) -> None:
     rng = np.random.default_rng(5)
-    alike = [across_motions(same_different_study(rng, participants=12, spread=0.2))["f_p_value"] for _ in range(40)]
+    alike = [across_motions(same_different_study(rng, participants=12, spread=0.2)).f_p_value for _ in range(40)]
     easier = same_different_study(rng, participants=12, motions={"walking": 1.0, "running": 2.0, "turning": 0.6})
     assert np.mean(np.array(alike) < 0.05) < 0.2
-    assert across_motions(easier)["f_p_value"] < 0.001
-    assert across_motions(easier)["chi_square_p_value"] < 0.001
+    assert across_motions(easier).f_p_value < 0.001
+    assert across_motions(easier).chi_square_p_value < 0.001
 
 
 def test_too_few_participants_for_a_test_across_motions(same_different_study: Simulate) -> None:
     result = across_motions(same_different_study(np.random.default_rng(5), participants=2))
-    assert result["f"] is None
-    assert "too few" in result["note"]
+    assert result.f is None
+    assert "too few" in result.note
 
 
 def test_quality_counts_what_is_missing_and_implausible(same_different_study: Simulate) -> None:
@@ -102,30 +108,30 @@ def test_quality_counts_what_is_missing_and_implausible(same_different_study: Si
     answers.loc[answers["participant"] == "p02", "answer"] = "same"
     answers["shown_well"] = answers.index != 60
     result = quality(answers)
-    first, second, third = result["table"]
-    assert first["missed"] == 10
-    assert "missed 10 of 42" in first["flags"]
-    assert second["too_fast"] == 42
-    assert "answers sooner than 0.2 s" in second["flags"]
-    assert 'always "same"' in third["flags"]
-    assert result["missed"] == 10
-    assert result["flagged"] == 3
-    assert result["shown_badly"] == second["shown_badly"] == 1
+    first, second, third = result.table
+    assert first.missed == 10
+    assert "missed 10 of 42" in first.flags
+    assert second.too_fast == 42
+    assert "answers sooner than 0.2 s" in second.flags
+    assert 'always "same"' in third.flags
+    assert result.missed == 10
+    assert result.flagged == 3
+    assert result.shown_badly == second.shown_badly == 1
 
 
 def test_quality_without_times(same_different_study: Simulate) -> None:
     answers = same_different_study(np.random.default_rng(5), participants=2).drop(columns=["response_s", "simulated"])
     result = quality(answers)
-    assert result["response_s"] == {}
-    assert result["table"][0]["median_response_s"] is None
-    assert result["simulated_participants"] == 0
+    assert result.response_s == {}
+    assert result.table[0].median_response_s is None
+    assert result.simulated_participants == 0
 
 
 def test_margin_and_family_are_what_was_declared(preference_study: Simulate) -> None:
     one, two = (preference_study(np.random.default_rng(seed), 12).assign(study=f"s{seed}") for seed in (1, 2))
     both = pd.concat([one, two], ignore_index=True)
-    found = analyse(both, margin=0.2, family=["s2"], resamples=20)
-    assert [row["study"] for row in found["confirmatory"]] == ["s2"]
-    assert found["confirmatory"][0]["holm_p_value"] == found["confirmatory"][0]["p_value"]
-    assert {study[0]["no_preference"]["margin"] for study in found["preference"].values()} == {0.2}
-    assert [row["study"] for row in analyse(both, resamples=20)["confirmatory"]] == ["s1", "s2"]
+    found = analyse(both, Settings(margin=0.2, resamples=20), family=["s2"])
+    assert [row.study for row in found.confirmatory] == ["s2"]
+    assert found.confirmatory[0].holm_p_value == found.confirmatory[0].p_value
+    assert {study.comparisons[0].no_preference.margin for study in found.of(Preference).values()} == {0.2}
+    assert [row.study for row in analyse(both, Settings(resamples=20)).confirmatory] == ["s1", "s2"]

@@ -12,18 +12,15 @@ import numpy as np
 import pytest
 from scipy.stats import binom, nct, t
 
+from study.analysis.analyse import Analysis
 from study.analysis.exclusions import Rules
 from study.apps.cli import run
-from study.apps.cli.power import (
-    _pair_rating_verdict,
-    _preference_verdict,
-    _rating_verdict,
-    _threshold_verdict,
-    plans_of,
-)
+from study.apps.cli.power import plans_of
 from study.apps.cli.study import load
-from study.power import design as power_studies
+from study.power import preference as preferences
+from study.power import ratings, same_different
 from study.power.design import Design
+from study.power.sessions import whole_sessions
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +28,7 @@ def preference() -> Design:
     """2004's study two, 35 real plans, nobody misses anything."""
     protocol = load("geodesic_vs_fixed")
     study = protocol.studies[0]
-    settings = power_studies.preference_observer(study, 0.65, 0.0, 0.0, 0.0)
+    settings = preferences.preference_observer(study, 0.65, 0.0, 0.0, 0.0)
     settings = replace(settings, response_log_sd=0.0)
     return Design(protocol, study, plans_of(protocol, None, 35), settings, Rules())
 
@@ -45,7 +42,7 @@ def test_without_correlation_power_is_that_of_closed_forms(preference: Design) -
     shift = 0.15 / np.sqrt(0.65 * 0.35 / 8) * np.sqrt(np.array([12, 35]))
     alpha = 0.001
     for size, noncentrality in zip((12, 35), shift, strict=True):
-        found = share_found(power_studies.preference_study(preference, alpha, 0.65), size)
+        found = share_found(preferences.preference_study(preference, alpha, 0.65), size)
         theory = nct.sf(t.ppf(1 - alpha / 2, size - 1), size - 1, noncentrality)
         assert found == pytest.approx(theory, abs=0.03)
     counts = np.arange(281)
@@ -54,19 +51,18 @@ def test_without_correlation_power_is_that_of_closed_forms(preference: Design) -
 
 
 def test_without_an_effect_power_is_the_level(preference: Design) -> None:
-    settings = power_studies.preference_observer(preference.study, 0.5, 0.2, 0.1, 0.02)
-    found = share_found(power_studies.preference_study(replace(preference, settings=settings), 0.05, 0.5), 24)
+    settings = preferences.preference_observer(preference.study, 0.5, 0.2, 0.1, 0.02)
+    found = share_found(preferences.preference_study(replace(preference, settings=settings), 0.05, 0.5), 24)
     assert found == pytest.approx(0.05, abs=0.015)
 
 
 def test_missed_answers_and_exclusions_cost_power(preference: Design) -> None:
-    settings = power_studies.preference_observer(preference.study, 0.7, 0.1, 0.1, 0.3)
+    settings = preferences.preference_observer(preference.study, 0.7, 0.1, 0.1, 0.3)
     missing = replace(preference, settings=settings)
     strict = replace(missing, rules=Rules(most_missed=0.3))
     complete = replace(preference, settings=replace(settings, missed=0.0))
     powers = [
-        share_found(power_studies.preference_study(design, 0.01, 0.7), 20, 1500)
-        for design in (complete, missing, strict)
+        share_found(preferences.preference_study(design, 0.01, 0.7), 20, 1500) for design in (complete, missing, strict)
     ]
     assert powers[0] > powers[1] + 0.03
     assert powers[1] > powers[2] + 0.03
@@ -75,20 +71,22 @@ def test_missed_answers_and_exclusions_cost_power(preference: Design) -> None:
 def test_answers_too_soon_are_left_out_as_the_protocol_says(preference: Design) -> None:
     settings = replace(preference.settings, response_median_s=0.2)
     none_left = replace(preference, settings=settings, rules=Rules(fastest_s=1.0))
-    assert share_found(power_studies.preference_study(none_left, 0.05, 0.65), 35, 200) == 0
+    assert share_found(preferences.preference_study(none_left, 0.05, 0.65), 35, 200) == 0
 
 
 def both_ways(design: Design, fast: Any, verdict: Any, size: int, studies: int) -> tuple[float, float]:
-    slow = power_studies.whole_sessions(design, verdict)
+    slow = whole_sessions(design, verdict)
     return share_found(fast, size, 2000), share_found(slow, size, studies)
 
 
 @pytest.mark.slow
 def test_preferences_at_once_are_those_of_whole_sessions(preference: Design) -> None:
-    settings = power_studies.preference_observer(preference.study, 0.72, 0.1, 0.1, 0.15)
+    settings = preferences.preference_observer(preference.study, 0.72, 0.1, 0.1, 0.15)
     design = replace(preference, settings=settings, rules=Rules(most_missed=0.4, fastest_s=0.6))
-    fast = power_studies.preference_study(design, 0.01, 0.72)
-    found = both_ways(design, fast, _preference_verdict(design.study.name, 0.72, 0.01), 12, 100)
+    fast = preferences.preference_study(design, 0.01, 0.72)
+    found = both_ways(
+        design, fast, lambda analysis: preferences.preference_found(analysis, design.study.name, 0.72, 0.01), 12, 100
+    )
     assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(100))
     assert 0.2 < found[0] < 0.95
 
@@ -98,10 +96,10 @@ def test_ratings_at_once_are_those_of_whole_sessions() -> None:
     protocol = load("transition_points")
     study = protocol.studies[0]
     protocol = protocol.model_copy(update={"studies": (study.model_copy(update={"items": study.items[:1]}),)})
-    settings = power_studies.rating_observer(study, 1.0, 0.2, 0.0)
+    settings = ratings.rating_observer(study, 1.0, 0.2, 0.0)
     design = Design(protocol, protocol.studies[0], plans_of(protocol, None, 12), settings, Rules())
-    fast = power_studies.rating_study(design, 0.05, 1.0)
-    found = both_ways(design, fast, _rating_verdict(study, 1.0, 0.05), 12, 60)
+    fast = ratings.rating_study(design, 0.05, 1.0)
+    found = both_ways(design, fast, lambda analysis: ratings.rating_found(analysis, study, 1.0, 0.05), 12, 60)
     assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(60))
 
 
@@ -110,10 +108,10 @@ def test_rated_pairs_at_once_are_those_of_whole_sessions() -> None:
     protocol = load("transition_points")
     study = protocol.study("compared")
     protocol = protocol.model_copy(update={"studies": (study.model_copy(update={"items": study.items[:1]}),)})
-    settings = power_studies.rating_observer(study, 0.6, 0.2, 0.0)
+    settings = ratings.rating_observer(study, 0.6, 0.2, 0.0)
     design = Design(protocol, protocol.studies[0], plans_of(protocol, None, 12), settings, Rules())
-    fast = power_studies.rating_study(design, 0.05, 0.6)
-    found = both_ways(design, fast, _pair_rating_verdict(study, 0.6, 0.05), 12, 60)
+    fast = ratings.rating_study(design, 0.05, 0.6)
+    found = both_ways(design, fast, lambda analysis: ratings.pair_rating_found(analysis, study, 0.6, 0.05), 12, 60)
     assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(60))
 
 
@@ -121,11 +119,14 @@ def test_rated_pairs_at_once_are_those_of_whole_sessions() -> None:
 def test_thresholds_are_those_of_whole_sessions() -> None:
     protocol = load("blend_length_jnd")
     study = protocol.studies[0]
-    settings = power_studies.same_different_observer(8.0, 7.0, 0.15, 0.02)
+    settings = same_different.same_different_observer(8.0, 7.0, 0.15, 0.02)
     design = Design(protocol, study, plans_of(protocol, None, 8), settings, Rules())
-    verdict = _threshold_verdict(study.name, 1.7)
-    fast = power_studies.same_different_study(design, 1.7, protocol.analysis.threshold)
-    found = share_found(fast, 8, 100), share_found(power_studies.whole_sessions(design, verdict), 8, 25)
+    fast = same_different.same_different_study(design, 1.7, protocol.analysis.threshold)
+
+    def narrow(analysis: Analysis) -> bool:
+        return same_different.thresholds_found(analysis, study.name, 1.7)
+
+    found = share_found(fast, 8, 100), share_found(whole_sessions(design, narrow), 8, 25)
     assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(25))
 
 

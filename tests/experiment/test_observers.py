@@ -308,10 +308,10 @@ def test_the_careless_answer_at_random_and_are_found_by_the_rules(tmp_path, toy_
     people = [person(settings, name, 3) for name in sorted(set(answers["participant"]))]
     careless = {who.name for who in people if who.careless}
     assert 5 <= len(careless) <= 20
-    kept = exclude(answers, Rules(most_failed_checks=0.1, most_too_fast=0.2), checks)
-    assert {row["participant"] for row in kept.participants} <= careless
+    _, left_out = exclude(answers, Rules(most_failed_checks=0.1, most_too_fast=0.2), checks)
+    assert {one.participant for one in left_out.participants} <= careless
     # One in 64 passes all six checks by chance, and answers no slower for it.
-    assert len(kept.participants) >= len(careless) - 1
+    assert len(left_out.participants) >= len(careless) - 1
 
 
 def test_shares_of_what_goes_wrong_are_from_0_to_1():

@@ -25,11 +25,11 @@ def test_two_factors_between_as_r_prints_them() -> None:
     cells = [(value, *cell) for cell, values in TEETH.items() for value in values]
     length, supp, dose = zip(*cells, strict=True)
     rows = two_way(length, supp, dose, ("supp", "dose"))
-    assert [row["sum_of_squares"] for row in rows] == pytest.approx([205.4, 2426.4, 108.3, 712.1], abs=0.05)
-    assert [row["degrees_of_freedom"] for row in rows] == [1, 2, 2, 54]
-    assert [row["f"] for row in rows[:3]] == pytest.approx([15.572, 92.000, 4.107], abs=5e-4)
-    assert rows[0]["p_value"] == pytest.approx(0.000231, abs=5e-7)
-    assert rows[2]["p_value"] == pytest.approx(0.021860, abs=5e-7)
+    assert [row.sum_of_squares for row in rows] == pytest.approx([205.4, 2426.4, 108.3, 712.1], abs=0.05)
+    assert [row.degrees_of_freedom for row in rows] == [1, 2, 2, 54]
+    assert [row.f for row in rows[:3]] == pytest.approx([15.572, 92.000, 4.107], abs=5e-4)
+    assert rows[0].p_value == pytest.approx(0.000231, abs=5e-7)
+    assert rows[2].p_value == pytest.approx(0.021860, abs=5e-7)
 
 
 def test_one_factor_within_with_its_corrections() -> None:
@@ -48,12 +48,12 @@ def test_one_factor_within_with_its_corrections() -> None:
     found = mixed_design(scores, ["all"] * 12, ["age"])
     assert not isinstance(found, str)
     (age,) = found
-    assert (age["sum_of_squares"], age["error_sum_of_squares"]) == (pytest.approx(552), pytest.approx(2006))
-    assert age["f"] == pytest.approx(3.03, abs=0.005)
-    assert age["p_value"] == pytest.approx(0.042, abs=0.002)
-    assert age["epsilon"] == pytest.approx(0.61, abs=0.005)
-    assert age["huynh_feldt_epsilon"] == pytest.approx(0.725, abs=0.005)
-    assert age["corrected_p_value"] == pytest.approx(0.075, abs=0.0005)
+    assert (age.sum_of_squares, age.error_sum_of_squares) == (pytest.approx(552), pytest.approx(2006))
+    assert age.f == pytest.approx(3.03, abs=0.005)
+    assert age.p_value == pytest.approx(0.042, abs=0.002)
+    assert age.epsilon == pytest.approx(0.61, abs=0.005)
+    assert age.huynh_feldt_epsilon == pytest.approx(0.725, abs=0.005)
+    assert age.corrected_p_value == pytest.approx(0.075, abs=0.0005)
 
 
 # Randall 1989, bitterness of wine by nine judges: Table 1 of the tutorial of the R package `ordinal` (Christensen).

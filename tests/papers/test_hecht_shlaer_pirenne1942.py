@@ -13,7 +13,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 from scipy.stats import gamma
 
-from study.analysis.psychometric.posterior import PsychometricFit, fit_psychometric, make_model, threshold_at
+from study.analysis.psychometric.model import make_model
+from study.analysis.psychometric.posterior import PsychometricFit, fit_psychometric, threshold_at
 
 # Quanta, percent seen, number of flashes at each, quanta of the Poisson curve.
 SEEN = {

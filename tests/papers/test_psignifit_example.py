@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
-from study.analysis.psychometric.posterior import PsychometricFit, fit_psychometric, make_model
+from study.analysis.psychometric.model import make_model
+from study.analysis.psychometric.posterior import PsychometricFit, fit_psychometric
 
 LEVELS = np.array([1.0, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 6, 7, 8, 10]) / 1000
 RIGHT = np.array([45, 50, 44, 44, 52, 53, 62, 64, 76, 79, 88, 90, 90])

@@ -19,8 +19,8 @@ import pytest
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from study.analysis.same_different import fits as differencing
-from study.analysis.same_different.analyse import d_prime
+from study.analysis.same_different import fits
+from study.analysis.same_different.d_prime import d_prime
 from study.models.differencing import criterion_free_delta
 
 FRAMES = np.array([[0.0], [1.0]])
@@ -33,21 +33,21 @@ FRAMES = np.array([[0.0], [1.0]])
 def test_sensr_example(times: int, log_likelihood: float, criterion_error: float, delta_error: float) -> None:
     """8 of 13 same pairs "same", 9 of 13 different pairs "different"."""
     different, shown = times * np.array([5.0, 9.0]), times * np.array([13.0, 13.0])
-    found = differencing.fit(FRAMES, different[None], shown[None], largest_lapse=0.0)
+    found = fits.fit(FRAMES, different[None], shown[None], largest_lapse=0.0)
     assert found.criterion[0] == pytest.approx(1.2295508916, abs=1e-6)
     assert found.slopes[0, 0] == pytest.approx(1.8849964801, abs=1e-6)
     assert found.log_likelihood[0] == pytest.approx(log_likelihood, abs=1e-6)
-    spread = np.sqrt(np.diagonal(differencing.covariance(found, FRAMES, different, shown)))
+    spread = np.sqrt(np.diagonal(fits.covariance(found, FRAMES, different, shown)))
     assert found.criterion[0] * spread[0] == pytest.approx(criterion_error, abs=1e-5)
     assert found.slopes[0, 0] * spread[2] == pytest.approx(delta_error, abs=1e-5)
 
 
 def test_sensr_example_where_every_difference_was_seen() -> None:
     """`samediff(8, 5, 0, 9)`: d-prime has no bound above, and that is said."""
-    low, high = differencing.d_prime_interval(9, 9, 5, 13)
+    low, high = fits.d_prime_interval(9, 9, 5, 13)
     assert high is None
     assert low > 1.0
-    assert math.isfinite(d_prime(9, 9, 5, 13)["d_prime"] or math.nan)
+    assert math.isfinite(d_prime(9, 9, 5, 13).d_prime or math.nan)
 
 
 def test_the_interval_is_where_the_likelihood_has_fallen_by_1_92() -> None:
@@ -59,7 +59,7 @@ def test_the_interval_is_where_the_likelihood_has_fallen_by_1_92() -> None:
 
         return max(at(criterion) for criterion in np.linspace(0.2, 4, 1501))
 
-    low, high = differencing.d_prime_interval(9, 13, 5, 13)
+    low, high = fits.d_prime_interval(9, 13, 5, 13)
     assert high is not None
     assert 2 * (-16.6857627579 - profile(high)) == pytest.approx(norm.ppf(0.975) ** 2, abs=0.02)
     assert low == 0.0
@@ -68,7 +68,7 @@ def test_the_interval_is_where_the_likelihood_has_fallen_by_1_92() -> None:
 
 def test_one_sensitivity_under_two_rules() -> None:
     pairs = 1e8
-    differenced = d_prime(0.642 * pairs, pairs, 0.3 * pairs, pairs)["d_prime"]
+    differenced = d_prime(0.642 * pairs, pairs, 0.3 * pairs, pairs).d_prime
     best = norm.cdf((norm.ppf(0.75) - norm.ppf(0.3)) / 2)
     independent = 2 * norm.ppf(0.5 * (1 + math.sqrt(2 * best - 1)))
     assert differenced == pytest.approx(independent, abs=0.01)
@@ -77,7 +77,7 @@ def test_one_sensitivity_under_two_rules() -> None:
 
 def test_ceiling_of_the_tables() -> None:
     pairs = 1e8
-    assert d_prime(0.99 * pairs, pairs, 0.01 * pairs, pairs)["d_prime"] == pytest.approx(6.93, abs=0.005)
+    assert d_prime(0.99 * pairs, pairs, 0.01 * pairs, pairs).d_prime == pytest.approx(6.93, abs=0.005)
 
 
 def test_intervals_of_d_prime_cover_as_often_as_they_say() -> None:
@@ -87,7 +87,7 @@ def test_intervals_of_d_prime_cover_as_often_as_they_say() -> None:
     alarm = 2 * norm.sf(criterion / math.sqrt(2))
     inside = []
     for hits, alarms in zip(rng.binomial(60, hit, 150), rng.binomial(60, alarm, 150), strict=True):
-        low, high = differencing.d_prime_interval(hits, 60, alarms, 60)
+        low, high = fits.d_prime_interval(hits, 60, alarms, 60)
         inside.append(low <= delta and (high is None or delta <= high))
     assert 0.9 <= np.mean(inside) <= 0.99
 

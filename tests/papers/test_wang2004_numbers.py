@@ -5,7 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from study.analysis.preference.analyse import compare, published_test
+from study.analysis.preference.analyse import compare
+from study.analysis.preference.published import published_test
 
 
 @pytest.mark.parametrize(
@@ -47,7 +48,7 @@ def test_table_2_from_answers_of_35_participants() -> None:
         }
     )
     (result,) = compare(answers)
-    assert result["published"]["answers"] == 280
-    assert f"{result['published']['percent']:.1f}" == "96.4"
-    assert f"{result['published']['chi_square']:.2f}" == "241.43"
-    assert len(result["motions"]) == 8
+    assert result.published.answers == 280
+    assert f"{result.published.percent:.1f}" == "96.4"
+    assert f"{result.published.chi_square:.2f}" == "241.43"
+    assert len(result.motions) == 8

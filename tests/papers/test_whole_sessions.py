@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from study.analysis.analyse import analyse
+from study.analysis.preference.analyse import Preference
+from study.analysis.ratings.analyse import PairRatings, Ratings
+from study.analysis.study_result import Settings
 from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import find_protocol, load_protocol
@@ -76,8 +79,8 @@ def test_the_sitting_of_2004_has_42_and_three_times_8_pairs(library, tmp_path):
         assert warped.frames == 60 + warped.blend_frames + 60
     with open_responses(tmp_path) as responses:
         simulate(protocol, prepared, responses, 35, seed=2)
-        found = analyse(answers_frame(responses), resamples=50)
-    favoured = {study: rows[0]["published"]["percent"] for study, rows in found["preference"].items()}
+        found = analyse(answers_frame(responses), Settings(resamples=50))
+    favoured = {name: study.comparisons[0].published.percent for name, study in found.of(Preference).items()}
     # 2004 Table 2, which the simulated observers were made to give; three standard errors of 280 answers.
     for study, percent, within in (
         ("geodesic_vs_fixed", 96.4, 3.5),
@@ -130,20 +133,22 @@ def test_the_study_of_2003_cuts_where_each_metric_is_least(library, tmp_path):
     assert orders == [("cut-lee2002", "cut-wang2003"), ("cut-wang2003", "cut-lee2002")]
     with open_responses(tmp_path) as responses:
         simulate(protocol, prepared, responses, 26, seed=3)
-        result = analyse(answers_frame(responses), scale_points=protocol.scale_points)
-    found = result["rating_anova"]["cuts"]
+        result = analyse(answers_frame(responses), Settings(scale_points=protocol.scale_points))
+    found = result.of(Ratings)["cuts"].questions
     assert len(found) == 6
     for question in found:
-        effects = question["anova"][:3]
-        assert [(row["degrees_of_freedom"], row["error_degrees_of_freedom"]) for row in effects] == [(1, 48)] * 3
-        assert question["difference"]["of"] == "cut-wang2003 minus cut-lee2002"
+        effects = question.anova[:3]
+        assert [(row.degrees_of_freedom, row.error_degrees_of_freedom) for row in effects] == [(1, 48)] * 3
+        assert question.difference.of == "cut-wang2003 minus cut-lee2002"
     # The simulated observers prefer the optimised weights, by about as much as the paper's participants did.
-    assert np.mean([question["difference"]["mean"] for question in found]) == pytest.approx(0.7, abs=0.35)
-    assert max(question["anova"][0]["f"] for question in found) > 4.0
+    assert np.mean([question.difference.mean for question in found]) == pytest.approx(0.7, abs=0.35)
+    assert max(question.anova[0].f for question in found) > 4.0
     # Table 2: 2.73 (1.00) and 2.69 (0.84); within three standard errors of 26 people.
-    for question, mean, spread in zip(result["pair_ratings"]["compared"], (2.73, 2.69), (1.00, 0.84), strict=True):
-        assert question["of"] == "cut-wang2003 compared with cut-lee2002"
-        assert question["published"]["mean"] == pytest.approx(mean, abs=3 * spread / np.sqrt(26))
-        assert question["published"]["standard_deviation"] == pytest.approx(spread, rel=0.45)
-        assert [row["participants"] for row in question["order"]["rows"]] == [13, 13]
-        assert question["order"]["error_degrees_of_freedom"] == 24
+    for question, mean, spread in zip(
+        result.of(PairRatings)["compared"].questions, (2.73, 2.69), (1.00, 0.84), strict=True
+    ):
+        assert question.of == "cut-wang2003 compared with cut-lee2002"
+        assert question.published.mean == pytest.approx(mean, abs=3 * spread / np.sqrt(26))
+        assert question.published.standard_deviation == pytest.approx(spread, rel=0.45)
+        assert [row.participants for row in question.order.rows] == [13, 13]
+        assert question.order.error_degrees_of_freedom == 24

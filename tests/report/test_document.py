@@ -176,7 +176,7 @@ def test_known_truth_of_simulated_observers_stands_beside_what_was_found(written
 
 def test_importing_the_report_loads_nothing_heavy() -> None:
     code = (
-        "import sys; import study.report.document, study.report.figures, study.report.drawing; "
+        "import sys; import study.report.document, study.report.drawing, study.report.sections.registry; "
         "heavy = {'matplotlib', 'pandas', 'scipy', 'av', 'PIL', 'jinja2', 'sqlalchemy'} & set(sys.modules); "
         "assert not heavy, heavy"
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from study.analysis.analyse import analyse
+from study.analysis.study_result import Settings
 from study.experiment.protocol.whole import parse_protocol
 from study.report.material import Material, gather
 from study.report.methods import methods_paragraphs, references
@@ -18,7 +19,7 @@ MakeFolder = Callable[..., Path]
 
 def paragraphs(material: Material) -> tuple[dict[str, str], list[str]]:
     """The methods by heading, and the references."""
-    analysis = analyse(material.answers, resamples=10)
+    analysis = analyse(material.answers, Settings(resamples=10))
     who = "two observers"
     told = methods_paragraphs(material.protocol, material.manifest, analysis, material.presentations, who)
     return dict(told), references(material.protocol, analysis)

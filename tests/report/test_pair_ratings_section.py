@@ -11,11 +11,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from study.analysis.ratings.analyse import PairRatings
 from study.analysis.ratings.pairs import pair_ratings
 from study.report.document import write_report
-from study.report.sections.pair_ratings.figure import likert_figure, shades
+from study.report.sections.pair_ratings.figures import likert_figure, shades
 from study.report.sections.pair_ratings.section import pair_ratings_section
-from study.report.sections.section import Section
+from study.report.sections.section import About, Section
 
 ENDS = {"better": ("much worse", "much better"), "natural": ("much less natural", "much more natural")}
 
@@ -31,7 +32,11 @@ def answers(scores: dict[str, list[int]]) -> pd.DataFrame:
 
 
 def section_of(scores: dict[str, list[int]], mark: str = "") -> Section:
-    return pair_ratings_section("compared", "Compared", pair_ratings(answers(scores), 5), ENDS, mark=mark, alpha=0.05)
+    section = pair_ratings_section(
+        PairRatings(pair_ratings(answers(scores), 5)), About("compared", "Compared", ends=ENDS, mark=mark)
+    )
+    assert section is not None
+    return section
 
 
 TWO = {"better": [4, 3, 3, 4, 3, 2, 3, 4], "natural": [2, 3, 2, 3, 2, 2, 1, 3]}
@@ -46,12 +51,12 @@ def test_the_headline_counts_the_questions_and_gives_each_test() -> None:
     )
     size = "16 answers of 8 participants, on a scale of 0 to 4, where 2 means no difference."
     assert headline.detail.startswith(f"{size} Better: 3.25 [2.66, 3.84], t(7) = ")
-    assert [row["result"] for row in section.readings] == [
+    assert [row.result for row in section.readings] == [
         "better: new cut compared with old cut",
         "natural: new cut compared with old cut",
     ]
-    assert section.readings[0]["published"] == "3.25 (SD 0.71)"
-    assert section.readings[0]["corrected"].startswith("3.25 [2.66, 3.84], t(7) = 5.00, p = .002")
+    assert section.readings[0].published == "3.25 (SD 0.71)"
+    assert section.readings[0].corrected.startswith("3.25 [2.66, 3.84], t(7) = 5.00, p = .002")
 
 
 def test_what_is_worse_is_called_worse_and_one_question_is_told_by_its_mean() -> None:

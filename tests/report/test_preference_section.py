@@ -5,15 +5,17 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from study.analysis.preference.analyse import compare, strengths
+from study.analysis.preference.analyse import Preference, compare, strengths
 from study.report.sections.preference.section import preference_section
-from study.report.sections.section import Section
+from study.report.sections.section import About, Section
 
 
 def section_of(rows: list[tuple[str, str, str, str, bool, float]]) -> Section:
     names = ["participant", "motion", "method_a", "method_b", "a_first", "chose_a"]
     answers = pd.DataFrame(rows, columns=names)
-    return preference_section("s", "Pairs", compare(answers), mark="", strengths=strengths(answers))
+    section = preference_section(Preference(compare(answers), strengths(answers)), About("s", "Pairs"))
+    assert section is not None
+    return section
 
 
 @pytest.mark.parametrize("others", [[], [("q", "run", "a", "b", True, 1.0)]], ids=["all", "of one motion"])

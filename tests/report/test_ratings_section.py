@@ -2,38 +2,53 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
-from study.analysis.ratings.comparisons import rating_anova
-from study.analysis.ratings.table import rating_table
+from study.analysis.ratings.analyse import Ratings
+from study.analysis.ratings.comparisons import MethodDifference, MixedDesign, Question, Ranks, rating_anova
+from study.analysis.ratings.table import MethodRating, rating_table
+from study.analysis.variance.two_way import VarianceEffect, VarianceRow
 from study.report.sections.ratings.section import ratings_section
-from study.report.sections.section import Section
+from study.report.sections.section import About, Section
 
 
-def question(item: str, mean: float, f: float, p: float) -> dict[str, Any]:
-    effect = {"degrees_of_freedom": 1, "error_degrees_of_freedom": 48, "sum_of_squares": f, "mean_square": f}
-    effect |= {"source": "method", "f": f, "p_value": p, "partial_eta_squared": 0.1}
-    rest = {"source": "residual", "degrees_of_freedom": 48, "sum_of_squares": 48.0, "mean_square": 1.0}
-    difference = {"of": "cut-wang2003 minus cut-lee2002", "mean": mean, "low": 0.0, "high": 1.0, "t": 2.0}
-    difference |= {"degrees_of_freedom": 25, "p_value": p, "holm_p_value": p, "test": "Student's t", "note": ""}
-    nothing = {"type_ii": None, "ordinal": None, "participants": 26, "answers": 52, "note": ""}
-    nothing |= {"mixed_design": {"effects": [], "note": ""}, "ranks": {"between": [], "participants": None, "note": ""}}
-    return {"item": item, "anova": [effect, rest], "difference": difference, "differences": [difference], **nothing}
+def question(item: str, mean: float, f: float, p: float) -> Question:
+    effect = VarianceEffect("method", f, 1, f, f, 48, p, partial_eta_squared=0.1)
+    difference = MethodDifference(
+        "cut-wang2003 minus cut-lee2002", 26, mean, 0.0, 1.0, 2.0, 25, p, "Student's t", "", holm_p_value=p
+    )
+    return Question(
+        item=item,
+        participants=26,
+        answers=52,
+        anova=(effect, effect, effect, VarianceRow("residual", 48.0, 48, 1.0)),
+        balanced=True,
+        type_ii=None,
+        differences=(difference,),
+        difference=difference,
+        mixed_design=MixedDesign((), ("method",), 26, 0, ""),
+        ranks=Ranks((), None, ""),
+        ordinal=None,
+        note="",
+    )
 
 
-ROWS = [
-    {"item": "natural", "method": method, "answers": 26, "participants": 26, "mean": mean, "standard_error": 0.2}
-    | {"low": mean - 0.4, "high": mean + 0.4, "median": 2.0, "standard_deviation": 1.0, "distribution": {"2": 26}}
+ROWS = tuple(
+    MethodRating("natural", method, 26, 26, mean, 0.2, mean - 0.4, mean + 0.4, "", 1.0, 2.0, {"2": 26})
     for method, mean in (("cut-lee2002", 1.5), ("cut-wang2003", 2.2))
-]
+)
+
+
+def shown(result: Ratings, about: About) -> Section:
+    section = ratings_section(result, about)
+    assert section is not None
+    return section
 
 
 def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
-    variance = [question("natural", 0.7, 6.39, 0.0148), question("smooth", 0.3, 1.2, 0.28)]
-    section = ratings_section("cuts", "Cuts", ROWS, variance, mark="", points=5, alpha=0.05)
+    questions = (question("natural", 0.7, 6.39, 0.0148), question("smooth", 0.3, 1.2, 0.28))
+    section = shown(Ratings(ROWS, questions, ()), About("cuts", "Cuts"))
     (headline,) = section.headlines
     assert "was rated higher than" in headline.statement
     assert "in 2 of 2 questions, in 1 of them significantly at 0.05 across 26 participants" in headline.statement
@@ -45,8 +60,8 @@ def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
 
 
 def test_the_worse_method_is_not_called_better() -> None:
-    variance = [question("natural", -0.7, 6.39, 0.0148)]
-    (headline,) = ratings_section("cuts", "Cuts", ROWS, variance, mark="", points=5).headlines
+    result = Ratings(ROWS, (question("natural", -0.7, 6.39, 0.0148),), ())
+    (headline,) = shown(result, About("cuts", "Cuts")).headlines
     assert headline.statement == (
         "Cut-lee2002 was rated 0.70 points higher than cut-wang2003 on average, on a scale of 0 to 4; across "
         "participants "
@@ -66,7 +81,7 @@ def ratings_of(values: dict[str, list[float]]) -> pd.DataFrame:
 
 def section_of(values: dict[str, list[float]]) -> Section:
     answers = ratings_of(values)
-    return ratings_section("s", "Sliders", rating_table(answers), rating_anova(answers), mark="", points=101)
+    return shown(Ratings(rating_table(answers), rating_anova(answers), ()), About("s", "Sliders", points=101))
 
 
 def test_three_methods_are_tested_together_and_in_pairs() -> None:
@@ -99,7 +114,7 @@ def test_participants_who_all_differ_alike_are_tested_by_signs() -> None:
 
 
 def test_a_single_method_has_no_comparison() -> None:
-    section = ratings_section("cuts", "Cuts", ROWS[:1], (), mark="", points=5)
+    section = shown(Ratings(ROWS[:1], (), ()), About("cuts", "Cuts"))
     assert [table.name for table in section.tables] == ["cuts_ratings"]
     assert section.headlines[0].statement == "Natural: cut-lee2002 was rated 1.50 on average, on a scale of 0 to 4."
     assert "26 participants" in section.headlines[0].detail

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
+from study.analysis.estimates import Interval
+from study.analysis.same_different.analyse import SameDifferent, analyse_jnd
+from study.analysis.same_different.counts import PercentDifferent, Side
+from study.analysis.same_different.threshold import Status, Threshold
 from study.report import words
 from study.report.media import _moments, strip_of_video
 from study.report.sections.same_different.section import headline
@@ -51,20 +57,28 @@ def test_files_have_all_columns_and_full_numbers() -> None:
     assert [[text for text, _ in row] for row in table.cells] == [['say "x", y'], ["z"]]
 
 
-def threshold(side: str, frames: float | None, note: str = "") -> dict[str, Any]:
-    ends = {"low": None, "high": None}
-    how = {"standard_error": None, "interval": ends, "method": "straight lines (Fieller)", "note": note}
-    return {"side": side, "frames": frames, **how}
+def threshold(side: Side, frames: float | None, note: str = "") -> Threshold:
+    status: Status = "not reached" if frames is None else "reached"
+    return Threshold(side, frames, None, Interval(None, None), status, "straight lines (Fieller)", note)
+
+
+def without_model(**known: Any) -> SameDifferent:
+    """The result of a study to which no model could be fitted."""
+    nobody = pd.DataFrame({"participant": [], "difference_frames": [], "answer": []})
+    return replace(analyse_jnd(nobody), model_note="no", **known)
+
+
+NOWHERE: dict[Side, Threshold] = {
+    "longer": threshold("longer", None, "not reached"),
+    "shorter": threshold("shorter", None, "not reached"),
+}
 
 
 def test_a_threshold_that_is_not_reached_is_said_to_be_so() -> None:
-    published = {
-        "longer": threshold("longer", None, "not reached within the levels shown (largest 20 frames: 60%)"),
-        "shorter": threshold("shorter", 8.0),
-    }
-    result = {"model": None, "model_note": "every answer was “same”", "published": published, "level": 0.75}
-    result |= {"answers": 84, "participants": 2, "missed": 0, "percent_different": []}
-    said = headline(result, 30.0, "collected")
+    note = "not reached within the levels shown (largest 20 frames: 60%)"
+    published = {"longer": threshold("longer", None, note), "shorter": threshold("shorter", 8.0)}
+    result = without_model(published=published, answers=84, participants=2)
+    said = headline(replace(result, model_note="every answer was “same”"), 30.0, "collected")
     assert said.statement == (
         "The just noticeable difference of 2 people is estimated at 8.0 frames (0.27 s) shorter (75% “different”)."
     )
@@ -72,32 +86,29 @@ def test_a_threshold_that_is_not_reached_is_said_to_be_so() -> None:
     assert "84 answers of 2 participants. No model was fitted: every answer was “same”." in said.detail
 
 
-def level(frames: float, percent: float, low: float, high: float) -> dict[str, float]:
-    return {"difference_frames": frames, "percent": percent, "low": low, "high": high}
+def level(frames: float, percent: float, low: float, high: float) -> PercentDifferent:
+    return PercentDifferent(frames, 1, 42, int(percent * 0.42), percent, None, low, high, "")
 
 
 @pytest.mark.parametrize(
     ("levels", "expected"),
     [
         # Enough answers to tell that the threshold lies below the smallest difference, or beyond the largest.
-        ([level(5, 100, 83, 100), level(-5, 0, 0, 17)], "less than 5 frames longer and more than 5 frames shorter"),
-        ([level(5, 100, 83, 100), level(10, 100, 83, 100)], "less than 5 frames longer (75%"),
+        ((level(5, 100, 83, 100), level(-5, 0, 0, 17)), "less than 5 frames longer and more than 5 frames shorter"),
+        ((level(5, 100, 83, 100), level(10, 100, 83, 100)), "less than 5 frames longer (75%"),
     ],
 )
-def test_a_threshold_outside_the_levels_is_bounded_by_them(levels: list[dict[str, float]], expected: str) -> None:
-    nowhere = {side: threshold(side, None, "not reached") for side in ("longer", "shorter")}
-    result = {"model": None, "model_note": "no", "published": nowhere, "level": 0.75, "percent_different": levels}
-    result |= {"answers": 42, "participants": 1, "missed": 0}
+def test_a_threshold_outside_the_levels_is_bounded_by_them(levels: tuple[PercentDifferent, ...], expected: str) -> None:
+    result = without_model(published=NOWHERE, percent_different=levels, answers=42, participants=1)
     assert expected in headline(result, 30.0, "collected").statement
 
 
 def test_one_answer_is_no_evidence_for_a_bound() -> None:
-    nowhere = {side: threshold(side, None, "not reached") for side in ("longer", "shorter")}
-    result = {"model": None, "model_note": "no", "published": nowhere, "level": 0.75}
-    result |= {"answers": 1, "participants": 1, "missed": 0, "percent_different": [level(5, 100, 20, 100)]}
+    levels = (level(5, 100, 20, 100),)
+    result = without_model(published=NOWHERE, percent_different=levels, answers=1, participants=1)
     said = headline(result, 30.0, "collected").statement
     assert said == "No just noticeable difference can be given from the answers of 1 person."
-    missed = {**result, "answers": 0, "participants": 0, "missed": 42}
+    missed = replace(result, answers=0, participants=0, missed=42)
     assert "all 42 questions were missed" in headline(missed, 30.0, "collected").statement
 
 

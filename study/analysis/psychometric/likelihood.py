@@ -1,4 +1,4 @@
-"""Psychometric functions by maximum likelihood: the frequentist choice beside the posterior of `psychometric`.
+"""Psychometric functions by maximum likelihood: the frequentist choice beside the `posterior`.
 
 Counts at levels come in; the maximum, a profile-likelihood interval of the threshold, and the goodness of fit go out
 (Wichmann & Hill 2001). Many data sets are fitted at once.
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study.analysis import estimates
-from study.analysis.psychometric.posterior import (
+from study.analysis.psychometric.model import (
     LARGEST_GUESS,
     LARGEST_LAPSE,
     Data,
@@ -168,7 +168,7 @@ def fit_likelihood(
     Parameters
     ----------
     levels, yes, shown, model, confidence
-        As in `psychometric.fit_psychometric`.
+        As in `posterior.fit_psychometric`.
     simulations, seed
         Data sets drawn from the fit and fitted again, for the p-value of the deviance; 0 takes chi-square.
     """

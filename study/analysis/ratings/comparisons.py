@@ -8,18 +8,19 @@ for no more than ordered.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.rank_tests import NO_RANKS, anova_type, friedman, signed_rank
-from study.analysis.ratings.table import rated
+from study.analysis.rank_tests import NO_RANKS, Friedman, RankEffect, anova_type, friedman, signed_rank
+from study.analysis.ratings.answers import first_seen, rated
 from study.analysis.regression.ordinal import OrdinalFit, fit_ordinal
-from study.analysis.variance.repeated_measures import likeness, mixed_design
-from study.analysis.variance.two_way import two_way
+from study.analysis.variance.repeated_measures import Likeness, WithinEffect, likeness, mixed_design
+from study.analysis.variance.two_way import TwoWay, two_way
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -28,7 +29,118 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 
-def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: bool = True) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class MethodDifference:
+    """How much higher the other of two methods was rated: mean of each participant's own difference, with its test.
+
+    `test` is Student's t, or the exact sign test where all participants differ alike; `holm_p_value` is adjusted over
+    the pairs of methods.
+    """
+
+    of: str
+    participants: int
+    mean: float | None
+    low: float | None
+    high: float | None
+    t: float | None
+    degrees_of_freedom: int | None
+    p_value: float | None
+    test: str
+    note: str
+    holm_p_value: float | None = None
+
+
+@dataclass(frozen=True)
+class MixedDesign(Likeness):
+    """Participants as random; those who did not rate every combination of `factors` are left out."""
+
+    effects: tuple[WithinEffect, ...]
+    factors: tuple[str, ...]
+    participants: int
+    left_out: int
+    note: str
+
+
+@dataclass(frozen=True)
+class RankTest:
+    """All methods over participants, on ranks."""
+
+    test: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class FriedmanTest(RankTest, Friedman):
+    """The same where there are more than two methods."""
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """The published design on ranks, and the methods over participants; `note` says what can't be had."""
+
+    between: tuple[RankEffect, ...]
+    participants: RankTest | None
+    note: str
+
+
+@dataclass(frozen=True)
+class OrdinalEffect:
+    """An effect in logits, and as an odds ratio; None where it can't be estimated."""
+
+    name: str
+    value: float | None
+    standard_error: float | None
+    interval: estimates.Interval
+    p_value: float | None
+    odds_ratio: float | None
+
+
+@dataclass(frozen=True)
+class Ordinal:
+    """A cumulative-link mixed model, and the test of all methods by its likelihood ratio; `note` says what is amiss."""
+
+    effects: tuple[OrdinalEffect, ...] = ()
+    spread: float | None = None
+    points: tuple[float, ...] = ()
+    thresholds: tuple[float, ...] = ()
+    likelihood_ratio: float | None = None
+    degrees_of_freedom: int | None = None
+    p_value: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Question:
+    """Methods compared in one question.
+
+    Attributes
+    ----------
+    anova, balanced, type_ii
+        As published, by type III (empty where it can't be had); whether all combinations have as many answers, and the
+        same by type II where they have not.
+    differences, difference
+        Of each pair of methods over participants; the only one where there are two methods, else None.
+    mixed_design, ranks, ordinal
+        Tests beside; `ordinal` is None where no models were asked for.
+    note
+        What can't be had.
+    """
+
+    item: str
+    participants: int
+    answers: int
+    anova: TwoWay | tuple[()]
+    balanced: bool
+    type_ii: TwoWay | None
+    differences: tuple[MethodDifference, ...]
+    difference: MethodDifference | None
+    mixed_design: MixedDesign
+    ranks: Ranks
+    ordinal: Ordinal | None
+    note: str
+
+
+def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: bool = True) -> tuple[Question, ...]:
     """Analyse each question of a rating study by method and by order of presentation.
 
     Parameters
@@ -41,19 +153,6 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: boo
     models
         Whether to fit the ordinal model too, which takes longer.
 
-    Returns
-    -------
-    list of dict
-        One entry a question: `item`, `participants`, `answers`, `anova` (see `two_way`, type III; empty where it can't
-        be had), `balanced` (whether all combinations have as many answers), `type_ii` (the same by type II where they
-        have not, else None), `differences` (of each participant's mean ratings, one entry a pair of methods: `of`,
-        `mean`, `low`, `high`, `t`, `degrees_of_freedom`, `p_value`, `test`, `holm_p_value`, `note`; `test` is Student's
-        t, or the exact sign test where all participants differ alike), `difference` (the same where there are two
-        methods, else None), `mixed_design` (`effects`, `participants`,
-        `left_out`, `factors`, `intraclass_correlation` with what that does to the published test, `note`), `ranks`
-        (`between`, `participants`, `note`), `ordinal` (`effects`, `spread`, `likelihood_ratio`, `degrees_of_freedom`,
-        `p_value`, `note`; None without models), `note`.
-
     Raises
     ------
     AnalysisError
@@ -61,44 +160,39 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: boo
     """
     part = rated(answers)
     if part.empty or "method_a" not in part.columns or part["method_a"].nunique() < 2:
-        return []
-    shown = answers.sort_values("trial", kind="stable") if "trial" in answers.columns else answers
-    first_seen = shown.groupby(shown["participant"].astype(str))["method_a"].first().astype(str)
+        return ()
     part["participant"], part["method_a"] = part["participant"].astype(str), part["method_a"].astype(str)
-    part["order"] = part["participant"].map(first_seen) + " first"
-    return [
-        dict(estimates.plain(_question(str(name), group, confidence, models)))
-        for name, group in part.groupby("item", sort=False)
-    ]
+    part["order"] = part["participant"].map(first_seen(answers)) + " first"
+    return tuple(_question(str(name), group, confidence, models) for name, group in part.groupby("item", sort=False))
 
 
-def _question(name: str, part: pd.DataFrame, confidence: float, models: bool) -> dict[str, Any]:
+def _question(name: str, part: pd.DataFrame, confidence: float, models: bool) -> Question:
     table, type_ii, note = _as_published(part, 1 - confidence)
     differences = _differences(part, confidence)
-    return {
-        "item": name,
-        "participants": int(part["participant"].nunique()),
-        "answers": len(part),
-        "anova": table,
-        "balanced": bool(part.groupby(["method_a", "order"]).size().nunique() == 1),
-        "type_ii": type_ii,
-        "differences": differences,
-        "difference": differences[0] if len(differences) == 1 else None,
-        "mixed_design": _mixed_design(part, 1 - confidence),
-        "ranks": _ranks(part),
-        "ordinal": _ordinal(part, confidence) if models else None,
-        "note": note,
-    }
+    return Question(
+        item=name,
+        participants=int(part["participant"].nunique()),
+        answers=len(part),
+        anova=table,
+        balanced=bool(part.groupby(["method_a", "order"]).size().nunique() == 1),
+        type_ii=type_ii,
+        differences=differences,
+        difference=differences[0] if len(differences) == 1 else None,
+        mixed_design=_mixed_design(part, 1 - confidence),
+        ranks=_ranks(part),
+        ordinal=_ordinal(part, confidence) if models else None,
+        note=note,
+    )
 
 
-def _as_published(part: pd.DataFrame, alpha: float) -> tuple[list[dict[str, Any]], list[dict[str, Any]] | None, str]:
+def _as_published(part: pd.DataFrame, alpha: float) -> tuple[TwoWay | tuple[()], TwoWay | None, str]:
     """The analysis of variance between subjects by type III, by type II where that differs, and why not."""
     factors = (part["rating"], part["method_a"], part["order"], ("method", "order"))
     try:
         table = two_way(*factors, alpha=alpha)
     except AnalysisError as error:
-        return [], None, f"no analysis of variance: {error}"
-    note = "the ratings of each combination are all alike: no F" if table[0]["f"] is None else ""
+        return (), None, f"no analysis of variance: {error}"
+    note = "the ratings of each combination are all alike: no F" if table[0].f is None else ""
     uneven = part.groupby(["method_a", "order"]).size().nunique() > 1
     return table, two_way(*factors, squares="II", alpha=alpha) if uneven else None, note
 
@@ -108,57 +202,56 @@ def _means(part: pd.DataFrame) -> pd.DataFrame:
     return part.groupby(["participant", "method_a"])["rating"].mean().unstack()
 
 
-def _differences(part: pd.DataFrame, confidence: float) -> list[dict[str, Any]]:
+def _differences(part: pd.DataFrame, confidence: float) -> tuple[MethodDifference, ...]:
     """The difference of each two methods over participants, p-values adjusted over the pairs by Holm's method."""
     means = _means(part)
     rows = [_difference(means[one], means[other], confidence) for one, other in combinations(sorted(means.columns), 2)]
-    known = np.array([np.nan if row["p_value"] is None else row["p_value"] for row in rows], dtype=np.float64)
-    return [{**row, "holm_p_value": estimates.finite(p)} for row, p in zip(rows, estimates.holm(known), strict=True)]
+    adjusted = estimates.holm([row.p_value for row in rows])
+    return tuple(replace(row, holm_p_value=p) for row, p in zip(rows, adjusted, strict=True))
 
 
-def _difference(one: pd.Series[float], other: pd.Series[float], confidence: float) -> dict[str, Any]:
+def _difference(one: pd.Series[float], other: pd.Series[float], confidence: float) -> MethodDifference:
     """How much higher the other method was rated; by the exact sign test where all participants differ alike."""
     apart = (other - one).dropna().to_numpy(dtype=np.float64)
     test = estimates.mean_test(apart, 0.0, confidence)
     p_value = signed_rank(apart) if test.p_value is None else test.p_value
     note = "the two were rated alike by everybody" if len(apart) > 1 and not apart.any() else test.note
-    return {
-        "of": f"{other.name} minus {one.name}",
-        "participants": test.participants,
-        "mean": test.mean,
-        "low": test.interval.low,
-        "high": test.interval.high,
-        "t": test.statistic,
-        "degrees_of_freedom": test.degrees_of_freedom,
-        "p_value": p_value,
-        "test": "none" if p_value is None else "exact sign test" if test.p_value is None else "Student's t",
-        "note": "nobody rated both" if not len(apart) else note,
-    }
+    return MethodDifference(
+        of=f"{other.name} minus {one.name}",
+        participants=test.participants,
+        mean=test.mean,
+        low=test.interval.low,
+        high=test.interval.high,
+        t=test.statistic,
+        degrees_of_freedom=test.degrees_of_freedom,
+        p_value=p_value,
+        test="none" if p_value is None else "exact sign test" if test.p_value is None else "Student's t",
+        note="nobody rated both" if not len(apart) else note,
+    )
 
 
-def _mixed_design(part: pd.DataFrame, alpha: float) -> dict[str, Any]:
+def _mixed_design(part: pd.DataFrame, alpha: float) -> MixedDesign:
     """Participants as random: method (and motion, where everybody rated each motion by each method) within them."""
     people = part["participant"].nunique()
     values, who, factors = _complete(part, people)
-    group = part.drop_duplicates("participant").set_index("participant")["order"]
+    group = part.drop_duplicates("participant").set_index("participant")["order"][who].to_numpy()
     found = (
-        mixed_design(values, group[who].to_numpy(), factors, between="order", alpha=alpha)
+        mixed_design(values, group, factors, between="order", alpha=alpha)
         if len(who)
         else "no participant rated every method"
     )
-    if isinstance(found, str):
-        effects, note = [], found
-    else:
-        still = [row["source"] for row in found if row["f"] is None]
-        effects, note = found, f"participants do not vary in {', '.join(still)}: no F" if still else ""
-    return {
-        "effects": effects,
-        **likeness(values, group[who].to_numpy()),
-        "factors": factors,
-        "participants": len(who),
-        "left_out": people - len(who),
-        "note": note,
-    }
+    effects: tuple[WithinEffect, ...] = () if isinstance(found, str) else found
+    note = found if isinstance(found, str) else ""
+    if still := [row.source for row in effects if row.f is None]:
+        note = f"participants do not vary in {', '.join(still)}: no F"
+    return MixedDesign(
+        **vars(likeness(values, group)),
+        effects=effects,
+        factors=factors,
+        participants=len(who),
+        left_out=people - len(who),
+        note=note,
+    )
 
 
 def _complete(part: pd.DataFrame, people: int) -> tuple[FloatArray, list[str], tuple[str, ...]]:
@@ -176,10 +269,10 @@ def _complete(part: pd.DataFrame, people: int) -> tuple[FloatArray, list[str], t
     return wide.to_numpy(dtype=np.float64), list(wide.index), ("method",)
 
 
-def _ranks(part: pd.DataFrame) -> dict[str, Any]:
+def _ranks(part: pd.DataFrame) -> Ranks:
     """The published design on ranks, and the methods over participants on ranks."""
     methods, orders = sorted(part["method_a"].unique()), sorted(part["order"].unique())
-    between: list[dict[str, Any]] | str = "fewer than two orders, or more than two of either: no 2 x 2 design"
+    between: tuple[RankEffect, ...] | str = "fewer than two orders, or more than two of either: no 2 x 2 design"
     if len(methods) == len(orders) == 2:
         first = (part["method_a"] == methods[1]).to_numpy(dtype=int)
         second = (part["order"] == orders[1]).to_numpy(dtype=int)
@@ -194,60 +287,62 @@ def _ranks(part: pd.DataFrame) -> dict[str, Any]:
         )
     over = _ranks_over_participants(part)
     note = between if isinstance(between, str) else ""
-    return {
-        "between": [] if isinstance(between, str) else between,
-        "participants": over,
-        "note": "; ".join(filter(None, (note, NO_RANKS if over is None else ""))),
-    }
+    return Ranks(
+        between=() if isinstance(between, str) else between,
+        participants=over,
+        note="; ".join(filter(None, (note, NO_RANKS if over is None else ""))),
+    )
 
 
-def _ranks_over_participants(part: pd.DataFrame) -> dict[str, Any] | None:
+def _ranks_over_participants(part: pd.DataFrame) -> RankTest | None:
     wide = _means(part).dropna()
     if len(wide) < 2:
         return None
     if wide.shape[1] == 2:
-        apart = wide.iloc[:, 1] - wide.iloc[:, 0]
-        p_value = signed_rank(apart)
-        return None if p_value is None else {"test": "Wilcoxon's signed ranks", "p_value": p_value}
+        p_value = signed_rank(wide.iloc[:, 1] - wide.iloc[:, 0])
+        return None if p_value is None else RankTest("Wilcoxon's signed ranks", p_value)
     found = friedman(wide)
-    return None if found is None else {"test": "Friedman's test (F by Iman and Davenport)", **found}
+    return None if found is None else FriedmanTest(test="Friedman's test (F by Iman and Davenport)", **vars(found))
 
 
-def _ordinal(part: pd.DataFrame, confidence: float) -> dict[str, Any]:
+def _ordinal(part: pd.DataFrame, confidence: float) -> Ordinal:
     """Cumulative-link mixed model: methods beside the first by name, and the place where each was shown once."""
     methods = sorted(part["method_a"].unique())
     columns = [(part["method_a"] == method).to_numpy(dtype=np.float64) for method in methods[1:]]
     names = [f"{method} over {methods[0]}" for method in methods[1:]]
     if not columns:
-        return {"effects": [], "p_value": None, "note": "one method: nothing to compare"}
+        return Ordinal(note="one method: nothing to compare")
     place = _shown_later(part)
     shared = [place] if place is not None else []
     design = np.column_stack([*columns, *shared])
     who = part["participant"].to_numpy()
     fit = fit_ordinal(design, part["rating"], who, names=[*names, "shown second"], confidence=confidence)
     if isinstance(fit, str):
-        return {"effects": [], "p_value": None, "note": fit}
+        return Ordinal(note=fit)
     people = fit.participants
     without = fit_ordinal(design[:, len(columns) :], part["rating"], who, confidence=confidence)
     ratio = 2 * (fit.log_likelihood - without.log_likelihood) if isinstance(without, OrdinalFit) else None
-    return {
-        "effects": [
-            {
-                **estimates.plain(effect),
-                "value": effect.value if effect.standard_error else None,
-                "odds_ratio": float(np.exp(effect.value)) if effect.standard_error else None,
-            }
+    return Ordinal(
+        effects=tuple(
+            OrdinalEffect(
+                name=effect.name,
+                value=effect.value if effect.standard_error else None,
+                standard_error=effect.standard_error,
+                interval=effect.interval,
+                p_value=effect.p_value,
+                odds_ratio=float(np.exp(effect.value)) if effect.standard_error else None,
+            )
             for effect in fit.effects
-        ],
-        "spread": fit.spread,
-        "points": fit.points,
-        "thresholds": fit.thresholds,
-        "likelihood_ratio": None if ratio is None else max(ratio, 0.0),
-        "degrees_of_freedom": len(columns),
+        ),
+        spread=fit.spread,
+        points=fit.points,
+        thresholds=fit.thresholds,
+        likelihood_ratio=None if ratio is None else max(ratio, 0.0),
+        degrees_of_freedom=len(columns),
         # The chi-square finds too much with few participants; F with participants less one, as Student's t, does not.
-        "p_value": None if ratio is None else estimates.f_probability(ratio / len(columns), len(columns), people - 1),
-        "note": fit.note,
-    }
+        p_value=None if ratio is None else estimates.f_probability(ratio / len(columns), len(columns), people - 1),
+        note=fit.note,
+    )
 
 
 def _shown_later(part: pd.DataFrame) -> FloatArray | None:
@@ -259,53 +354,3 @@ def _shown_later(part: pd.DataFrame) -> FloatArray | None:
         return None
     starts = part["method_a"] + " first" != part["order"]
     return np.asarray(starts, dtype=np.float64)
-
-
-def anova_sentences(questions: list[dict[str, Any]], alpha: float) -> list[str]:
-    """Each effect of each question in words, degrees of freedom always with it, and what holds over participants."""
-    found = []
-    for question in questions:
-        name = question["item"] or "rating"
-        found += [
-            f"{name}: {row['source']} F({row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}) = "
-            f"{row['f']:.2f}, MS = {row['mean_square']:.2f}, {_verdict(row['p_value'], alpha)}"
-            for row in question["anova"]
-            if row.get("f") is not None
-        ]
-        if len(question["differences"]) > 1:
-            found.append(f"{name}: {omnibus_in_words(question, alpha)}")
-        found += [
-            f"{name}: {difference_in_words(row, alpha)}" for row in question["differences"] if row["participants"]
-        ]
-    return found
-
-
-def _verdict(p_value: float, alpha: float, name: str = "p") -> str:
-    return f"{name} = {p_value:.3g} ({'' if p_value < alpha else 'not '}significant at {alpha:g})"
-
-
-def omnibus_in_words(question: dict[str, Any], alpha: float) -> str:
-    """Return whether more than two methods differ at all over participants: by their means, and by ranks."""
-    design, ranks = question["mixed_design"], question["ranks"]["participants"]
-    row = next((effect for effect in design["effects"] if effect["source"] == "method"), None)
-    said = "all methods over participants"
-    if row is None or row["f"] is None:
-        said = f"{said}: {design['note']}"
-    else:
-        said += (
-            f" F({row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}) = {row['f']:.2f}, corrected by "
-            f"Greenhouse and Geisser {_verdict(row['corrected_p_value'], alpha)}"
-        )
-    return said if ranks is None else f"{said}; by ranks (Friedman) {_verdict(ranks['p_value'], alpha)}"
-
-
-def difference_in_words(row: dict[str, Any], alpha: float) -> str:
-    """Return the difference of two methods over participants, with its test or why there is none."""
-    said = f"{row['of']} over participants {row['mean']:.2f}"
-    if row["p_value"] is None:
-        return f"{said}; {row['note']}"
-    if row["t"] is None:
-        return f"{said}, the same for all {row['participants']}, {row['test']} {_verdict(row['p_value'], alpha)}"
-    adjusted = row["holm_p_value"] > row["p_value"]
-    verdict = _verdict(row["holm_p_value"], alpha, "p adjusted by Holm" if adjusted else "p")
-    return f"{said} ({row['low']:.2f} to {row['high']:.2f}), t({row['degrees_of_freedom']}) = {row['t']:.2f}, {verdict}"

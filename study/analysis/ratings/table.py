@@ -1,49 +1,56 @@
-"""Ratings of naturalness on a scale: answers of a rating task in, a table by method out."""
+"""Ratings of naturalness on a scale: answers of a rating task in, a table by method and one by order out.
+
+Wang & Bodenheimer 2003, section 4.2: cost function by presentation order. The order is the method that a participant
+saw first.
+"""
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from study.analysis import estimates
-from study.errors import AnalysisError
+from study.analysis.estimates import mean_test
+from study.analysis.ratings.answers import first_seen, rated
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def rated(answers: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers given in rating tasks with the columns `rating` (a number) and `item` (empty where none).
+@dataclass(frozen=True)
+class MeanRating:
+    """The mean over participants of their means, with its standard error and Student's interval."""
 
-    Raises
-    ------
-    AnalysisError
-        When an answer is not a number.
-    """
-    import pandas as pd
-
-    part = answers[answers["task"] == "rating"] if "task" in answers.columns else answers
-    part = part[part["answer"].notna()].copy()
-    part["rating"] = pd.to_numeric(part["answer"].astype(str).str.strip(), errors="coerce").astype(float)
-    strange = ~(part["rating"].abs() <= estimates.LARGEST)
-    if strange.any():
-        found = part.loc[strange, "answer"].iloc[0]
-        raise AnalysisError(f"expected ratings as numbers, found {str(found)!r}; recode the column `answer`")
-    part["item"] = part["item"].fillna("").astype(str) if "item" in part.columns else ""
-    return part
+    item: str
+    method: str
+    answers: int
+    participants: int
+    mean: float
+    standard_error: float | None
+    low: float | None
+    high: float | None
+    note: str
 
 
-def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class MethodRating(MeanRating):
+    """How a method was rated in one question; spread, median and distribution are of all answers."""
+
+    standard_deviation: float | None
+    median: float
+    distribution: dict[str, int]
+
+
+@dataclass(frozen=True)
+class CellRating(MeanRating):
+    """How a method was rated by those who saw the method `order` first."""
+
+    order: str
+
+
+def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[MethodRating, ...]:
     """Return one entry a question and method: how it was rated.
-
-    Returns
-    -------
-    list of dict
-        `item`, `method`, `answers`, `participants`, `mean` (over participants of their means), `standard_error`,
-        `low`, `high` (Student's t over participants), `standard_deviation` (of all answers), `median`, `note`,
-        `distribution` (answers a value).
 
     Raises
     ------
@@ -53,27 +60,61 @@ def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> list[dict[s
     import pandas as pd
 
     part = rated(answers)
+    who = part["participant"].astype(str)
     method = part["method_a"].astype(str) if "method_a" in part.columns else pd.Series("all", index=part.index)
-    rows = []
-    for (question, name), values in part["rating"].groupby([part["item"], method], sort=True):
-        means = values.groupby(part.loc[values.index, "participant"].astype(str)).mean().to_numpy(dtype=np.float64)
-        test = estimates.mean_test(means, 0.0, confidence)
-        rows.append(
-            {
-                "item": str(question),
-                "method": str(name),
-                "answers": len(values),
-                "participants": test.participants,
-                "mean": test.mean,
-                "standard_error": test.standard_error,
-                "low": test.interval.low,
-                "high": test.interval.high,
-                "standard_deviation": float(values.std(ddof=1)) if len(values) > 1 else math.nan,
-                "median": float(values.median()),
-                "note": test.note,
-                "distribution": {
-                    f"{value:g}": int(count) for value, count in values.value_counts().sort_index().items()
-                },
-            }
+    return tuple(
+        MethodRating(
+            **_mean(str(item), str(name), values, who, confidence),
+            standard_deviation=float(values.std(ddof=1)) if len(values) > 1 else None,
+            median=float(values.median()),
+            distribution={f"{value:g}": int(count) for value, count in values.value_counts().sort_index().items()},
         )
-    return [dict(estimates.plain(row)) for row in rows]
+        for (item, name), values in part["rating"].groupby([part["item"], method], sort=True)
+    )
+
+
+def rating_cells(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[CellRating, ...]:
+    """Return one entry a question, method and order of presentation; none where one method was rated, or one order.
+
+    Parameters
+    ----------
+    answers
+        Of one rating study: `participant`, `method_a`, `answer`, and where they are known `item` and `trial`.
+    confidence
+        Of the intervals.
+
+    Raises
+    ------
+    AnalysisError
+        When an answer is not a number.
+    """
+    part = rated(answers)
+    if part.empty or "method_a" not in part.columns:
+        return ()
+    who, method = part["participant"].astype(str), part["method_a"].astype(str)
+    order = who.map(first_seen(answers))
+    if method.nunique() < 2 or order.nunique() < 2:
+        return ()
+    return tuple(
+        CellRating(**_mean(str(item), str(name), values, who, confidence), order=str(first))
+        for (item, name, first), values in part.groupby([part["item"], method, order], sort=False)["rating"]
+    )
+
+
+def _mean(item: str, method: str, values: pd.Series[float], who: pd.Series[str], confidence: float) -> dict[str, Any]:
+    """The fields of a `MeanRating`."""
+    means = values.groupby(who.loc[values.index]).mean().to_numpy(dtype=np.float64)
+    test = mean_test(means, 0.0, confidence)
+    return vars(
+        MeanRating(
+            item=item,
+            method=method,
+            answers=len(values),
+            participants=test.participants,
+            mean=float(means.mean()),
+            standard_error=test.standard_error,
+            low=test.interval.low,
+            high=test.interval.high,
+            note=test.note,
+        )
+    )

@@ -7,37 +7,117 @@ differ across motions. Beside it the differencing model, d-prime at each level, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.same_different import fits as differencing
-from study.analysis.same_different.independent import compare_rules, fit_independent, order_test, profile_intervals
-from study.analysis.same_different.interpolation import (
+from study.analysis.same_different.counts import (
     Counts,
-    Threshold,
+    PercentDifferent,
+    Side,
     count_answers,
-    crossings,
     percent_different,
     same_different_answers,
 )
+from study.analysis.same_different.d_prime import LevelDPrime, d_prime_table
+from study.analysis.same_different.independent import Rules, compare_rules, fit_independent
+from study.analysis.same_different.interpolation import crossings
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
-from study.counting import counted
-from study.errors import AnalysisError
-from study.models.differencing import ROOT_TWO, detected
+from study.analysis.same_different.motions import AcrossMotions, across_motions
+from study.analysis.same_different.order import OrderShare, OrderTest, order_test, shares_by_order
+from study.analysis.same_different.profiles import profile_intervals
+from study.analysis.same_different.threshold import Threshold
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
+    from study.analysis.study_result import Settings
+
+
+@dataclass(frozen=True)
+class MotionThresholds:
+    """A same-different study by one motion; see `SameDifferent`."""
+
+    motion: str
+    answers: int
+    percent_where_different: float | None
+    percent_where_same: float | None
+    note: str
+    published: dict[Side, Threshold]
+    model: ModelFit | None
+    model_note: str
+    percent_different: tuple[PercentDifferent, ...]
+
+
+@dataclass(frozen=True)
+class SameDifferent:
+    """The result of a same-different study.
+
+    Attributes
+    ----------
+    participants, answers, missed
+        How many answered, how often, and how many answers were missed.
+    level
+        Share of "different" at threshold.
+    percent_different
+        The points of Figure 6.
+    published
+        Crossings of straight lines, by side.
+    model, model_note
+        The differencing model of the group's curve, and what to be careful about, or why there is none.
+    mixed, mixed_note
+        The same of participants who differ: the median observer, and the group.
+    d_prime
+        Sensitivity at each level.
+    clustering
+        How alike the answers of a participant are, at the pairs with a difference.
+    motions, across_motions
+        The same per motion, and tests that performance is the same across them.
+    order, order_test
+        Share of "different" by which came first, and the test that it does not matter.
+    rules
+        Differencing against independent observations.
+    profile
+        Intervals of the model's thresholds by profile likelihood, by side.
+    answer
+        The thresholds in sentences.
+    """
+
+    keys: ClassVar[Mapping[str, str]] = {"jnd": ""}
+
+    participants: int
+    answers: int
+    missed: int
+    level: float
+    percent_different: tuple[PercentDifferent, ...]
+    published: dict[Side, Threshold]
+    model: ModelFit | None
+    model_note: str
+    mixed: MixedThresholds | None
+    mixed_note: str
+    d_prime: tuple[LevelDPrime, ...]
+    clustering: estimates.Clustering
+    motions: tuple[MotionThresholds, ...]
+    across_motions: AcrossMotions
+    order: tuple[OrderShare, ...]
+    order_test: OrderTest
+    rules: Rules
+    profile: dict[Side, estimates.Interval]
+    answer: str
+
+    def sentences(self, alpha: float) -> list[str]:
+        """Return the thresholds in words; they rest on no level of significance."""
+        del alpha
+        return [self.answer]
 
 
 def analyse_jnd(
     answers: pd.DataFrame, *, level: float = 0.75, confidence: float = 0.95, resamples: int = 1000, seed: int = 0
-) -> dict[str, Any]:
+) -> SameDifferent:
     """Analyse one same-different study.
 
     Parameters
@@ -48,17 +128,6 @@ def analyse_jnd(
         Share of "different" at threshold.
     confidence, resamples, seed
         Of the intervals, and of the bootstrap behind the standard errors.
-
-    Returns
-    -------
-    dict
-        JSON-able: `participants`, `answers`, `missed`, `level`, `percent_different` (rows of Figure 6), `published`
-        (crossings by side), `model` (`ModelFit` as a dict, or None: the group's curve), `model_note`, `mixed`
-        (`MixedThresholds` as a dict, or None: the median observer, and the group), `mixed_note`, `d_prime` (rows by
-        level), `clustering` (answers at the pairs with a difference), `motions` (the same per motion), `across_motions`
-        (tests), `order` (share of "different" by which came first), `order_test` (`decision_rules.order_test`), `rules`
-        (differencing against independent observations), `profile` (intervals by profile likelihood, by side),
-        `answer` (a sentence).
 
     Raises
     ------
@@ -75,33 +144,44 @@ def analyse_jnd(
     moved = counts.differences != 0
     given = same_different_answers(answers)
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
-    result = {
-        "participants": len(counts.participants),
-        "answers": int(counts.shown.sum()),
-        "missed": int(len(chosen) - len(given)),
-        "level": level,
-        "percent_different": percent_different(answers, confidence).to_dict("records"),
-        "published": published,
-        "model": fitted if isinstance(fitted, ModelFit) else None,
-        "model_note": fitted.note if isinstance(fitted, ModelFit) else fitted,
-        "mixed": mixed if isinstance(mixed, MixedThresholds) else None,
-        "mixed_note": mixed.note if isinstance(mixed, MixedThresholds) else mixed,
-        "d_prime": d_prime_table(counts, confidence),
-        "clustering": estimates.clustering(counts.different[:, moved].sum(axis=1), counts.shown[:, moved].sum(axis=1)),
-        "motions": _by_motion(given, level, confidence, resamples, rng),
-        "across_motions": across_motions(given),
-        "order": _by_order(given),
-        "order_test": order_test(given),
-        "rules": compare_rules(
-            fit_independent(counts, level), fitted.log_likelihood if isinstance(fitted, ModelFit) else None
-        ),
-        "profile": profile_intervals(counts, level, confidence),
-    }
-    return {**dict(estimates.plain(result)), "answer": in_words(published, fitted, mixed, level)}
+    likelihood = fitted.log_likelihood if isinstance(fitted, ModelFit) else None
+    return SameDifferent(
+        participants=len(counts.participants),
+        answers=int(counts.shown.sum()),
+        missed=len(chosen) - len(given),
+        level=level,
+        percent_different=percent_different(counts, confidence),
+        published=published,
+        model=fitted if isinstance(fitted, ModelFit) else None,
+        model_note=fitted.note if isinstance(fitted, ModelFit) else fitted,
+        mixed=mixed if isinstance(mixed, MixedThresholds) else None,
+        mixed_note=mixed.note if isinstance(mixed, MixedThresholds) else mixed,
+        d_prime=d_prime_table(counts, confidence),
+        clustering=estimates.clustering(counts.different[:, moved].sum(axis=1), counts.shown[:, moved].sum(axis=1)),
+        motions=_by_motion(given, level, confidence, resamples, rng),
+        across_motions=across_motions(given),
+        order=shares_by_order(given),
+        order_test=order_test(given),
+        rules=compare_rules(fit_independent(counts, level), likelihood),
+        profile=profile_intervals(counts, level, confidence),
+        answer=in_words(published, fitted, mixed, level),
+    )
+
+
+def analyse_same_different(answers: pd.DataFrame, name: str, settings: Settings) -> SameDifferent:
+    """Analyse one same-different study as was decided beforehand."""
+    del name
+    return analyse_jnd(
+        answers,
+        level=settings.threshold,
+        confidence=settings.confidence,
+        resamples=settings.resamples,
+        seed=settings.seed,
+    )
 
 
 def in_words(
-    published: Mapping[str, Threshold], fitted: ModelFit | str, mixed: MixedThresholds | str, level: float
+    published: Mapping[Side, Threshold], fitted: ModelFit | str, mixed: MixedThresholds | str, level: float
 ) -> str:
     """Return the thresholds in sentences: as published, corrected, and those of the median observer."""
     first = f"Read off straight lines, as published, {100 * level:.0f}% of the answers are “different” at "
@@ -114,9 +194,10 @@ def in_words(
     return f"{text} That is the group's; the median observer's is {_sides_in_words(mixed.typical)}."
 
 
-def _sides_in_words(thresholds: Mapping[str, Threshold]) -> str:
+def _sides_in_words(thresholds: Mapping[Side, Threshold]) -> str:
+    signs: dict[Side, str] = {"longer": "+", "shorter": "−"}
     parts = []
-    for side, sign in (("longer", "+"), ("shorter", "−")):
+    for side, sign in signs.items():
         found = thresholds.get(side)
         if found is None:
             continue
@@ -130,182 +211,30 @@ def _sides_in_words(thresholds: Mapping[str, Threshold]) -> str:
 
 def _by_motion(
     given: pd.DataFrame, level: float, confidence: float, resamples: int, rng: np.random.Generator
-) -> list[dict[str, Any]]:
+) -> tuple[MotionThresholds, ...]:
     if "motion" not in given.columns:
-        return []
+        return ()
     rows = []
     for motion, part in given.groupby(given["motion"].astype(str), sort=False):
         counts = count_answers(part)
         fitted = fit_model(counts, level=level, confidence=confidence)
         moved = counts.differences != 0
-        shown, different = counts.shown[:, moved].sum(), counts.different[:, moved].sum()
         rows.append(
-            {
-                "motion": str(motion),
-                "answers": int(counts.shown.sum()),
-                "percent_where_different": 100 * different / shown if shown else None,
-                "percent_where_same": _share(counts, ~moved),
-                "note": "" if moved.any() and not moved.all() else "pairs with a difference only, or without one",
-                "published": crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng),
-                "model": fitted if isinstance(fitted, ModelFit) else None,
-                "model_note": fitted.note if isinstance(fitted, ModelFit) else fitted,
-                "percent_different": percent_different(part, confidence).to_dict("records"),
-            }
+            MotionThresholds(
+                motion=str(motion),
+                answers=int(counts.shown.sum()),
+                percent_where_different=_percent(counts, moved),
+                percent_where_same=_percent(counts, ~moved),
+                note="" if moved.any() and not moved.all() else "pairs with a difference only, or without one",
+                published=crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng),
+                model=fitted if isinstance(fitted, ModelFit) else None,
+                model_note=fitted.note if isinstance(fitted, ModelFit) else fitted,
+                percent_different=percent_different(counts, confidence),
+            )
         )
-    return rows
+    return tuple(rows)
 
 
-def _share(counts: Counts, levels: NDArray[np.bool_]) -> float | None:
+def _percent(counts: Counts, levels: NDArray[np.bool_]) -> float | None:
     shown = float(counts.shown[:, levels].sum())
     return 100 * float(counts.different[:, levels].sum()) / shown if shown else None
-
-
-def across_motions(given: pd.DataFrame) -> dict[str, Any]:
-    """Test that performance is the same across motions (2004 section 5.1).
-
-    Returns
-    -------
-    dict
-        `chi_square`, `chi_square_degrees_of_freedom`, `chi_square_p_value`: correct and wrong answers by motion, every
-        answer taken as independent. `f`, `f_degrees_of_freedom` (two), `f_p_value`: Hotelling's test on the
-        participants' own percentages correct, which asks neither independence nor equal variances. `note`.
-    """
-    result: dict[str, Any] = dict.fromkeys(("chi_square", "chi_square_degrees_of_freedom", "chi_square_p_value"))
-    result |= dict.fromkeys(("f", "f_degrees_of_freedom", "f_p_value"))
-    if "motion" not in given.columns or given["motion"].nunique() < 2:
-        return {**result, "note": "fewer than two motions"}
-    correct = ((given["answer"] == "different") == (given["difference_frames"] != 0)).astype(float)
-    motion = given["motion"].astype(str)
-    result |= _pooled_chi_square(correct.groupby(motion).sum(), correct.groupby(motion).size())
-    shares = correct.groupby([given["participant"].astype(str), motion]).mean().unstack().dropna()
-    return result | _hotelling(shares.to_numpy(dtype=np.float64))
-
-
-def _pooled_chi_square(right: pd.Series[float], shown: pd.Series[int]) -> dict[str, Any]:
-    yes, total = right.to_numpy(dtype=np.float64), shown.to_numpy(dtype=np.float64)
-    share, freedom = yes.sum() / total.sum(), len(yes) - 1
-    if share in (0.0, 1.0):
-        return {}
-    statistic = float(((yes - total * share) ** 2 / (total * share * (1 - share))).sum())
-    return {
-        "chi_square": statistic,
-        "chi_square_degrees_of_freedom": freedom,
-        "chi_square_p_value": estimates.chi_square_probability(statistic, freedom),
-    }
-
-
-def _hotelling(shares: FloatArray) -> dict[str, Any]:
-    """Hotelling's one-sample test that all columns have one mean; rows are participants."""
-    count, motions = shares.shape
-    contrasts = shares[:, 1:] - shares[:, :1]
-    size = motions - 1
-    if count <= size + 1:
-        return {
-            "note": f"{counted(count, 'participant is', 'participants are')} too few for a test across "
-            f"{counted(motions, 'motion')}"
-        }
-    spread = np.atleast_2d(np.cov(contrasts, rowvar=False))
-    if np.linalg.matrix_rank(spread, tol=1e-9) < size:
-        return {"note": "participants' differences between motions do not vary enough for a test"}
-    mean = contrasts.mean(axis=0)
-    squared = count * float(mean @ np.linalg.solve(spread, mean))
-    statistic = squared * (count - size) / (size * (count - 1))
-    probability = estimates.f_probability(statistic, size, count - size)
-    return {"f": statistic, "f_degrees_of_freedom": [size, count - size], "f_p_value": probability, "note": ""}
-
-
-def _by_order(given: pd.DataFrame) -> list[dict[str, Any]]:
-    """Share of "different" where the reference came first and where it came second.
-
-    Under the differencing rule the order does not matter; a gap points to a drift between first and second, or to
-    another rule.
-    """
-    if "reference_first" not in given.columns or given["reference_first"].isna().all():
-        return []
-    known = given[given["reference_first"].notna() & (given["difference_frames"] != 0)]
-    rows = []
-    for first, part in known.groupby(known["reference_first"].astype(bool), sort=True):
-        different = int((part["answer"] == "different").sum())
-        rows.append({"reference_first": bool(first), "answers": len(part), "percent": 100 * different / len(part)})
-    return rows
-
-
-# d-prime
-
-
-def d_prime(
-    hits: float, different_pairs: float, alarms: float, same_pairs: float, confidence: float = 0.95
-) -> dict[str, float | None]:
-    """Return d-prime and criterion under the differencing rule, for a table of hits and false alarms.
-
-    Parameters
-    ----------
-    hits, different_pairs
-        Answers "different" of all answers where there was a difference.
-    alarms, same_pairs
-        The same where there was none.
-    confidence
-        Of the interval.
-
-    Returns
-    -------
-    dict
-        `d_prime`, `criterion` (standard deviations of one impression), `standard_error` (of d-prime, by the delta
-        method), `low`, `high` (profile likelihood); answers are taken as independent. None where there are no pairs of
-        a kind, and `high` where the answers set no upper end. d-prime is 0 where hits do not exceed false alarms.
-
-    Raises
-    ------
-    AnalysisError
-        For counts that can't be.
-
-    Notes
-    -----
-    One half is added to each count of answers, one to each count of pairs (Hautus 1995), so that 0 and 100% stay
-    finite; this pulls d-prime towards 0 where there are few answers. The interval is that of the counts as they are.
-    """
-    from scipy.optimize import brentq
-    from scipy.special import ndtri
-
-    for yes, pairs in ((hits, different_pairs), (alarms, same_pairs)):
-        if not 0 <= yes <= pairs < np.inf:
-            raise AnalysisError(
-                f"expected counts with 0 <= different <= pairs, found {yes} of {counted(pairs, 'pair')}; count again"
-            )
-    if different_pairs == 0 or same_pairs == 0:
-        return dict.fromkeys(("d_prime", "criterion", "standard_error", "low", "high"))
-    hit, alarm = (hits + 0.5) / (different_pairs + 1), (alarms + 0.5) / (same_pairs + 1)
-
-    def solve(hit: float, alarm: float) -> float:
-        criterion = np.full(1, -ROOT_TWO * ndtri(alarm / 2))
-        if hit <= alarm:
-            return 0.0
-        found = brentq(lambda delta: float(detected(np.full(1, delta), criterion)[0]) - hit, 0.0, 40.0)
-        return float(found)
-
-    value, step = solve(hit, alarm), 1e-5
-    error = None
-    if value > 0:
-        by_hit = (solve(hit + step, alarm) - solve(hit - step, alarm)) / (2 * step)
-        by_alarm = (solve(hit, alarm + step) - solve(hit, alarm - step)) / (2 * step)
-        variance = by_hit**2 * hit * (1 - hit) / different_pairs + by_alarm**2 * alarm * (1 - alarm) / same_pairs
-        error = float(np.sqrt(variance))
-    low, high = differencing.d_prime_interval(hits, different_pairs, alarms, same_pairs, confidence)
-    criterion = float(-ROOT_TWO * ndtri(alarm / 2))
-    return {"d_prime": value, "criterion": criterion, "standard_error": error, "low": low, "high": high}
-
-
-OPEN = "no more “different” than without a difference, or no end above: what is missing can't be told"
-
-
-def d_prime_table(counts: Counts, confidence: float = 0.95) -> list[dict[str, Any]]:
-    """Return d-prime at every level against the pairs with no difference, answers pooled over participants."""
-    same = counts.differences == 0
-    alarms, same_pairs = float(counts.different[:, same].sum()), float(counts.shown[:, same].sum())
-    rows: list[dict[str, Any]] = []
-    for level in np.flatnonzero(~same):
-        hits, pairs = float(counts.different[:, level].sum()), float(counts.shown[:, level].sum())
-        found = d_prime(hits, pairs, alarms, same_pairs, confidence)
-        note = "" if None not in found.values() else "no pairs to tell it by" if found["d_prime"] is None else OPEN
-        rows.append({"difference_frames": float(counts.differences[level]), **found, "note": note})
-    return rows

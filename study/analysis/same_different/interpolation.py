@@ -1,9 +1,8 @@
-"""The just noticeable difference in blend length: answers of a same-different task in, thresholds out.
+"""The just noticeable difference as published: counts of a same-different task in, thresholds out.
 
-As published (2004 section 5.1, Figure 6): percent "different" by signed difference in blend length, with standard
-errors of the mean over participants, and where straight lines between these points cross 75%, shorter and longer.
-Beside it the differencing model (`differencing`), whose criterion comes from the pairs with no difference: straight
-lines cut the corners of a bent curve, and the crossing moves with the rate of false alarms.
+2004 section 5.1, Figure 6: where straight lines between percentages "different" cross 75%, shorter and longer. The
+differencing model (`model`) stands beside it, since straight lines cut the corners of a bent curve, and their crossing
+moves with the rate of false alarms.
 
 Intervals take the participant as the unit. A threshold outside the levels shown is said to be outside, never computed.
 """
@@ -11,173 +10,15 @@ Intervals take the participant as the unit. A threshold outside the levels shown
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.errors import AnalysisError
-
-if TYPE_CHECKING:
-    import pandas as pd
+from study.analysis.same_different.counts import SIDES, Counts, Side, percentages
+from study.analysis.same_different.threshold import FEWEST_FOR_INTERVAL, Threshold
 
 FloatArray = NDArray[np.float64]
-Side = Literal["shorter", "longer"]
-SIDES: tuple[Side, Side] = ("shorter", "longer")
-Status = Literal["reached", "not reached", "above", "not estimable"]
-
-FEWEST_FOR_INTERVAL = 2
-NEEDED_COLUMNS = ("participant", "difference_frames", "answer")
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Answers counted by participant and level.
-
-    Attributes
-    ----------
-    participants
-        In the order of the rows below.
-    differences : ndarray, shape (levels,)
-        Signed difference in blend length, frames, rising: comparison minus reference.
-    different, shown : ndarray, shape (participants, levels)
-        Answers "different", and all answers given; missed answers are in neither.
-    """
-
-    participants: tuple[str, ...]
-    differences: FloatArray
-    different: FloatArray
-    shown: FloatArray
-
-
-@dataclass(frozen=True)
-class Threshold:
-    """A threshold on one side.
-
-    Attributes
-    ----------
-    side
-        "shorter" or "longer" than the reference.
-    frames
-        Size of the difference, always positive; None unless `status` is "reached".
-    standard_error
-        Frames.
-    interval
-        Frames; an open end lies outside the levels shown, or can't be told.
-    status
-        "reached"; "not reached" within the levels shown; "above": the curve is above the level at the smallest
-        difference shown; "not estimable".
-    method
-        How it was found, and what its interval rests on.
-    note
-        In words, where the status is not "reached" or the estimate needs a caution.
-    """
-
-    side: Side
-    frames: float | None
-    standard_error: float | None
-    interval: estimates.Interval
-    status: Status
-    method: str
-    note: str = ""
-
-
-def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers given in same-different tasks, missed ones left out.
-
-    Raises
-    ------
-    AnalysisError
-        When a column is missing, or an answer is neither "same" nor "different".
-    """
-    estimates.check_columns(answers, NEEDED_COLUMNS, "a same-different analysis")
-    chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
-    given = chosen[chosen["answer"].notna() & chosen["difference_frames"].notna()]
-    estimates.check_participants(given)
-    strange = sorted(set(given["answer"].astype(str)) - {"same", "different"})
-    if strange:
-        raise AnalysisError(f'expected the answers "same" and "different", found {strange[0]!r}; recode the column')
-    return given
-
-
-def count_answers(answers: pd.DataFrame) -> Counts:
-    """Count answers by participant and signed difference in blend length."""
-    import pandas as pd
-
-    given = same_different_answers(answers)
-    if given.empty:
-        nothing = np.zeros((0, 0))
-        return Counts((), np.zeros(0), nothing, nothing)
-    yes = (given["answer"] == "different").astype(float)
-    differences = estimates.numbers(given["difference_frames"], "difference_frames")
-    if not np.isfinite(differences).all():
-        raise AnalysisError("expected finite numbers in difference_frames, found an infinite one; leave out that row")
-    groups = yes.groupby([given["participant"].astype(str), pd.Series(differences, index=given.index)])
-    shown, different = groups.size().unstack(fill_value=0), groups.sum().unstack(fill_value=0)
-    return Counts(
-        tuple(str(name) for name in shown.index),
-        shown.columns.to_numpy(dtype=np.float64),
-        different.to_numpy(dtype=np.float64),
-        shown.to_numpy(dtype=np.float64),
-    )
-
-
-def percentages(counts: Counts) -> FloatArray:
-    """Return the share of "different" of every participant and level; NaN where a participant gave no answer."""
-    share = np.full(counts.shown.shape, np.nan)
-    np.divide(counts.different, counts.shown, out=share, where=counts.shown > 0)
-    return share
-
-
-def percent_different(answers: pd.DataFrame, confidence: float = 0.95) -> pd.DataFrame:
-    """Return percent "different" by signed difference in blend length (2004 Figure 6).
-
-    Returns
-    -------
-    DataFrame
-        One row a level: `difference_frames`, `participants`, `answers`, `different`, `percent` (mean over participants
-        of their percentages), `standard_error` (of that mean; missing for one participant), `low` and `high` (Wilson's
-        interval of the answers as if independent, in percent: it says something even where all answers agree).
-    """
-    import pandas as pd
-
-    counts = count_answers(answers)
-    rows: list[dict[str, Any]] = []
-    for level, difference in enumerate(counts.differences):
-        share = percentages(counts)[:, level]
-        share = share[np.isfinite(share)]
-        different, shown = counts.different[:, level].sum(), counts.shown[:, level].sum()
-        interval = estimates.wilson_interval(different, shown, confidence)
-        rows.append(
-            {
-                "difference_frames": difference,
-                "participants": len(share),
-                "answers": int(shown),
-                "different": int(different),
-                "percent": 100 * float(share.mean()),
-                "standard_error": 100 * float(share.std(ddof=1)) / math.sqrt(len(share)) if len(share) > 1 else None,
-                "note": "" if len(share) > 1 else "one participant: no spread to judge by",
-                "low": 100 * interval.low if interval.low is not None else None,
-                "high": 100 * interval.high if interval.high is not None else None,
-            }
-        )
-    names = [
-        "difference_frames",
-        "participants",
-        "answers",
-        "different",
-        "percent",
-        "standard_error",
-        "low",
-        "high",
-        "note",
-    ]
-    return pd.DataFrame(rows, columns=names)
-
-
-# Crossings of straight lines, as published
 
 
 def crossing_of_lines(sizes: FloatArray, shares: FloatArray, level: float = 0.75) -> FloatArray:
@@ -227,7 +68,7 @@ def crossings(
     confidence: float = 0.95,
     resamples: int = 2000,
     rng: np.random.Generator | None = None,
-) -> dict[str, Threshold]:
+) -> dict[Side, Threshold]:
     """Return the 75% crossings of straight lines on both sides (2004 Figure 6).
 
     Parameters

@@ -1,6 +1,6 @@
 """Observers who differ, in a same-different study: counts by participant in, the typical observer's thresholds out.
 
-Every participant has an own sensitivity and an own criterion under the differencing rule (`differencing`): both are
+Every participant has an own sensitivity and an own criterion under the differencing rule (`fits`): both are
 log-normal over people, so that "typical" is the median observer. The mean curve of people who differ is flatter than
 anybody's, and crosses 75% further out than the typical observer does; one curve fitted to all answers follows neither
 quite. This model says both: the typical observer's threshold, and where the mean of all people's curves crosses.
@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.same_different import fits as differencing
-from study.analysis.same_different.independent import frames_by_side
-from study.analysis.same_different.interpolation import SIDES, Counts, Side, Threshold
+from study.analysis.same_different import fits
+from study.analysis.same_different.counts import SIDES, Counts, Side, frames_by_side
 from study.analysis.same_different.model import why_no_fit
+from study.analysis.same_different.threshold import Threshold
 from study.counting import counted
 from study.models.differencing import ROOT_TWO, density, detected
 
@@ -59,8 +59,8 @@ class MixedThresholds:
         What to be careful about.
     """
 
-    typical: dict[str, Threshold]
-    population: dict[str, Threshold]
+    typical: dict[Side, Threshold]
+    population: dict[Side, Threshold]
     sensitivity_spread: float
     criterion_spread: float
     criterion: float
@@ -93,7 +93,7 @@ class _Doubt:
 
 
 def fit_mixed_thresholds(
-    counts: Counts, *, level: float = 0.75, confidence: float = 0.95, largest_lapse: float = differencing.LARGEST_LAPSE
+    counts: Counts, *, level: float = 0.75, confidence: float = 0.95, largest_lapse: float = fits.LARGEST_LAPSE
 ) -> MixedThresholds | str:
     """Fit the differencing model with an own sensitivity and criterion a participant.
 
@@ -116,7 +116,7 @@ def fit_mixed_thresholds(
     Notes
     -----
     Maximum likelihood. Standard errors come from the curvature of the marginal likelihood, so they hold if people are
-    as the model has them; `same_different_model.fit_model` asks less of them and describes the group's curve. With few
+    as the model has them; `model.fit_model` asks less of them and describes the group's curve. With few
     people the likeliest spread is often none, which would make the rest look too sure, so the curvature is taken where
     the likelihood times the root of the spread of sensitivity is highest (after Chung, Rabe-Hesketh, Dorie, Gelman &
     Liu 2013).
@@ -129,7 +129,7 @@ def fit_mixed_thresholds(
     if reason:
         return reason
     people = _people(counts, answered)
-    start = differencing.fit(
+    start = fits.fit(
         people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None], largest_lapse=largest_lapse
     )
     if start.held[0, 2:].any() or start.held[0, 0]:
@@ -202,7 +202,7 @@ def _curves(point: FloatArray, people: _People, frames: FloatArray) -> tuple[Flo
 def _log_likelihood(point: FloatArray, people: _People) -> tuple[float, FloatArray]:
     """Marginal log likelihood and its gradient."""
     share, by = _curves(point, people, people.frames)
-    share = np.clip(share, differencing.SMALLEST_PROBABILITY, 1 - differencing.SMALLEST_PROBABILITY)
+    share = np.clip(share, fits.SMALLEST_PROBABILITY, 1 - fits.SMALLEST_PROBABILITY)
     value = people.different @ np.log(share).T + (people.shown - people.different) @ np.log1p(-share).T
     value += people.log_mass
     highest = value.max(axis=1, keepdims=True)
@@ -283,9 +283,9 @@ def _thresholds(
     sides: list[Side],
     level: float,
     confidence: float,
-) -> dict[str, Threshold]:
+) -> dict[Side, Threshold]:
     """Thresholds of the people on the grid; one person there is the median observer."""
-    result: dict[str, Threshold] = {}
+    result: dict[Side, Threshold] = {}
     for place, side in enumerate(sides):
         largest, nothing = float(people.frames[:, place].max()), estimates.Interval(None, None, confidence)
         log_found, gradient = _log_threshold(point, people, place, level)

@@ -1,7 +1,7 @@
 """The differencing model fitted to a group's answers: thresholds that false alarms and straight lines do not bend.
 
-Counts of a same-different task (`same_different.Counts`) come in; criterion, sensitivities, thresholds with intervals
-and tests go out (2004 section 5.1, corrected). What the model says stands in `differencing`.
+Counts of a same-different task (`counts`) come in; criterion, sensitivities, thresholds with intervals
+and tests go out (2004 section 5.1, corrected). What the model says stands in `fits`.
 """
 
 from __future__ import annotations
@@ -9,17 +9,43 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.same_different import fits as model
-from study.analysis.same_different.interpolation import FEWEST_FOR_INTERVAL, SIDES, Counts, Threshold
+from study.analysis.same_different import fits
+from study.analysis.same_different.counts import SIDES, Counts, Side, both_sides, frames_by_side
+from study.analysis.same_different.threshold import FEWEST_FOR_INTERVAL, Threshold
 from study.models.differencing import KINDS, Kind, probability_different
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EqualSlopes:
+    """Tests that shorter and longer blends are told apart equally well.
+
+    Attributes
+    ----------
+    likelihood_ratio, degrees_of_freedom, p_value_answers_independent
+        Against one slope for both sides, answers as independent.
+    slope_ratio_longer_to_shorter
+        How many times as well a frame longer is seen.
+    t, t_degrees_of_freedom, p_value_participants_independent
+        Of the logarithm of that ratio, over participants (jackknife); None where they do not spread.
+    note
+        Why there is no t.
+    """
+
+    likelihood_ratio: float
+    degrees_of_freedom: int
+    p_value_answers_independent: float
+    slope_ratio_longer_to_shorter: float
+    t: float | None
+    t_degrees_of_freedom: int | None
+    p_value_participants_independent: float | None
+    note: str
 
 
 @dataclass(frozen=True)
@@ -59,12 +85,12 @@ class ModelFit:
     criterion_error: float | None
     lapse: float
     false_alarms: float
-    slopes: dict[str, float]
+    slopes: dict[Side, float]
     level: float
-    jnd: dict[str, Threshold]
-    corrected: dict[str, Threshold]
-    guess_corrected: dict[str, Threshold]
-    equal_slopes: dict[str, Any] | None
+    jnd: dict[Side, Threshold]
+    corrected: dict[Side, Threshold]
+    guess_corrected: dict[Side, Threshold]
+    equal_slopes: EqualSlopes | None
     fit_deviance: float
     fit_degrees_of_freedom: int
     fit_p_value: float | None
@@ -73,17 +99,12 @@ class ModelFit:
     note: str = ""
 
 
-def _frames_by_side(differences: FloatArray) -> FloatArray:
-    """Regressors of the model, shape (levels, 2): size of the difference where it is shorter, and where longer."""
-    return np.column_stack([np.maximum(-differences, 0.0), np.maximum(differences, 0.0)])
-
-
 def fit_model(
     counts: Counts,
     *,
     level: float = 0.75,
     confidence: float = 0.95,
-    largest_lapse: float = model.LARGEST_LAPSE,
+    largest_lapse: float = fits.LARGEST_LAPSE,
 ) -> ModelFit | str:
     """Fit the differencing model; a sentence that says why where it can't be fitted.
 
@@ -110,16 +131,15 @@ def fit_model(
         return reason
     present = np.flatnonzero(counts.shown.sum(axis=0) > 0)
     differences, different, shown = counts.differences[present], counts.different[:, present], counts.shown[:, present]
-    both = _frames_by_side(differences)
-    sides = [index for index in range(2) if both[:, index].any()]
-    frames, total = both[:, sides], (different.sum(axis=0)[None], shown.sum(axis=0)[None])
-    best = model.fit(frames, *total, largest_lapse=largest_lapse)
+    frames, sides = frames_by_side(differences)
+    total = (different.sum(axis=0)[None], shown.sum(axis=0)[None])
+    best = fits.fit(frames, *total, largest_lapse=largest_lapse)
     spread = _spread_of(level, best, frames, different, shown, largest_lapse)
     thresholds = {kind: _thresholds(best, spread, frames, sides, kind, confidence) for kind in KINDS}
     deviance = max(2 * (_saturated_log_likelihood(*total) - float(best.log_likelihood[0])), 0.0)
     freedom = len(differences) - 2 - len(sides)
     line = np.linspace(differences.min(), differences.max(), 201)
-    curve = probability_different(_frames_by_side(line)[:, sides], best.criterion, best.lapse, best.slopes)[0]
+    curve = probability_different(both_sides(line)[:, sides], best.criterion, best.lapse, best.slopes)[0]
     alarms = probability_different(np.zeros((1, len(sides))), best.criterion, best.lapse, best.slopes)
     return ModelFit(
         criterion=float(best.criterion[0]),
@@ -153,18 +173,18 @@ class _Spread:
 
     participants: int
     level: float
-    left_out: model.Fits | None
+    left_out: fits.Fits | None
     covariance: FloatArray
 
-    def log_threshold_error(self, best: model.Fits, kind: Kind, place: int) -> float | None:
+    def log_threshold_error(self, best: fits.Fits, kind: Kind, place: int) -> float | None:
         """Standard error of the log threshold of one slope; None where it can't be told."""
         if self.left_out is not None:
-            others = model.threshold_frames(self.left_out, kind, self.level)[:, place]
+            others = fits.threshold_frames(self.left_out, kind, self.level)[:, place]
             return estimates.jackknife_error(np.log(others)) if (others > 0).all() else None
-        gradient = model.log_threshold_gradient(best, kind, self.level)[place]
+        gradient = fits.log_threshold_gradient(best, kind, self.level)[place]
         return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
 
-    def criterion_error(self, best: model.Fits) -> float | None:
+    def criterion_error(self, best: fits.Fits) -> float | None:
         """Standard error of the criterion."""
         if self.left_out is not None:
             return estimates.jackknife_error(self.left_out.criterion)
@@ -172,15 +192,15 @@ class _Spread:
 
 
 def _spread_of(
-    level: float, best: model.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, largest_lapse: float
+    level: float, best: fits.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, largest_lapse: float
 ) -> _Spread:
     answered = shown.sum(axis=1) > 0
     different, shown = different[answered], shown[answered]
     count = len(shown)
     if count < FEWEST_FOR_INTERVAL:
-        return _Spread(count, level, None, model.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
+        return _Spread(count, level, None, fits.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
     others = (different.sum(axis=0) - different, shown.sum(axis=0) - shown)
-    return _Spread(count, level, model.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
+    return _Spread(count, level, fits.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
 
 
 def why_no_fit(counts: Counts) -> str:
@@ -198,7 +218,7 @@ def why_no_fit(counts: Counts) -> str:
     return ""
 
 
-def _caution(best: model.Fits) -> str:
+def _caution(best: fits.Fits) -> str:
     notes = []
     if best.held[0, 0]:
         notes.append("the criterion stands at the bound of its range")
@@ -219,23 +239,23 @@ def _saturated_log_likelihood(different: FloatArray, shown: FloatArray) -> float
 
 
 def _thresholds(
-    best: model.Fits, spread: _Spread, frames: FloatArray, sides: Sequence[int], kind: Kind, confidence: float
-) -> dict[str, Threshold]:
+    best: fits.Fits, spread: _Spread, frames: FloatArray, sides: Sequence[int], kind: Kind, confidence: float
+) -> dict[Side, Threshold]:
     """Thresholds of one kind on every side shown."""
-    result: dict[str, Threshold] = {}
+    result: dict[Side, Threshold] = {}
     for place, index in enumerate(sides):
         result[SIDES[index]] = _threshold(best, spread, float(frames[:, place].max()), place, index, kind, confidence)
     return result
 
 
 def _threshold(
-    best: model.Fits, spread: _Spread, largest: float, place: int, index: int, kind: Kind, confidence: float
+    best: fits.Fits, spread: _Spread, largest: float, place: int, index: int, kind: Kind, confidence: float
 ) -> Threshold:
     """One threshold, with Student's interval of its logarithm."""
     side, clustered = SIDES[index], spread.left_out is not None
     who = "jackknife over participants" if clustered else "one participant, answers as independent"
     method = f"differencing model; Student interval of the logarithm, {who}"
-    found = float(model.threshold_frames(best, kind, spread.level)[0, place])
+    found = float(fits.threshold_frames(best, kind, spread.level)[0, place])
     interval = estimates.Interval(None, None, confidence)
     if best.held[0, 2 + place]:
         note = "the slope stands at the bound of its range"
@@ -262,14 +282,14 @@ def _threshold(
 
 
 def _equal_slopes(
-    best: model.Fits,
+    best: fits.Fits,
     spread: _Spread,
     frames: FloatArray,
     total: tuple[FloatArray, FloatArray],
     largest_lapse: float,
-) -> dict[str, Any]:
+) -> EqualSlopes:
     """Tests that shorter and longer blends are told apart equally well."""
-    one = model.fit(frames.sum(axis=1, keepdims=True), *total, largest_lapse=largest_lapse)
+    one = fits.fit(frames.sum(axis=1, keepdims=True), *total, largest_lapse=largest_lapse)
     ratio = max(2 * float(best.log_likelihood[0] - one.log_likelihood[0]), 0.0)
     difference = float(np.log(best.slopes[0, 1] / best.slopes[0, 0]))
     error = None
@@ -277,15 +297,14 @@ def _equal_slopes(
         error = estimates.jackknife_error(np.log(spread.left_out.slopes[:, 1] / spread.left_out.slopes[:, 0]))
     statistic = difference / error if error is not None and error > 1e-9 else None
     freedom = spread.participants - 1
-    return {
-        "likelihood_ratio": ratio,
-        "degrees_of_freedom": 1,
-        "p_value_answers_independent": estimates.chi_square_probability(ratio, 1),
-        "slope_ratio_longer_to_shorter": math.exp(difference),
-        "t": statistic,
-        "t_degrees_of_freedom": freedom if statistic is not None else None,
-        "p_value_participants_independent": (
-            estimates.t_probability(statistic, freedom) if statistic is not None else None
-        ),
-        "note": "" if statistic is not None else "participants' slopes don't spread so that they could be judged by",
-    }
+    told = statistic is not None
+    return EqualSlopes(
+        likelihood_ratio=ratio,
+        degrees_of_freedom=1,
+        p_value_answers_independent=estimates.chi_square_probability(ratio, 1),
+        slope_ratio_longer_to_shorter=math.exp(difference),
+        t=statistic,
+        t_degrees_of_freedom=freedom if told else None,
+        p_value_participants_independent=estimates.t_probability(statistic, freedom) if statistic is not None else None,
+        note="" if told else "participants' slopes don't spread so that they could be judged by",
+    )

@@ -34,6 +34,29 @@ class EffectSize:
     interval: Interval
 
 
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """The columns of a table that say how large an effect is; None where there is no F. The interval is of both."""
+
+    partial_eta_squared: float | None = None
+    partial_omega_squared: float | None = None
+    effect_low: float | None = None
+    effect_high: float | None = None
+
+
+def sizes(f: float | None, degrees: float, error_degrees: float, alpha: float) -> Sizes:
+    """Return the columns of an effect, see `effect_size`."""
+    if f is None:
+        return Sizes()
+    found = effect_size(f, degrees, error_degrees, alpha)
+    return Sizes(
+        partial_eta_squared=found.partial_eta_squared,
+        partial_omega_squared=found.partial_omega_squared,
+        effect_low=found.interval.low,
+        effect_high=found.interval.high,
+    )
+
+
 def effect_size(f: float, degrees: float, error_degrees: float, alpha: float = 0.05) -> EffectSize:
     """Return the size of an effect.
 

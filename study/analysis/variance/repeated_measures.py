@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -17,10 +18,72 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study.analysis import estimates
-from study.analysis.variance.two_way import sizes, sum_to_zero
+from study.analysis.variance.effect_sizes import Sizes, sizes
+from study.analysis.variance.two_way import sum_to_zero
 from study.counting import counted
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WithinEffect(Sizes):
+    """An effect of a mixed design.
+
+    Attributes
+    ----------
+    source, error
+        The effect, and what it is judged by.
+    epsilon, huynh_feldt_epsilon
+        How far sphericity holds (Greenhouse & Geisser; Huynh & Feldt); 1 with one degree of freedom within.
+    f, p_value, corrected_p_value, huynh_feldt_p_value
+        None where nothing varies that it could be judged by; the corrected one is by Greenhouse and Geisser.
+    generalized_eta_squared
+        Olejnik & Algina 2003: comparable with a design between participants.
+    """
+
+    source: str
+    sum_of_squares: float
+    degrees_of_freedom: int
+    error: str
+    error_sum_of_squares: float
+    error_degrees_of_freedom: int
+    epsilon: float
+    huynh_feldt_epsilon: float
+    mean_square: float
+    f: float | None
+    p_value: float | None
+    corrected_p_value: float | None
+    huynh_feldt_p_value: float | None
+    generalized_eta_squared: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Likeness:
+    """How alike the values of one participant are, and what that does to tests that take them for independent.
+
+    Attributes
+    ----------
+    intraclass_correlation
+        Consistency, groups and columns taken out; below zero where people are more alike than chance would have it.
+    between_effect, within_effect
+        By how much the error variance of a comparison between groups is larger, and of one within participants smaller,
+        than that of independent values.
+    """
+
+    intraclass_correlation: float | None = None
+    between_effect: float | None = None
+    within_effect: float | None = None
+
+
+@dataclass(frozen=True)
+class _Stratum:
+    """Effects that are judged by one error: name, sum of squares and degrees of freedom of each."""
+
+    effects: tuple[tuple[str, float, int], ...]
+    error: str
+    error_squares: float
+    error_degrees: int
+    epsilons: tuple[float, float]
 
 
 def mixed_design(
@@ -30,7 +93,7 @@ def mixed_design(
     *,
     between: str = "group",
     alpha: float = 0.05,
-) -> list[dict[str, Any]] | str:
+) -> tuple[WithinEffect, ...] | str:
     """Analyse a table in which no value is missing; a sentence that says why where it can't be.
 
     Parameters
@@ -45,15 +108,6 @@ def mixed_design(
         What the groups are called.
     alpha
         Of the intervals of effect sizes.
-
-    Returns
-    -------
-    list of dict
-        One entry an effect: `source`, `sum_of_squares`, `degrees_of_freedom`, `mean_square`, `error` (what it is judged
-        by), `error_sum_of_squares`, `error_degrees_of_freedom`, `f`, `p_value`, `epsilon` (Greenhouse-Geisser's; 1 with
-        one degree of freedom within), `huynh_feldt_epsilon`, `corrected_p_value` (by Greenhouse-Geisser),
-        `huynh_feldt_p_value`, `partial_eta_squared`, `partial_omega_squared`, `effect_low`, `effect_high`,
-        `generalized_eta_squared` (Olejnik & Algina 2003: comparable with a design between participants).
 
     Notes
     -----
@@ -70,16 +124,15 @@ def mixed_design(
         return "a factor with one level: nothing to compare"
     design = np.column_stack([np.ones(people), sum_to_zero(code, count)])
     flat = table.reshape(people, -1)
-    rows = []
+    strata = []
     for which in _subsets(len(levels)):
         scores = flat @ _contrasts(levels, which)
-        within = " x ".join(names[axis] for axis in which)
-        rows += _stratum(scores, design, within, between, left)
-    errors = float(sum(row["error_sum_of_squares"] for row in rows if row["leads"]))
-    return [_finished(row, errors, alpha) for row in rows if row["source"]]
+        strata.append(_stratum(scores, design, " x ".join(names[axis] for axis in which), between, left))
+    errors = sum(stratum.error_squares for stratum in strata)
+    return tuple(_finished(*effect, stratum, errors, alpha) for stratum in strata for effect in stratum.effects)
 
 
-def likeness(values: ArrayLike, groups: Sequence[Any] | NDArray[Any]) -> dict[str, float | None]:
+def likeness(values: ArrayLike, groups: Sequence[Any] | NDArray[Any]) -> Likeness:
     """Return how alike the values of one participant are, and what that does to tests that take them for independent.
 
     Parameters
@@ -87,23 +140,14 @@ def likeness(values: ArrayLike, groups: Sequence[Any] | NDArray[Any]) -> dict[st
     values : array_like, shape (participants, ...)
         As `mixed_design` takes them.
     groups : sequence, shape (participants,)
-
-    Returns
-    -------
-    dict
-        `intraclass_correlation` (consistency, groups and columns taken out; below zero where people are more alike
-        than chance would have it), `between_effect` and `within_effect`: by how much the error variance of a comparison
-        between groups is larger, and of one within participants smaller, than that of independent values.
-        None where that can't be told.
     """
     table = np.asarray(values, dtype=np.float64)
     people, columns = len(table), math.prod(table.shape[1:])
     table = table.reshape(people, columns)
     _, code = np.unique(np.asarray(groups).astype(str), return_inverse=True)
     count = int(code.max()) + 1 if people else 0
-    nothing = dict.fromkeys(("intraclass_correlation", "between_effect", "within_effect"))
     if people - count < 1 or columns < 2:
-        return nothing
+        return Likeness()
     means = np.array([table[code == group].mean(axis=0) for group in range(count)])
     apart = table - means[code]
     own = apart.mean(axis=1)
@@ -111,13 +155,13 @@ def likeness(values: ArrayLike, groups: Sequence[Any] | NDArray[Any]) -> dict[st
     within = float(((apart - own[:, None]) ** 2).sum()) / ((people - count) * (columns - 1))
     spread = between + (columns - 1) * within
     if spread <= 1e-12:
-        return nothing
+        return Likeness()
     correlation = (between - within) / spread
-    return {
-        "intraclass_correlation": correlation,
-        "between_effect": 1 + (columns - 1) * correlation,
-        "within_effect": 1 - correlation,
-    }
+    return Likeness(
+        intraclass_correlation=correlation,
+        between_effect=1 + (columns - 1) * correlation,
+        within_effect=1 - correlation,
+    )
 
 
 def _subsets(factors: int) -> list[tuple[int, ...]]:
@@ -134,35 +178,25 @@ def _contrasts(levels: Sequence[int], which: Sequence[int]) -> FloatArray:
     return found
 
 
-def _stratum(scores: FloatArray, design: FloatArray, within: str, between: str, left: int) -> list[dict[str, Any]]:
-    """Effects that are judged by one error: that within itself, and how the groups differ in it."""
+def _stratum(scores: FloatArray, design: FloatArray, within: str, between: str, left: int) -> _Stratum:
+    """What is judged by one error: the effect within itself, and how the groups differ in it.
+
+    One group alone leaves no effect between, but its error still counts in generalized eta squared.
+    """
     apart = scores - design @ np.linalg.lstsq(design, scores, rcond=None)[0]
     error, dimensions = float((apart**2).sum()), scores.shape[1]
-    epsilon = _epsilons(apart.T @ apart, left, design.shape[1])
     groups = list(range(1, design.shape[1]))
     tested = [(f"{within} x {between}" if within else between, groups)] if groups else []
     if within:
         tested.insert(0, (within, [0]))
-    rows: list[dict[str, Any]] = []
+    effects = []
     for name, columns in tested:
         others = np.delete(design, columns, axis=1)
         kept = scores - others @ np.linalg.lstsq(others, scores, rcond=None)[0] if others.shape[1] else scores
-        squares = max(float((kept**2).sum()) - error, 0.0)
-        rows.append(
-            {
-                "source": name,
-                "sum_of_squares": squares,
-                "degrees_of_freedom": dimensions * len(columns),
-                "error": f"{within} x participants" if within else "participants",
-                "error_sum_of_squares": error,
-                "error_degrees_of_freedom": dimensions * left,
-                "epsilon": epsilon[0],
-                "huynh_feldt_epsilon": epsilon[1],
-                "leads": not rows,
-            }
-        )
-    # One group alone leaves no effect between, but its error still counts in generalized eta squared.
-    return rows or [{"source": "", "error_sum_of_squares": error, "leads": True}]
+        effects.append((name, max(float((kept**2).sum()) - error, 0.0), dimensions * len(columns)))
+    judge = f"{within} x participants" if within else "participants"
+    epsilons = _epsilons(apart.T @ apart, left, design.shape[1])
+    return _Stratum(tuple(effects), judge, error, dimensions * left, epsilons)
 
 
 def _epsilons(products: FloatArray, left: int, groups: int) -> tuple[float, float]:
@@ -178,25 +212,28 @@ def _epsilons(products: FloatArray, left: int, groups: int) -> tuple[float, floa
     return greenhouse, float(min(max(huynh, greenhouse), 1.0))
 
 
-def _finished(row: dict[str, Any], errors: float, alpha: float) -> dict[str, Any]:
-    """An effect with its F, tests and sizes; F is None where nothing varies that it could be judged by."""
-    del row["leads"]
-    squares, degrees = row["sum_of_squares"], row["degrees_of_freedom"]
-    error, error_degrees = row["error_sum_of_squares"], row["error_degrees_of_freedom"]
+def _finished(name: str, squares: float, degrees: int, stratum: _Stratum, errors: float, alpha: float) -> WithinEffect:
+    """An effect with its F, tests and sizes."""
+    error, error_degrees = stratum.error_squares, stratum.error_degrees
     f = squares / degrees / (error / error_degrees) if error > 1e-12 * max(squares, 1.0) else None
-    tests = {
-        key: None if f is None else estimates.f_probability(f, degrees * share, error_degrees * share)
-        for key, share in (
-            ("p_value", 1.0),
-            ("corrected_p_value", row["epsilon"]),
-            ("huynh_feldt_p_value", row["huynh_feldt_epsilon"]),
-        )
-    }
-    return {
-        **row,
-        "mean_square": squares / degrees,
-        "f": f,
-        **tests,
-        **sizes(f, degrees, error_degrees, alpha),
-        "generalized_eta_squared": None if f is None else squares / (squares + errors),
-    }
+    p_value, corrected, huynh_feldt = (
+        None if f is None else estimates.f_probability(f, degrees * share, error_degrees * share)
+        for share in (1.0, *stratum.epsilons)
+    )
+    return WithinEffect(
+        source=name,
+        sum_of_squares=squares,
+        degrees_of_freedom=degrees,
+        error=stratum.error,
+        error_sum_of_squares=error,
+        error_degrees_of_freedom=error_degrees,
+        epsilon=stratum.epsilons[0],
+        huynh_feldt_epsilon=stratum.epsilons[1],
+        mean_square=squares / degrees,
+        f=f,
+        p_value=p_value,
+        corrected_p_value=corrected,
+        huynh_feldt_p_value=huynh_feldt,
+        generalized_eta_squared=None if f is None else squares / (squares + errors),
+        **vars(sizes(f, degrees, error_degrees, alpha)),
+    )

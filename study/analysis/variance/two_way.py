@@ -7,17 +7,41 @@ two sequences each they would be 1 and 48. The same values in a design within pa
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study.analysis import estimates
-from study.analysis.variance.effect_sizes import effect_size
+from study.analysis.variance.effect_sizes import Sizes, sizes
 from study.errors import AnalysisError
 
 FloatArray = NDArray[np.float64]
 Squares = Literal["II", "III"]
+
+
+@dataclass(frozen=True)
+class VarianceRow:
+    """A row of the table."""
+
+    source: str
+    sum_of_squares: float
+    degrees_of_freedom: int
+    mean_square: float
+
+
+@dataclass(frozen=True)
+class VarianceEffect(VarianceRow, Sizes):
+    """A factor or the interaction; `f` is None where nothing varies that it could be judged by."""
+
+    f: float | None
+    error_degrees_of_freedom: int
+    p_value: float | None
+
+
+TwoWay = tuple[VarianceEffect, VarianceEffect, VarianceEffect, VarianceRow]
+"""The two factors, their interaction, and the residual."""
 
 
 def two_way(
@@ -28,7 +52,7 @@ def two_way(
     *,
     squares: Squares = "III",
     alpha: float = 0.05,
-) -> list[dict[str, Any]]:
+) -> TwoWay:
     """Between-subjects analysis of variance with two factors and their interaction.
 
     Parameters
@@ -43,13 +67,6 @@ def two_way(
         Type of the sums of squares, see Notes.
     alpha
         Of the intervals of effect sizes, see `effect_sizes`.
-
-    Returns
-    -------
-    list of dict
-        For each factor, their interaction, and the residual: `source`, `sum_of_squares`, `degrees_of_freedom`,
-        `mean_square`, and but for the residual `f`, `error_degrees_of_freedom`, `p_value`, `partial_eta_squared`,
-        `partial_omega_squared`, `effect_low`, `effect_high` (interval of both).
 
     Raises
     ------
@@ -92,40 +109,17 @@ def two_way(
         beside = [other for key, other in effects.items() if key != name and (squares == "III" or " x " not in key)]
         with_it = residual if squares == "III" or " x " in name else _left_over(y, [*beside, columns])
         rows.append(_effect(name, _left_over(y, beside) - with_it, columns.shape[1], residual, left, alpha))
-    error = {
-        "source": "residual",
-        "sum_of_squares": residual,
-        "degrees_of_freedom": left,
-        "mean_square": residual / left,
-    }
-    return [*rows, error]
+    return rows[0], rows[1], rows[2], VarianceRow("residual", residual, left, residual / left)
 
 
-def _effect(name: str, squares: float, degrees: int, residual: float, left: int, alpha: float) -> dict[str, Any]:
+def _effect(name: str, squares: float, degrees: int, residual: float, left: int, alpha: float) -> VarianceEffect:
     squares = max(squares, 0.0)
     mean_square = squares / degrees
     # Where every answer of a combination is the same, nothing is left to compare with.
     f = mean_square / (residual / left) if residual > 1e-12 * max(squares, 1.0) else None
-    return {
-        "source": name,
-        "sum_of_squares": squares,
-        "degrees_of_freedom": degrees,
-        "mean_square": mean_square,
-        "f": f,
-        "error_degrees_of_freedom": left,
-        "p_value": None if f is None else estimates.f_probability(f, degrees, left),
-        **sizes(f, degrees, left, alpha),
-    }
-
-
-def sizes(f: float | None, degrees: float, error_degrees: float, alpha: float) -> dict[str, float | None]:
-    """The columns of a table that say how large an effect is; None where F can't be had."""
-    names = ("partial_eta_squared", "partial_omega_squared", "effect_low", "effect_high")
-    if f is None:
-        return dict.fromkeys(names)
-    found = effect_size(f, degrees, error_degrees, alpha)
-    values = (found.partial_eta_squared, found.partial_omega_squared, found.interval.low, found.interval.high)
-    return dict(zip(names, values, strict=True))
+    p_value = None if f is None else estimates.f_probability(f, degrees, left)
+    of = sizes(f, degrees, left, alpha)
+    return VarianceEffect(name, squares, degrees, mean_square, f, left, p_value, **vars(of))
 
 
 def sum_to_zero(code: NDArray[np.int64], levels: int) -> FloatArray:

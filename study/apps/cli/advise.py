@@ -132,12 +132,12 @@ def _write(out: Path, result: dict[str, Any]) -> None:
 
     import pandas as pd
 
-    from study.analysis.estimates import plain
+    from study.analysis.to_json import to_json
     from study.files import write_whole
     from study.spreadsheets import safe_table
 
     write_whole(out / "advice.csv", safe_table(pd.DataFrame(result["advice"])).to_csv(index=False))
-    write_whole(out / "advice.json", json.dumps(plain(result), indent=2, allow_nan=False) + "\n")
+    write_whole(out / "advice.json", json.dumps(to_json(result), indent=2, allow_nan=False) + "\n")
 
 
 def _table(rows: Sequence[dict[str, Any]], fps: float, library: str | None) -> Iterator[str]:

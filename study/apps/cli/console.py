@@ -44,9 +44,9 @@ def database_option(command: Command) -> Command:
 
 def emit(result: Mapping[str, Any], as_json: bool, text: str) -> None:
     """Prints a verb's result: the mapping as JSON (numbers that are not finite become null), or the text."""
-    from study.analysis.estimates import plain
+    from study.analysis.to_json import to_json
 
-    show(json.dumps(plain(result), indent=2, allow_nan=False) if as_json else text, sys.stdout)
+    show(json.dumps(to_json(result), indent=2, allow_nan=False) if as_json else text, sys.stdout)
 
 
 def say(message: str) -> None:

@@ -75,11 +75,12 @@ def _pairs(where: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
 def _fit_function(trials: Trials, task: str, options: dict[str, Any]) -> dict[str, Any]:
     """2AFC or yes-no."""
     from study.analysis.psychometric.analyse import analyse_psychometric
-    from study.analysis.psychometric.posterior import make_model
+    from study.analysis.psychometric.model import make_model
+    from study.analysis.to_json import to_json
 
     settings = {name: options[name] for name in ("guess", "lapse")}
     model = make_model(task, sigmoid=options["sigmoid"] or "normal", choices=options["choices"] or 2, **settings)
-    return analyse_psychometric(trials.table, model, confidence=options["confidence"], simulations=500)
+    return dict(to_json(analyse_psychometric(trials.table, model, confidence=options["confidence"], simulations=500)))
 
 
 def _fit_pairs(trials: Trials, options: dict[str, Any]) -> dict[str, Any]:
@@ -88,6 +89,7 @@ def _fit_pairs(trials: Trials, options: dict[str, Any]) -> dict[str, Any]:
     import pandas as pd
 
     from study.analysis.same_different.analyse import analyse_jnd
+    from study.analysis.to_json import to_json
 
     table = trials.table
     parts = []
@@ -102,7 +104,7 @@ def _fit_pairs(trials: Trials, options: dict[str, Any]) -> dict[str, Any]:
     if options["order"]:
         answers["reference_first"] = _reference_first(answers["order"], options)
     level = options["threshold"] or 0.75
-    return analyse_jnd(answers, level=level, confidence=options["confidence"])
+    return dict(to_json(analyse_jnd(answers, level=level, confidence=options["confidence"])))
 
 
 def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Series[bool]:
@@ -121,20 +123,11 @@ def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Serie
 
 def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
     """Preferences and ratings, through the analysis of our own studies; `answer` in words."""
-    from study.analysis.analyse import analyse
-    from study.analysis.preference.analyse import strengths_in_words
-    from study.analysis.ratings.comparisons import anova_sentences
+    from study.analysis.analyse import analyse, analysis_json
+    from study.analysis.study_result import Settings
 
-    alpha = options["alpha"] or 0.05
-    result = analyse(found.table, confidence=options["confidence"], alpha=alpha)
-    said = [compared["answer"] for study in result["preference"].values() for compared in study]
-    said += [strengths_in_words(found) for found in result["bradley_terry"].values() if found]
-    for questions in result["rating_anova"].values():
-        said += anova_sentences(questions, alpha)
-    for row in (row for rows in result["ratings"].values() for row in rows):
-        said.append(f"{': '.join(filter(None, (row['item'], row['method'])))}: mean {row['mean']:.2f} over "
-                    f"{counted(row['participants'], 'participant')}")  # fmt: skip
-    return {**result, "answer": "\n".join(said)}
+    analysis = analyse(found.table, Settings(confidence=options["confidence"], alpha=options["alpha"] or 0.05))
+    return {**analysis_json(analysis), "answer": "\n".join(analysis.sentences())}
 
 
 @click.command()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +18,7 @@ from study.errors import AnalysisError
 if TYPE_CHECKING:
     from study.experiment.plan import Plan
     from study.experiment.protocol.whole import Protocol, StudySpec
-    from study.power.curve import Power, Run
-    from study.power.design import Design
+    from study.power.curve import Power
 
 AT_ONCE = 250
 """Studies drawn and analysed together: enough to be fast, few enough for little memory."""
@@ -51,102 +50,6 @@ def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
         if study.name == name:
             return study
     raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
-
-
-def planned(
-    protocol: Protocol, study: StudySpec, plans: tuple[Plan, ...], options: Mapping[str, Any]
-) -> tuple[Run, dict[str, Any]]:
-    """What is simulated, and in words and numbers what is looked for: `effect`, `icc`, `test`, `aim`."""
-    from study.analysis.exclusions import rules_of
-    from study.power import design as made
-    from study.tasks.registry import task_of
-
-    alpha, missed = protocol.analysis.alpha, options["missed"]
-    rules = rules_of(protocol.analysis.exclusions.model_dump())
-
-    def design(settings: Any) -> Design:
-        return made.Design(protocol, study, plans, settings, rules)
-
-    if study.task == "preference":
-        effect = {key: options[key] for key in ("share", "correlation", "order_bias")}
-        settings = made.preference_observer(study, **effect, missed=missed)
-        run = made.preference_study(design(settings), alpha, options["share"])
-        said = {
-            "icc": options["correlation"],
-            "test": f"Student's t over participants at {alpha:g}",
-            "aim": f"find a preference of {100 * options['share']:g}% at the level {alpha:g}",
-        }
-        verdict = _preference_verdict(study.name, options["share"], alpha)
-    elif study.task == "rating":
-        effect, paired = {key: options[key] for key in ("difference", "correlation")}, task_of(study).slots > 1
-        settings = made.rating_observer(study, **effect, missed=missed)
-        run = made.rating_study(design(settings), alpha, options["difference"])
-        said = {
-            "icc": options["correlation"],
-            "test": f"Student's t of participants' {'mean scores' if paired else 'differences'} at {alpha:g}, "
-            "one question",
-            "aim": f"find a difference of {options['difference']:g} points in one question at the level {alpha:g}",
-        }
-        made_verdict = _pair_rating_verdict if paired else _rating_verdict
-        verdict = made_verdict(study, options["difference"], alpha)
-    else:
-        effect = {key: options[key] for key in ("shorter", "longer", "spread", "precision")}
-        settings = made.same_different_observer(options["shorter"], options["longer"], options["spread"], missed)
-        run = made.same_different_study(design(settings), options["precision"], protocol.analysis.threshold)
-        said = {
-            "icc": None,
-            "test": "width of the differencing model's 95% intervals",
-            "aim": f"tell both thresholds to ± {options['precision']:g} frames",
-        }
-        verdict = _threshold_verdict(study.name, options["precision"])
-    if options["sessions"]:
-        run = made.whole_sessions(design(settings), verdict)
-    return run, {"effect": {**effect, "missed": missed}, **said}
-
-
-def _preference_verdict(name: str, share: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
-    def found(result: Mapping[str, Any]) -> bool:
-        compared = result["preference"].get(name)
-        test = compared[0]["participants"] if compared else None
-        if test is None or test["p_value"] is None:
-            return False
-        return test["p_value"] < alpha and (share == 0.5 or (test["mean_percent"] > 50) == (share > 0.5))
-
-    return found
-
-
-def _rating_verdict(study: StudySpec, difference: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
-    def found(result: Mapping[str, Any]) -> bool:
-        questions = result["rating_anova"].get(study.name) or []
-        test = questions[0]["difference"] if questions else None
-        if test is None or test["p_value"] is None:
-            return False
-        # Differences are of the later method by name from the earlier; the effect is of the comparison.
-        sign = 1 if str(test["of"]).startswith(f"{study.comparison} minus") else -1
-        return test["p_value"] < alpha and (difference == 0 or (sign * test["mean"] > 0) == (difference > 0))
-
-    return found
-
-
-def _pair_rating_verdict(study: StudySpec, difference: float, alpha: float) -> Callable[[Mapping[str, Any]], bool]:
-    def found(result: Mapping[str, Any]) -> bool:
-        questions = result["pair_ratings"].get(study.name) or []
-        test = questions[0]["participants"] if questions else None
-        if test is None or test["p_value"] is None:
-            return False
-        return test["p_value"] < alpha and (difference == 0 or (test["t"] > 0) == (difference > 0))
-
-    return found
-
-
-def _threshold_verdict(name: str, precision: float) -> Callable[[Mapping[str, Any]], bool]:
-    def found(result: Mapping[str, Any]) -> bool:
-        model = (result["jnd"].get(name) or {}).get("model")
-        ends = [threshold["interval"] for threshold in model["jnd"].values()] if model else []
-        known = [end for end in ends if end["low"] is not None and end["high"] is not None]
-        return bool(ends) and len(known) == len(ends) and all(e["high"] - e["low"] <= 2 * precision for e in known)
-
-    return found
 
 
 def _sizes(text: str) -> list[int]:
@@ -195,22 +98,27 @@ def power(
     **options: Any,
 ) -> None:
     """How many participants a protocol needs, at stated effects, by simulation."""
-    from study.analysis.estimates import plain
+    from study.analysis.exclusions import rules_of
+    from study.analysis.to_json import to_json
     from study.apps.cli.study import load
     from study.files import check_place
     from study.power.curve import power_curve
+    from study.power.design import Design
+    from study.power.registry import effect_of
+    from study.power.sessions import whole_sessions
 
     checked, sizes = load(protocol), _sizes(participants)
     study = chosen_study(checked, name)
     if out is not None:
         check_place(out / f"power_{study.name}.json")
     plans = plans_of(checked, library, max(sizes))
-    run, said = planned(checked, study, plans, options)
-    slow = options["sessions"] or study.task == "same-different"
+    effect = effect_of(study, options, checked.analysis)
+    design = Design(checked, study, plans, effect.observer, rules_of(checked.analysis.exclusions))
+    slow = options["sessions"] or effect.slow
     studies = options["studies"] or (200 if slow else 1000)
     with progress("studies") as report:
         found = power_curve(
-            run,
+            whole_sessions(design, effect.found) if options["sessions"] else effect.study(design),
             sizes,
             studies=studies,
             target=options["target"],
@@ -219,13 +127,23 @@ def power(
             progress=lambda done, total: report(done / total, f"{done} of {total}"),
         )
     answers = sum(trial.study == study.name and trial.role == "trial" for trial in plans[0].trials)
-    through = "whole sessions" if options["sessions"] else "plan, observers, exclusions and default test"
-    named = {"protocol": checked.name, "study": study.name, "task": study.task}
-    made = {"simulations": studies, "through": through, "seed": options["seed"], "answers_per_participant": answers}
-    result = {**named, **said, **plain(found), **made}
+    result = {
+        "protocol": checked.name,
+        "study": study.name,
+        "task": study.task,
+        "effect": {**effect.stated, "missed": options["missed"]},
+        "icc": effect.icc,
+        "test": effect.test,
+        "aim": effect.aim,
+        **to_json(found),
+        "simulations": studies,
+        "through": "whole sessions" if options["sessions"] else "plan, observers, exclusions and default test",
+        "seed": options["seed"],
+        "answers_per_participant": answers,
+    }
     if out is not None:
         _write(out, result)
-    emit(result, as_json, _in_words(found, said["aim"], answers))
+    emit(result, as_json, _in_words(found, effect.aim, answers))
 
 
 def _write(folder: Path, result: Mapping[str, Any]) -> None:

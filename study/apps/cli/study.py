@@ -13,6 +13,7 @@ from study.apps.cli.shown import table_of, trials_between
 from study.counting import counted
 
 if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
     from study.experiment.protocol.whole import Protocol
     from study.experiment.stimuli.manifest import Manifest
     from study.experiment.stimuli.stimulus import StimulusSet
@@ -114,44 +115,18 @@ def simulate_participants(
     return {**asdict(summary), "folder": str(folder), "database": responses.place, "simulated": True}
 
 
-def analyse_results(folder: Path, database: str | None = None) -> dict[str, Any]:
+def analyse_results(folder: Path, database: str | None = None) -> Analysis:
     """All analyses of a results folder, as its protocol decided."""
-    from study.analysis.analyse import analyse as analyse_all
-    from study.analysis.exclusions import rules_of
+    from study.analysis.analyse import analyse_folder
     from study.experiment.folder import PROTOCOL
     from study.experiment.protocol.whole import load_protocol
     from study.experiment.store.frames import answers_frame
     from study.experiment.store.responses import open_answers
 
     protocol = load_protocol(folder / PROTOCOL)
-    settings = protocol.analysis
     with open_answers(folder, database) as responses:
         answers, checks = answers_frame(responses), answers_frame(responses, roles=("check",))
-    rules = rules_of(settings.exclusions.model_dump())
-    return analyse_all(
-        answers,
-        threshold=settings.threshold,
-        alpha=settings.alpha,
-        margin=settings.equivalence_points / 100.0,
-        family=settings.confirmatory or None,
-        rules=rules,
-        checks=checks,
-        scale_points=protocol.scale_points,
-    )
-
-
-def headlines(analysis: dict[str, Any]) -> list[str]:
-    """The answers of an analysis in sentences."""
-    from study.analysis.ratings.comparisons import anova_sentences
-    from study.analysis.ratings.pairs import pair_sentences
-
-    sentences = [study["answer"] for study in analysis["jnd"].values()]
-    sentences += [compared["answer"] for study in analysis["preference"].values() for compared in study]
-    for study in analysis["rating_anova"].values():
-        sentences += anova_sentences(study, analysis["alpha"])
-    for study in analysis["pair_ratings"].values():
-        sentences += pair_sentences(study, analysis["alpha"])
-    return sentences
+    return analyse_folder(protocol, answers, checks)
 
 
 @click.command()
@@ -269,8 +244,10 @@ def simulate(
 @json_option
 def analyse(results: Path, database: str | None, as_json: bool) -> None:
     """Thresholds, preferences and ratings of a results folder."""
+    from study.analysis.analyse import analysis_json
+
     analysis = analyse_results(results, database)
-    emit(analysis, as_json, "\n".join(headlines(analysis)))
+    emit(analysis_json(analysis), as_json, "\n".join(analysis.sentences()))
 
 
 @click.command()
@@ -297,6 +274,7 @@ def report(results: Path, out: Path | None, database: str | None, as_json: bool)
 @json_option
 def demo(out: Path | None, workers: int | None, participants: int, as_json: bool) -> None:
     """A small study end to end, with no screen and no network: stimuli, simulated observers, analysis, report."""
+    from study.analysis.analyse import analysis_json
     from study.report.document import write_report
 
     protocol = load("demo")
@@ -305,18 +283,18 @@ def demo(out: Path | None, workers: int | None, participants: int, as_json: bool
     rendered = render_stimuli(prepare_stimuli(protocol, None), folder, workers)
     simulated = simulate_participants(protocol, folder, participants)
     analysis = analyse_results(folder)
-    page = write_report(folder)
+    page = write_report(folder, analysis=analysis)
     lines = [
         f"{counted(rendered['videos'], 'stimulus video')} ({counted(rendered['frames'], 'frame')}) in "
         f"{folder / 'stimuli'}",
         f"{counted(simulated['answers'] + simulated['found'], 'answer')} of "
         f"{counted(participants, 'simulated participant')} "
         f"in {folder / 'responses.sqlite'}",
-        *headlines(analysis),
+        *analysis.sentences(),
         f"The report: {page.resolve()}",
     ]
     emit(
-        {"render": rendered, "simulate": simulated, "analysis": analysis, "report": str(page)},
+        {"render": rendered, "simulate": simulated, "analysis": analysis_json(analysis), "report": str(page)},
         as_json,
         "\n".join(lines),
     )

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from study.report import tables
 from study.report.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.analysis.analyse import Analysis, Data
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,26 @@ class Headline:
 
 
 @dataclass(frozen=True)
+class Reading:
+    """A line of the table that sets published and corrected results side by side."""
+
+    result: str
+    published: str
+    corrected: str
+
+
+@dataclass(frozen=True)
+class MainResult:
+    """A result that is given with and without exclusions: what it is, its value, interval, and p-value."""
+
+    result: str
+    value: float | None
+    low: float | None
+    high: float | None
+    p_value: float | None = None
+
+
+@dataclass(frozen=True)
 class Section:
     """One study on the page.
 
@@ -42,7 +67,7 @@ class Section:
     folded
         Tables to open.
     readings
-        Lines of the table that sets published and corrected results side by side: `result`, `published`, `corrected`.
+        Its lines of the table that compares readings.
     """
 
     anchor: str
@@ -52,18 +77,103 @@ class Section:
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
     folded: tuple[Table, ...] = ()
-    readings: tuple[Mapping[str, Any], ...] = ()
+    readings: tuple[Reading, ...] = ()
+
+
+class OfMotion(Protocol):
+    """A result of one motion."""
+
+    @property
+    def motion(self) -> str:
+        """Its name."""
+
+
+MotionRow = TypeVar("MotionRow", bound=OfMotion)
+
+
+@dataclass(frozen=True)
+class About:
+    """What a section knows of its study beside the result.
+
+    Attributes
+    ----------
+    name, title
+        Of the study.
+    fps
+        Frames per second, for seconds beside frames.
+    data, mark
+        Whose answers they are, and what every figure says about its data.
+    alpha
+        Level of significance.
+    points, ends
+        Of a rating scale, counted from 0, and the words at its lowest and highest point, by question.
+    transitions
+        Names of the transitions in the protocol's order.
+    known
+        What is known of simulated observers; empty where people took part.
+    """
+
+    name: str
+    title: str
+    fps: float = 30.0
+    data: Data = "collected"
+    mark: str = ""
+    alpha: float = 0.05
+    points: int = 5
+    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    transitions: tuple[str, ...] = ()
+    known: Mapping[str, Any] = field(default_factory=dict)
+
+    def in_order(self, rows: Iterable[MotionRow]) -> tuple[MotionRow, ...]:
+        """Return results by motion in the protocol's order rather than that of the first participant's plan."""
+        places = {name: place for place, name in enumerate(self.transitions)}
+        return tuple(sorted(rows, key=lambda row: places.get(row.motion, len(places))))
+
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Course:
+    """What the course of a study is told by: a percentage in words, and which answers count towards it."""
+
+    what: str
+    counts: Callable[[pd.DataFrame], pd.Series[bool]]
+
+
+@dataclass(frozen=True)
+class SectionKind(Generic[Result]):
+    """How a kind of result is shown.
+
+    Attributes
+    ----------
+    section
+        From a result and what is known of its study; None where there is nothing to show.
+    main_results
+        From a result and the study's name: the lines that are given with and without exclusions.
+    methods
+        How studies of this kind were analysed, for a Methods section: from the results and the whole analysis.
+    references
+        Keys of the works that this rests on.
+    course
+        None where answers do not change over a study in any way that is told.
+    """
+
+    section: Callable[[Result, About], Section | None]
+    main_results: Callable[[Result, str], Iterable[MainResult]]
+    methods: Callable[[Collection[Result], Analysis], str]
+    references: Callable[[Collection[Result]], set[str]]
+    course: Course | None = None
 
 
 def readings_table(sections: Sequence[Section]) -> Table | None:
     """Return every result as published and corrected, side by side; None where there is no result."""
-    rows = [row for section in sections for row in section.readings]
+    rows = [vars(row) for section in sections for row in section.readings]
     if not rows:
         return None
-    names = [row["result"] for row in rows]
-    if len(set(names)) < len(names):
+    if len({row["result"] for row in rows}) < len(rows):
         rows = [
-            {**row, "result": f"{section.title}: {row['result']}"} for section in sections for row in section.readings
+            vars(row) | {"result": f"{section.title}: {row.result}"} for section in sections for row in section.readings
         ]
     return tables.make(
         "results",

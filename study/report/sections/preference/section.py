@@ -5,46 +5,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
+from study.analysis.confirmatory import ConfirmatoryTest
+from study.analysis.estimates import Interval
+from study.analysis.preference.analyse import Comparison, Preference
+from study.analysis.preference.bradley_terry import BradleyTerry
+from study.analysis.preference.no_effect import NoEffect
 from study.counting import counted
-from study.report import figures, tables, words
-from study.report.sections.section import Drawing, Headline, Section
+from study.report import tables, words
+from study.report.references import (
+    BRADLEY_1952,
+    HOLM_1979,
+    LIANG_1986,
+    MANCL_2001,
+    ROUDER_2009,
+    SCHUIRMANN_1987,
+    WILSON_1927,
+)
+from study.report.sections.preference.figures import preference_figure
+from study.report.sections.section import About, Course, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.tables import Table
 
-Result = Mapping[str, Any]
+if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
 
 
-def preference_section(
-    name: str, title: str, comparisons: Sequence[Result], *, mark: str, strengths: Result | None = None
-) -> Section:
-    """Return the section of a preference study.
-
-    Parameters
-    ----------
-    name, title
-        Of the study.
-    comparisons
-        From `compare`: one entry a pair of methods.
-    mark
-        What every figure says about its data.
-    strengths
-        From `strengths`, where more than two methods were compared.
-    """
+def preference_section(result: Preference, about: About) -> Section | None:
+    """Return the section of a preference study; None without a comparison."""
+    comparisons, name = result.comparisons, about.name
+    if not comparisons:
+        return None
     drawings, shown, folded, notes = [], [], [], []
     for place, comparison in enumerate(comparisons):
         suffix = f"_{place + 1}" if len(comparisons) > 1 else ""
-        drawings.append(_drawing(f"{name}_forest{suffix}", comparison, mark))
-        shown.append(preference_table(name + suffix, comparison))
-        folded += [make(name + suffix, comparison) for make in (motion_table, order_table, no_preference_table)]
-        notes += _notes(comparison)
-    if strengths is not None:
-        shown += [strengths_table(name, strengths)] if strengths.get("strengths") else []
-        notes += [f"Strengths of the methods: {strengths['note']}."] if strengths.get("note") else []
+        ordered = replace(comparison, motions=about.in_order(comparison.motions))
+        drawings.append(_drawing(f"{name}_forest{suffix}", ordered, about.mark))
+        shown.append(preference_table(name + suffix, ordered))
+        folded += [make(name + suffix, ordered) for make in (motion_table, order_table, no_preference_table)]
+        notes += _notes(ordered)
+    if result.strengths is not None:
+        shown += [strengths_table(name, result.strengths)] if isinstance(result.strengths, BradleyTerry) else []
+        notes += [f"Strengths of the methods: {result.strengths.note}."] if result.strengths.note else []
     return Section(
         anchor=f"study-{name}",
-        title=title,
+        title=about.title,
         headlines=tuple(headline(comparison) for comparison in comparisons),
         drawings=tuple(drawings),
         tables=tuple(shown),
@@ -54,96 +61,101 @@ def preference_section(
     )
 
 
-def _drawing(name: str, comparison: Result, mark: str) -> Drawing:
+def _drawing(name: str, comparison: Comparison, mark: str) -> Drawing:
     caption = (
         "Answers that favoured the first method, for every motion pair with Wilson’s 95% interval; below, all answers "
         "as if independent (Wilson), and the mean over participants (Student’s t). At the right, how many favoured it "
         "of how many answers."
     )
-    return Drawing(name, figures.preference_figure(comparison, f"study-{name}", mark), caption)
+    return Drawing(name, preference_figure(comparison, f"study-{name}", mark), caption)
 
 
-def methods_of(comparison: Result) -> tuple[str, str]:
+def methods_of(comparison: Comparison | ConfirmatoryTest) -> tuple[str, str]:
     """Return the two methods as words."""
-    return words.readable(comparison["method_a"]), words.readable(comparison["method_b"])
+    return words.readable(comparison.method_a), words.readable(comparison.method_b)
 
 
 # In words
 
 
-def headline(comparison: Result) -> Headline:
+def headline(comparison: Comparison) -> Headline:
     """Return a preference as a statement and what it rests on."""
-    published, people = comparison["published"], comparison["participants"]
+    published, people = comparison.published, comparison.participants
     parts = []
-    if people["low"] is not None:
+    if people.low is not None:
         parts.append(
-            f"Mean over {counted(people['participants'], 'participant')} {people['mean_percent']:.1f}%, 95% "
-            f"interval {words.interval(people['low'], people['high'], unit='%')}."
+            f"Mean over {counted(people.participants, 'participant')} {people.mean_percent:.1f}%, 95% "
+            f"interval {words.interval(people.low, people.high, unit='%')}."
         )
-    elif people["note"]:
-        parts.append(f"{words.sentence(people['note'])}.")
-    if published["chi_square"] is not None:
+    elif people.note:
+        parts.append(f"{words.sentence(people.note)}.")
+    if published.chi_square is not None and published.p_value is not None:
         parts.append(
-            f"As published: chi-square(1, N = {published['answers']}) = {published['chi_square']:.2f}, "
-            f"{words.p(published['p_value'])}."
+            f"As published: chi-square(1, N = {published.answers}) = {published.chi_square:.2f}, "
+            f"{words.p(published.p_value)}."
         )
-    return Headline(words.readable(comparison["answer"]), " ".join(parts))
+    return Headline(words.readable(comparison.answer), " ".join(parts))
 
 
-def _reading(comparison: Result) -> dict[str, Any]:
-    published, people = comparison["published"], comparison["participants"]
+def _reading(comparison: Comparison) -> Reading:
+    published, people = comparison.published, comparison.participants
     first, second = methods_of(comparison)
     pooled, corrected = "no answers", "no answers"
-    if published["percent"] is not None:
-        ends = {end: 100 * published["interval"][end] for end in ("low", "high")}
+    if published.percent is not None and published.chi_square is not None and published.p_value is not None:
+        low, high = _percents(published.interval)
         pooled = (
-            f"{published['percent']:.1f}% [{words.bare_interval(ends)}]; chi-square(1, N = {published['answers']}) = "
-            f"{published['chi_square']:.2f}, {words.p(published['p_value'])}"
+            f"{published.percent:.1f}% [{words.bare_interval(low, high)}]; chi-square(1, N = {published.answers}) = "
+            f"{published.chi_square:.2f}, {words.p(published.p_value)}"
         )
-    if people["mean_percent"] is not None:
-        corrected = f"{people['mean_percent']:.1f}% [{words.bare_interval(people)}]"
-        if people["t"] is not None:
-            corrected += f"; t({people['degrees_of_freedom']}) = {words.decimals(people['t'], 2)}"
-        if people["p_value"] is not None:
-            corrected += f"{', ' if people['t'] is not None else '; sign test '}{words.p(people['p_value'])}"
-    return {"result": f"{first} over {second}", "published": pooled, "corrected": corrected}
+    if people.mean_percent is not None:
+        corrected = f"{people.mean_percent:.1f}% [{words.bare_interval(people.low, people.high)}]"
+        if people.t is not None:
+            corrected += f"; t({people.degrees_of_freedom}) = {words.decimals(people.t, 2)}"
+        if people.p_value is not None:
+            corrected += f"{', ' if people.t is not None else '; sign test '}{words.p(people.p_value)}"
+    return Reading(f"{first} over {second}", pooled, corrected)
 
 
-def _notes(comparison: Result) -> list[str]:
+def _percents(interval: Interval) -> list[float | None]:
+    """The ends of an interval of a share, in percent."""
+    return [None if end is None else 100 * end for end in (interval.low, interval.high)]
+
+
+def _notes(comparison: Comparison) -> list[str]:
     """What the preference rests on, one sentence each."""
-    people, order, clusters = comparison["participants"], comparison["order"], comparison["clustering"]
+    people, order, clusters = comparison.participants, comparison.order, comparison.clustering
     first, second = methods_of(comparison)
     notes = [
-        f"{counted(people['for_a'], 'participant')} leant towards {first}, {people['for_b']} towards {second}, "
-        f"{people['undecided']} towards neither."
+        f"{counted(people.for_a, 'participant')} leant towards {first}, {people.for_b} towards {second}, "
+        f"{people.undecided} towards neither."
     ]
-    if comparison.get("ties"):
-        notes.append(f"{counted(comparison['ties'], 'answer')} chose neither: left out of the published test.")
-    if clusters["design_effect"] is not None:
-        correlation = words.signed(clusters["intraclass_correlation"], 3, plus=False)
+    if comparison.ties:
+        notes.append(f"{counted(comparison.ties, 'answer')} chose neither: left out of the published test.")
+    if clusters.design_effect is not None and clusters.intraclass_correlation is not None:
+        correlation = words.signed(clusters.intraclass_correlation, 3, plus=False)
         notes.append(
             f"Answers of one participant correlate by {correlation}: the pooled test counts "
-            f"{counted(comparison['published']['answers'], 'answer')} that are worth "
-            f"{clusters['effective_answers'] or 0:.0f} "
-            f"independent ones (design effect {clusters['design_effect']:.2f})."
+            f"{counted(comparison.published.answers, 'answer')} that are worth "
+            f"{clusters.effective_answers or 0:.0f} "
+            f"independent ones (design effect {clusters.design_effect:.2f})."
         )
-    if order["first_percent"] is not None:
-        test = f", {words.p(order['p_value'])} over participants" if order["p_value"] is not None else ""
-        notes.append(f"The transition shown first was favoured in {order['first_percent']:.1f}% of the answers{test}.")
-    notes += _no_preference(comparison["no_preference"])
-    notes += [comparison["models"]["differ"]] if (comparison["models"] or {}).get("differ") else []
+    if order.first_percent is not None:
+        test = f", {words.p(order.p_value)} over participants" if order.p_value is not None else ""
+        notes.append(f"The transition shown first was favoured in {order.first_percent:.1f}% of the answers{test}.")
+    notes += _no_preference(comparison.no_preference)
+    notes += [comparison.models.differ] if comparison.models and comparison.models.differ else []
     return notes
 
 
-def _no_preference(found: Result) -> list[str]:
+def _no_preference(found: NoEffect) -> list[str]:
     """The evidence for no preference, where it could be weighed."""
-    if found["equivalence_p_value"] is None:
+    if found.equivalence_p_value is None:
         return []
     text = (
         f"Evidence for no preference: two one-sided tests over participants for a share within {_margin(found)} give "
-        f"{words.p(found['equivalence_p_value'])}"
+        f"{words.p(found.equivalence_p_value)}"
     )
-    factor = found["bayes_factor_null"]
+    factor = found.bayes_factor_null
     if factor is None:
         return [f"{text}."]
     weight, side = (factor, "without") if factor >= 1 else (1 / factor, "with")
@@ -151,14 +163,14 @@ def _no_preference(found: Result) -> list[str]:
     return [f"{text}; the data are {times} times likelier {side} a preference (Bayes factor, Cauchy prior of 0.71)."]
 
 
-def _margin(found: Result) -> str:
-    return f"{50 - 100 * found['margin']:g} to {50 + 100 * found['margin']:g}%"
+def _margin(found: NoEffect) -> str:
+    return f"{50 - 100 * found.margin:g} to {50 + 100 * found.margin:g}%"
 
 
 # Tables
 
 
-def preference_table(name: str, comparison: Result) -> Table:
+def preference_table(name: str, comparison: Comparison) -> Table:
     """Return the tests of a preference, as published and corrected."""
     first, second = methods_of(comparison)
     return tables.make(
@@ -179,64 +191,62 @@ def preference_table(name: str, comparison: Result) -> Table:
     )
 
 
-def _published_rows(comparison: Result) -> list[dict[str, Any]]:
-    pooled = comparison["published"]
-    low, high = (None if (end := pooled["interval"][name]) is None else 100 * end for name in ("low", "high"))
-    test = {"test": f"chi-square(1, N = {pooled['answers']})", "statistic": pooled["chi_square"]}
+def _published_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    pooled = comparison.published
+    low, high = _percents(pooled.interval)
+    test = {"test": f"chi-square(1, N = {pooled.answers})", "statistic": pooled.chi_square}
     return [
-        {"reading": "as published", "percent": pooled["percent"], "low": low, "high": high, **test}
-        | {"p_value": pooled["p_value"]},
-        {"reading": "as published, exact", "test": "binomial", "p_value": pooled["exact_p_value"]},
+        {"reading": "as published", "percent": pooled.percent, "low": low, "high": high, **test}
+        | {"p_value": pooled.p_value},
+        {"reading": "as published, exact", "test": "binomial", "p_value": pooled.exact_p_value},
     ]
 
 
-def _corrected_rows(comparison: Result) -> list[dict[str, Any]]:
-    people = comparison["participants"]
-    test = f"t({people['degrees_of_freedom']})" if people["t"] is not None else people["test"]
-    ends = {end: people[end] for end in ("low", "high", "p_value")}
+def _corrected_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    people = comparison.participants
+    test = f"t({people.degrees_of_freedom})" if people.t is not None else people.test
+    ends = {"low": people.low, "high": people.high, "p_value": people.p_value}
     return [
-        {"reading": "corrected", "percent": people["mean_percent"], **ends, "test": test, "statistic": people["t"]},
-        {"reading": "corrected, by ranks", "test": "Wilcoxon", "p_value": people["wilcoxon_p_value"]},
+        {"reading": "corrected", "percent": people.mean_percent, **ends, "test": test, "statistic": people.t},
+        {"reading": "corrected, by ranks", "test": "Wilcoxon", "p_value": people.wilcoxon_p_value},
         {
             "reading": "corrected, pooled",
-            "test": f"F(1, {people['participants'] - 1})" if people["robust_chi_square"] is not None else "none",
-            "statistic": people["robust_chi_square"],
-            "p_value": people["robust_p_value"],
+            "test": f"F(1, {people.participants - 1})" if people.robust_chi_square is not None else "none",
+            "statistic": people.robust_chi_square,
+            "p_value": people.robust_p_value,
         },
-        {"reading": "orders balanced", "percent": comparison["order"].get("balanced_percent"), "test": ""},
+        {"reading": "orders balanced", "percent": comparison.order.balanced_percent, "test": ""},
     ]
 
 
-def _model_rows(comparison: Result) -> list[dict[str, Any]]:
+def _model_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """The mixed model and the estimating equations, where they could be fitted."""
-    models = comparison["models"] or {}
-    names = (("mixed", "a typical participant", "logistic mixed model"), ("gee", "the population", "GEE"))
+    if comparison.models is None:
+        return []
+    mixed, gee = comparison.models.mixed, comparison.models.gee
+    names = ((mixed, "a typical participant", "logistic mixed model"), (gee, "the population", "GEE"))
     return [
-        {"reading": reading, "test": test, **{key: models[name][key] for key in ("percent", "low", "high", "p_value")}}
-        for name, reading, test in names
-        if name in models and models[name]["percent"] is not None
+        vars(model) | {"reading": reading, "test": test} for model, reading, test in names if model.percent is not None
     ]
 
 
-def _sample_rows(comparison: Result) -> list[dict[str, Any]]:
+def _sample_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Tests that hold for other motions, where several were shown."""
-    found = comparison["motions_as_sample"]
-    rows = []
-    for key, reading, percent in (
-        ("by_motion", "other motions", "mean_percent"),
-        ("both", "other participants and motions", "percent"),
-    ):
-        if (entry := found[key]) is None:
-            continue
-        test = f"t({entry['degrees_of_freedom']})" if entry["t"] is not None else "none"
-        ends = {end: entry[end] for end in ("low", "high", "p_value")}
-        rows.append({"reading": reading, "percent": entry[percent], **ends, "test": test, "statistic": entry["t"]})
-    return rows
+    one, both = comparison.motions_as_sample.by_motion, comparison.motions_as_sample.both
+    rows: list[dict[str, Any]] = []
+    if one is not None:
+        rows.append(vars(one) | {"reading": "other motions", "percent": one.mean_percent})
+    if both is not None:
+        rows.append(vars(both) | {"reading": "other participants and motions"})
+    tested = ((row, row["t"]) for row in rows)
+    return [
+        row | {"test": "none" if t is None else f"t({row['degrees_of_freedom']})", "statistic": t} for row, t in tested
+    ]
 
 
-def motion_table(name: str, comparison: Result) -> Table:
+def motion_table(name: str, comparison: Comparison) -> Table:
     """Return the preference for every motion."""
-    rows = [{**row, "motion": words.readable(row["motion"])} for row in comparison["motions"]]
+    rows = [vars(row) | {"motion": words.readable(row.motion)} for row in comparison.motions]
     return tables.make(
         f"{name}_preference_by_motion",
         "Every motion pair. Wilson’s 95% interval, chi-square(1) as published, exact binomial test, and the "
@@ -246,19 +256,20 @@ def motion_table(name: str, comparison: Result) -> Table:
     )
 
 
-def order_table(name: str, comparison: Result) -> Table:
+def order_table(name: str, comparison: Comparison) -> Table:
     """Return the effect of the order of presentation, by percentages and by the models."""
-    order, (first, second) = comparison["order"], methods_of(comparison)
-    models = comparison["models"] or {}
-    rows = [
-        {"reading": f"{first} shown first: favouring {first}", "percent": order.get("percent_a_first")},
-        {"reading": f"{second} shown first: favouring {first}", "percent": order.get("percent_a_second")},
-        {"reading": "favouring the one shown first", "percent": order["first_percent"], "p_value": order["p_value"]},
+    order, (first, second) = comparison.order, methods_of(comparison)
+    rows: list[dict[str, Any]] = [
+        {"reading": f"{first} shown first: favouring {first}", "percent": order.percent_a_first},
+        {"reading": f"{second} shown first: favouring {first}", "percent": order.percent_a_second},
+        {"reading": "favouring the one shown first", "percent": order.first_percent, "p_value": order.p_value},
     ]
-    for key, reading in (("mixed", "order in the mixed model"), ("gee", "order in the estimating equations")):
-        found = models.get(key, {})
-        if found.get("order_logit") is not None:
-            rows.append({"reading": reading, "order_logit": found["order_logit"], "p_value": found["order_p_value"]})
+    if models := comparison.models:
+        rows += [
+            {"reading": f"order in the {kind}", "order_logit": model.order_logit, "p_value": model.order_p_value}
+            for kind, model in (("mixed model", models.mixed), ("estimating equations", models.gee))
+            if model.order_logit is not None
+        ]
     return tables.make(
         f"{name}_order",
         "How far the order of presentation decided. Percentages of answers, with Student’s t over participants; and "
@@ -268,29 +279,36 @@ def order_table(name: str, comparison: Result) -> Table:
     )
 
 
-def no_preference_table(name: str, comparison: Result) -> Table:
+def no_preference_table(name: str, comparison: Comparison) -> Table:
     """Return the evidence for no preference: the equivalence test with its margin, and the Bayes factor."""
-    found = comparison["no_preference"]
-    ends = {end: None if found["interval"][end] is None else 100 * found["interval"][end] for end in ("low", "high")}
-    row = {"margin": _margin(found), "percent": comparison["participants"]["mean_percent"], **ends}
+    found = comparison.no_preference
+    low, high = _percents(found.interval)
+    row = {
+        "margin": _margin(found),
+        "percent": comparison.participants.mean_percent,
+        "low": low,
+        "high": high,
+        "equivalence_p_value": found.equivalence_p_value,
+        "bayes_factor_null": found.bayes_factor_null,
+    }
     return tables.make(
         f"{name}_no_preference",
         "Evidence for no preference. Two one-sided t tests over participants (Schuirmann) that the share lies within "
         f"{_margin(found)}, whose 90% interval then lies in it; and how many times likelier the data are without a "
         "preference than with one (Bayes factor of Rouder et al. 2009, Cauchy prior of 0.71).",
         "margin percent low:one high:one equivalence_p_value bayes_factor_null",
-        [{**row, **{key: found[key] for key in ("equivalence_p_value", "bayes_factor_null")}}],
+        [row],
         headings={"low": "90% from"},
     )
 
 
-def strengths_table(name: str, found: Result) -> Table:
+def strengths_table(name: str, found: BradleyTerry) -> Table:
     """Return Bradley-Terry strengths of more than two methods."""
     rows = [
-        {**row, **row["interval"], "method": words.readable(row["method"])}
-        for row in [*found["strengths"], *([found["order"]] if found.get("order") else [])]
+        vars(row) | {"low": row.interval.low, "high": row.interval.high, "method": words.readable(row.method)}
+        for row in [*found.strengths, *([found.order] if found.order else [])]
     ]
-    whose = "participants" if found.get("participants") else "answers"
+    whose = "participants" if found.participants else "answers"
     return tables.make(
         f"{name}_strengths",
         "Strengths of the methods (Bradley-Terry, logits beside the reference), and what being shown first adds; "
@@ -301,12 +319,12 @@ def strengths_table(name: str, found: Result) -> Table:
     )
 
 
-def confirmatory_table(tests: Sequence[Result]) -> Table | None:
+def confirmatory_table(tests: Sequence[ConfirmatoryTest]) -> Table | None:
     """Return the confirmatory tests, adjusted together; None where there are none."""
     if not tests:
         return None
     rows = [
-        {**test, "comparison": " over ".join(methods_of(test)), "study": words.readable(test["study"])}
+        vars(test) | {"comparison": " over ".join(methods_of(test)), "study": words.readable(test.study)}
         for test in tests
     ]
     return tables.make(
@@ -317,3 +335,41 @@ def confirmatory_table(tests: Sequence[Result]) -> Table | None:
         "study comparison test p_value holm_p_value",
         rows,
     )
+
+
+# Beside the section
+
+
+def _main_results(result: Preference, study: str) -> Iterator[MainResult]:
+    for compared in result.comparisons:
+        people = compared.participants
+        what = f"{words.readable(study)}: {' over '.join(methods_of(compared))} [%]"
+        yield MainResult(what, people.mean_percent, people.low, people.high, people.p_value)
+
+
+def _methods(found: Collection[Preference], analysis: Analysis) -> str:
+    del found
+    count = len(analysis.confirmatory)
+    family = f" and adjusted by Holm’s method over {count} comparisons" if count > 1 else ""
+    return (
+        "Preferences were tested by Student’s t of one share a participant against one half"
+        f"{family}; chi-square and exact binomial tests of all answers are given as published, with Wilson’s "
+        "intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite quadrature) and generalised "
+        "estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) account for the order of "
+        "presentation. Evidence for no preference is an equivalence test (Schuirmann 1987) and a Bayes factor "
+        "(Rouder et al. 2009)."
+    )
+
+
+def _references(found: Collection[Preference]) -> set[str]:
+    several = {BRADLEY_1952} if any(result.strengths for result in found) else set()
+    return {WILSON_1927, HOLM_1979, LIANG_1986, MANCL_2001, SCHUIRMANN_1987, ROUDER_2009} | several
+
+
+KIND = SectionKind(
+    preference_section,
+    _main_results,
+    _methods,
+    _references,
+    Course("answers for the first", lambda given: given["answer"] == "first"),
+)

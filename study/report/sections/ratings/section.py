@@ -6,66 +6,52 @@ difference between the methods, the mixed design, ranks, and an ordinal model.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
+from study.analysis.ratings.analyse import Ratings
+from study.analysis.ratings.comparisons import MethodDifference, Question
+from study.analysis.ratings.table import MeanRating, MethodRating
+from study.analysis.variance.repeated_measures import WithinEffect
+from study.analysis.variance.two_way import VarianceEffect
 from study.counting import counted
-from study.report import figures, tables, words
-from study.report.sections.section import Drawing, Headline, Section
+from study.report import tables, words
+from study.report.sections.ratings import figures
+from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.tables import Table
+from study.transitions.methods.method import WANG_2003
 
-Result = Mapping[str, Any]
+if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
 
 
-def ratings_section(
-    name: str,
-    title: str,
-    rows: Sequence[Result],
-    variance: Sequence[Result] = (),
-    cells: Sequence[Result] = (),
-    *,
-    mark: str,
-    points: int,
-    alpha: float = 0.05,
-) -> Section:
-    """Return the section of a rating study: means, and where two methods or more were rated, their comparison.
-
-    Parameters
-    ----------
-    name, title
-        Of the study.
-    rows, variance, cells
-        From `rating_table`, `rating_anova` and `rating_cells`.
-    mark
-        What every figure says about its data.
-    points
-        Of the scale, which is counted from 0.
-    alpha
-        Level of significance.
-    """
+def ratings_section(result: Ratings, about: About) -> Section | None:
+    """Return the section of a rating study: means, and where two methods or more were rated, their comparison."""
+    name, questions = about.name, result.questions
+    if not result.table:
+        return None
     return Section(
         anchor=f"study-{name}",
-        title=title,
-        headlines=(_headline(title, rows, variance, points, alpha),),
-        drawings=tuple(_drawings(name, rows, cells, mark, points)),
+        title=about.title,
+        headlines=(_headline(result, about.points, about.alpha),),
+        drawings=tuple(_drawings(result, about)),
         tables=(
-            means_table(name, rows),
-            *((variance_table(name, variance), difference_table(name, variance)) if variance else ()),
+            means_table(name, result.table),
+            *((variance_table(name, questions), difference_table(name, questions)) if questions else ()),
         ),
-        notes=tuple(dict.fromkeys(note for question in variance for note in _notes(question))),
-        folded=tuple(_folded(name, variance, cells)),
-        readings=tuple(_readings(variance)),
+        notes=tuple(dict.fromkeys(note for question in questions for note in _notes(question))),
+        folded=tuple(_folded(name, result)),
+        readings=tuple(_readings(questions)),
     )
 
 
-def _drawings(name: str, rows: Sequence[Result], cells: Sequence[Result], mark: str, points: int) -> list[Drawing]:
-    if not rows:
-        return []
+def _drawings(result: Ratings, about: About) -> list[Drawing]:
+    name, mark, points = about.name, about.mark, about.points
     scale = f"on a scale of 0 to {points - 1} with 95% intervals over participants (Student’s t)"
-    place = f"study-{name}-ratings"
-    drawings = [Drawing(f"{name}_ratings", figures.ratings_figure(rows, place, mark, points), f"Mean ratings {scale}.")]
-    if cells:
-        svg = figures.cells_figure(cells, f"study-{name}-cells", mark, points)
+    svg = figures.ratings_figure(result.table, f"study-{name}-ratings", mark, points)
+    drawings = [Drawing(f"{name}_ratings", svg, f"Mean ratings {scale}.")]
+    if result.cells:
+        svg = figures.cells_figure(result.cells, f"study-{name}-cells", mark, points)
         drawings.append(Drawing(f"{name}_cells", svg, f"Mean ratings by method and by which was seen first, {scale}."))
     return drawings
 
@@ -73,162 +59,152 @@ def _drawings(name: str, rows: Sequence[Result], cells: Sequence[Result], mark: 
 # In words
 
 
-def _headline(title: str, rows: Sequence[Result], variance: Sequence[Result], points: int, alpha: float) -> Headline:
-    if not rows:
-        return Headline(f"{title}: there are no ratings.", "")
-    known = [question for question in variance if question["difference"] and question["difference"]["mean"] is not None]
+def _headline(result: Ratings, points: int, alpha: float) -> Headline:
+    known = [
+        (question, difference)
+        for question in result.questions
+        if (difference := question.difference) and difference.mean is not None
+    ]
     if not known:
-        highest = _highest(rows, points)
-        return Headline(highest.statement, " ".join(filter(None, (highest.detail, _tests(variance)))))
-    return _of_one(known[0], points, alpha) if len(known) == 1 else _of_several(known, alpha)
+        highest = _highest(result.table, points)
+        return Headline(highest.statement, " ".join(filter(None, (highest.detail, _tests(result.questions)))))
+    return _of_one(*known[0], points, alpha) if len(known) == 1 else _of_several(known, alpha)
 
 
-def _highest(rows: Sequence[Result], points: int) -> Headline:
+def _highest(rows: Sequence[MethodRating], points: int) -> Headline:
     """The highest mean, or the only one, or that there is no highest."""
-    top = max(row["mean"] for row in rows)
-    best = [row for row in rows if row["mean"] == top]
-    what = words.joined([words.readable(": ".join(filter(None, (row["item"], row["method"])))) for row in best])
+    top = max(row.mean for row in rows)
+    best = [row for row in rows if row.mean == top]
+    what = words.joined([words.readable(": ".join(filter(None, (row.item, row.method)))) for row in best])
     verb = "were rated alike," if len(best) > 1 else "was rated" if len(rows) == 1 else "was rated highest,"
     row = best[0]
-    size = f"{counted(row['answers'], 'answer')} of {counted(row['participants'], 'participant')}"
+    size = f"{counted(row.answers, 'answer')} of {counted(row.participants, 'participant')}"
     return Headline(
         f"{words.sentence(what)} {verb} {top:.2f} on average, on a scale of 0 to {points - 1}.",
-        f"{size}; 95% interval over participants {words.interval(row['low'], row['high'], 2)}.",
+        f"{size}; 95% interval over participants {words.interval(row.low, row.high, 2)}.",
     )
 
 
-def _of_one(question: Result, points: int, alpha: float) -> Headline:
+def _of_one(question: Question, difference: MethodDifference, points: int, alpha: float) -> Headline:
     """By how much one method was rated higher than the other."""
-    difference = question["difference"]
-    first, second = _methods(question)
-    if difference["mean"] < 0:
+    first, second = _two_of(difference)
+    mean = difference.mean or 0.0
+    if mean < 0:
         first, second = second, first
-    size = f"{counted(question['answers'], 'answer')} of {counted(question['participants'], 'participant')}"
-    if difference["mean"] == 0:
+    size = f"{counted(question.answers, 'answer')} of {counted(question.participants, 'participant')}"
+    if mean == 0:
         statement = f"{words.sentence(first)} and {second} were rated alike on average, on a scale of 0 to {points - 1}"
     else:
         statement = (
-            f"{words.sentence(first)} was rated {abs(difference['mean']):.2f} points higher than {second} on "
+            f"{words.sentence(first)} was rated {abs(mean):.2f} points higher than {second} on "
             "average, on "
             f"a scale of 0 to {points - 1}"
         )
-    if difference["p_value"] is not None:
-        told = "this is not chance" if difference["p_value"] < alpha else "this can’t be told from chance"
-        statement += f"; across participants {told} ({words.p(difference['p_value'])})"
+    if difference.p_value is not None:
+        told = "this is not chance" if difference.p_value < alpha else "this can’t be told from chance"
+        statement += f"; across participants {told} ({words.p(difference.p_value)})"
     return Headline(f"{statement}.", f"{size}. {_tests([question])}")
 
 
-def _of_several(known: Sequence[Result], alpha: float) -> Headline:
+def _of_several(known: Sequence[tuple[Question, MethodDifference]], alpha: float) -> Headline:
     """In how many questions one method was rated higher."""
-    first, second = _methods(known[0])
-    up = [question for question in known if question["difference"]["mean"] > 0]
-    down = [question for question in known if question["difference"]["mean"] < 0]
+    first, second = _two_of(known[0][1])
+    up = [difference for _, difference in known if (difference.mean or 0.0) > 0]
+    down = [difference for _, difference in known if (difference.mean or 0.0) < 0]
+    tests = _tests([question for question, _ in known])
     if len(down) > len(up):
         first, second, up = second, first, down
     if not up:
-        return Headline(f"{words.sentence(first)} and {second} were rated alike on average.", _tests(known))
-    clear = sum(1 for question in up if _significant(question, alpha))
+        return Headline(f"{words.sentence(first)} and {second} were rated alike on average.", tests)
+    clear = sum(difference.p_value is not None and difference.p_value < alpha for difference in up)
     return Headline(
         f"{words.sentence(first)} was rated higher than {second} in {len(up)} of "
         f"{counted(len(known), 'question')}, in {clear or 'none'} of them significantly at {alpha:g} across "
-        f"{counted(known[0]['participants'], 'participant')}.",
-        _tests(known),
+        f"{counted(known[0][0].participants, 'participant')}.",
+        tests,
     )
 
 
-def _methods(question: Result) -> tuple[str, str]:
+def _two_of(difference: MethodDifference) -> tuple[str, str]:
     """The two methods of a difference, which `rating_anova` names as "a minus b"."""
-    first, _, second = str(question["difference"]["of"]).partition(" minus ")
+    first, _, second = difference.of.partition(" minus ")
     return words.readable(first), words.readable(second)
 
 
-def _significant(question: Result, alpha: float) -> bool:
-    """By each participant's own difference, the corrected test."""
-    p_value = question["difference"]["p_value"]
-    return p_value is not None and p_value < alpha
-
-
-def _tests(questions: Sequence[Result]) -> str:
+def _tests(questions: Sequence[Question]) -> str:
     """The tests of every question: as published and over participants."""
     parts = []
     for question in questions:
-        found = [f"as published {_f(question['anova'][0])}"] if question["anova"] else []
-        if question["difference"] and question["difference"]["p_value"] is not None:
-            found.append(f"over participants {_difference(question['difference'])}")
+        found = [f"as published {_f(question.anova[0], question.anova[0].p_value)}"] if question.anova else []
+        if question.difference and question.difference.p_value is not None:
+            found.append(f"over participants {_difference(question.difference)}")
         found += _omnibus(question)
-        name = words.sentence(words.readable(question["item"]) or "rating")
+        name = words.sentence(words.readable(question.item) or "rating")
         parts.append(f"{name}: {'; '.join(found) or 'no test can be made'}.")
     return " ".join(parts)
 
 
-def _omnibus(question: Result) -> list[str]:
+def _omnibus(question: Question) -> list[str]:
     """Whether more than two methods differ at all, by participants' means and by ranks."""
-    if len(question["differences"]) < 2:
+    if len(question.differences) < 2:
         return []
-    ranks = question["ranks"]["participants"]
-    effects = [row for row in question["mixed_design"]["effects"] if row["source"] == "method"]
+    ranks = question.ranks.participants
+    effects = [row for row in question.mixed_design.effects if row.source == "method"]
     found = [
-        f"all methods over participants {_f({**row, 'p_value': row['corrected_p_value']})} (corrected by Greenhouse "
-        "and Geisser)"
+        f"all methods over participants {_f(row, row.corrected_p_value)} (corrected by Greenhouse and Geisser)"
         for row in effects
     ]
-    return [*found, *([f"by ranks (Friedman) {words.p(ranks['p_value'])}"] if ranks else [])]
+    return [*found, *([f"by ranks (Friedman) {words.p(ranks.p_value)}"] if ranks else [])]
 
 
-def _f(row: Result) -> str:
-    if row["f"] is None:
+def _f(row: VarianceEffect | WithinEffect, p_value: float | None) -> str:
+    if row.f is None or p_value is None:
         return "no F, for the ratings do not vary"
-    degrees = f"{row['degrees_of_freedom']}, {row['error_degrees_of_freedom']}"
-    return f"F({degrees}) = {row['f']:.2f}, {words.p(row['p_value'])}"
+    degrees = f"{row.degrees_of_freedom}, {row.error_degrees_of_freedom}"
+    return f"F({degrees}) = {row.f:.2f}, {words.p(p_value)}"
 
 
-def _difference(found: Result) -> str:
-    text = words.decimals(found["mean"], 2)
-    if found["t"] is None:
-        tested = found["p_value"] is not None
-        return f"{text} for every participant, {found['test']} {words.p(found['p_value'])}" if tested else text
-    interval = f"[{words.bare_interval(found, 2)}]"
-    return f"{text} {interval}, t({found['degrees_of_freedom']}) = {words.decimals(found['t'], 2)}, {_p_of(found)}"
+def _difference(found: MethodDifference) -> str:
+    text = words.decimals(found.mean, 2)
+    if found.t is None:
+        return text if found.p_value is None else f"{text} for every participant, {found.test} {words.p(found.p_value)}"
+    interval = f"[{words.bare_interval(found.low, found.high, 2)}]"
+    return f"{text} {interval}, t({found.degrees_of_freedom}) = {words.decimals(found.t, 2)}, {_p_of(found)}"
 
 
-def _p_of(difference: Result) -> str:
+def _p_of(difference: MethodDifference) -> str:
     """The p-value of a difference, adjusted where there are several."""
-    adjusted = difference["holm_p_value"] > difference["p_value"]
-    return f"{words.p(difference['holm_p_value'])} adjusted by Holm" if adjusted else words.p(difference["p_value"])
+    raw, adjusted = difference.p_value or 0.0, difference.holm_p_value or 0.0
+    return f"{words.p(adjusted)} adjusted by Holm" if adjusted > raw else words.p(raw)
 
 
-def _notes(question: Result) -> list[str]:
+def _notes(question: Question) -> list[str]:
     """Why something could not be had."""
-    parts = [
-        question["note"],
-        *(question[key]["note"] for key in ("mixed_design", "ranks", "ordinal") if question[key]),
-    ]
+    parts = [question.note, question.mixed_design.note, question.ranks.note]
+    parts += [question.ordinal.note] if question.ordinal else []
     return [f"{words.sentence(note)}." for note in parts if note]
 
 
-def _readings(variance: Sequence[Result]) -> list[dict[str, Any]]:
-    return [
-        {
-            "result": f"{words.readable(question['item']) or 'rating'}: {words.readable(difference['of'])}",
-            "published": _f(question["anova"][0]) if question["anova"] else "–",
-            "corrected": _difference(difference) if difference["mean"] is not None else "–",
-        }
-        for question in variance
-        for difference in question["differences"]
-    ]
+def _readings(questions: Sequence[Question]) -> Iterator[Reading]:
+    for question in questions:
+        published = _f(question.anova[0], question.anova[0].p_value) if question.anova else "–"
+        name = words.readable(question.item) or "rating"
+        for difference in question.differences:
+            corrected = _difference(difference) if difference.mean is not None else "–"
+            yield Reading(f"{name}: {words.readable(difference.of)}", published, corrected)
 
 
 # Tables
 
 
-def means_table(name: str, rows: Sequence[Result]) -> Table:
+def means_table(name: str, rows: Sequence[MethodRating]) -> Table:
     """Return mean ratings by question and method."""
     return tables.make(
         f"{name}_ratings",
         "Ratings by question and method. Mean over participants of their means, with its standard error and 95% "
         "interval (Student’s t); standard deviation and median of all answers.",
         "item method answers participants mean standard_error low high standard_deviation median",
-        [{**row, "item": words.readable(row["item"]), "method": words.readable(row["method"])} for row in rows],
+        [_readable(row) for row in rows],
     )
 
 
@@ -236,11 +212,17 @@ _VARIANCE = "item source degrees_of_freedom error_degrees_of_freedom"
 _EFFECT = "partial_eta_squared partial_omega_squared effect_low effect_high"
 
 
-def _by_question(questions: Sequence[Result], rows_of: Callable[[Result], Sequence[Result]]) -> list[dict[str, Any]]:
-    return [{**row, "item": words.readable(question["item"])} for question in questions for row in rows_of(question)]
+def _readable(row: MeanRating) -> dict[str, Any]:
+    return vars(row) | {"item": words.readable(row.item), "method": words.readable(row.method)}
 
 
-def variance_table(name: str, questions: Sequence[Result]) -> Table:
+def _by_question(
+    questions: Sequence[Question], rows_of: Callable[[Question], Sequence[object]]
+) -> list[dict[str, Any]]:
+    return [vars(row) | {"item": words.readable(question.item)} for question in questions for row in rows_of(question)]
+
+
+def variance_table(name: str, questions: Sequence[Question]) -> Table:
     """Return the analysis of variance as published."""
     return tables.make(
         f"{name}_anova",
@@ -249,49 +231,49 @@ def variance_table(name: str, questions: Sequence[Result]) -> Table:
         "type III sums of squares. It takes the ratings of one participant for independent; the next table does not. "
         "Effect sizes with 90% intervals.",
         f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
-        _by_question(questions, lambda question: question["anova"]),
+        _by_question(questions, lambda question: question.anova),
     )
 
 
-def difference_table(name: str, questions: Sequence[Result]) -> Table:
+def difference_table(name: str, questions: Sequence[Question]) -> Table:
     """Return the difference of the methods over participants."""
     return tables.make(
         f"{name}_differences",
         "Corrected: difference of each participant’s own ratings of two methods. Mean, 95% interval, and t test (the "
         "exact sign test where all participants differ alike); p-values of several pairs adjusted by Holm’s method.",
         "item of mean low high t degrees_of_freedom p_value holm_p_value",
-        _by_question(questions, lambda question: question["differences"]),
+        _by_question(questions, lambda question: question.differences),
     )
 
 
-def _folded(name: str, variance: Sequence[Result], cells: Sequence[Result]) -> list[Table]:
+def _folded(name: str, result: Ratings) -> list[Table]:
     """The cells of the design, and whatever other analyses could be made; those without a row are left out."""
     cells_table = tables.make(
         f"{name}_cells",
         "Ratings by method and by order of presentation. Order: the method that a participant saw first. Means over "
         "participants with standard errors and 95% intervals (Student’s t).",
         "item method order answers participants mean standard_error low high",
-        [{**row, **{key: words.readable(row[key]) for key in ("item", "method", "order")}} for row in cells],
+        [_readable(row) | {"order": words.readable(row.order)} for row in result.cells],
     )
     type_ii = tables.make(
         f"{name}_anova_type_ii",
         "The published analysis by type II sums of squares. It differs where the cells hold unequal numbers of "
         "answers.",
         f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
-        _by_question(variance, lambda question: question["type_ii"] or []),
+        _by_question(result.questions, lambda question: question.type_ii or ()),
     )
     mixed = tables.make(
         f"{name}_mixed_design",
         "Mixed design: participants as random. Methods (and motions, where everybody rated all) vary within "
         "participants, the order between them; p corrected by Greenhouse and Geisser’s epsilon.",
         f"{_VARIANCE} f p_value epsilon corrected_p_value generalized_eta_squared {_EFFECT}",
-        _by_question(variance, lambda question: question["mixed_design"]["effects"]),
+        _by_question(result.questions, lambda question: question.mixed_design.effects),
     )
     ranks = tables.make(
         f"{name}_ranks",
         "The same on ranks. The published design by ANOVA-type statistics, and the methods over participants.",
         "item source test f chi_square degrees_of_freedom error_degrees_of_freedom p_value",
-        _by_question(variance, _rank_rows),
+        [row for question in result.questions for row in _rank_rows(question)],
         headings={"source": "effect"},
     )
     ordinal = tables.make(
@@ -299,27 +281,40 @@ def _folded(name: str, variance: Sequence[Result], cells: Sequence[Result]) -> l
         "Ordinal mixed model. Points of the scale as ordered only, participants as random: effects in logits (above 0: "
         "rated higher), as odds ratios, with 95% intervals.",
         "item effect value standard_error low high odds_ratio p_value",
-        _by_question(variance, lambda question: _ordinal_rows(question["ordinal"] or {})),
+        [
+            vars(effect)
+            | {"item": words.readable(question.item), "effect": words.readable(effect.name)}
+            | {"low": effect.interval.low, "high": effect.interval.high}
+            for question in result.questions
+            if question.ordinal
+            for effect in question.ordinal.effects
+        ],
         headings={"value": "logits"},
     )
     return [table for table in (cells_table, type_ii, mixed, ranks, ordinal) if table.rows]
 
 
-def _rank_rows(question: Result) -> list[dict[str, Any]]:
-    ranks = question["ranks"]
-    rows = [{**row, "test": "ANOVA-type"} for row in ranks["between"]]
-    return [
-        *rows,
-        *([{"source": "method, over participants", **ranks["participants"]}] if ranks["participants"] else []),
-    ]
+def _rank_rows(question: Question) -> list[dict[str, Any]]:
+    item, over = {"item": words.readable(question.item)}, question.ranks.participants
+    rows = [vars(row) | item | {"test": "ANOVA-type"} for row in question.ranks.between]
+    return [*rows, vars(over) | item | {"source": "method, over participants"}] if over else rows
 
 
-def _ordinal_rows(ordinal: Result) -> list[dict[str, Any]]:
-    return [
-        {
-            **effect,
-            "effect": words.readable(effect["name"]),
-            **{end: effect["interval"][end] for end in ("low", "high")},
-        }
-        for effect in ordinal.get("effects", ())
-    ]
+# Beside the section
+
+
+def _main_results(result: Ratings, study: str) -> Iterator[MainResult]:
+    for rated in result.table:
+        what = words.readable(": ".join(filter(None, (rated.item, rated.method))))
+        yield MainResult(f"{words.readable(study)}: {what}", rated.mean, rated.low, rated.high)
+
+
+def _methods(found: Collection[Ratings], analysis: Analysis) -> str:
+    del found, analysis
+    return (
+        "Ratings were compared by the two-way between-subjects analysis of variance of 2003 (method by order; type "
+        "III sums of squares), and by Student’s t of each participant’s own difference."
+    )
+
+
+KIND = SectionKind(ratings_section, _main_results, _methods, lambda _: {WANG_2003})

@@ -9,18 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from study.analysis.ratings.pairs import PairQuestion, ScoreTest
 from study.report.drawing import BLUE, INK, ORANGE, RULE, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
 from study.report.words import readable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Result = Mapping[str, Any]
 LEAST_LABELLED = 5.0
 """A part of a bar that is narrower has no room for its count. [percent]"""
 
 
-def likert_figure(questions: Sequence[Result], name: str, mark: str, ends: Mapping[str, tuple[str, str]]) -> str:
+def likert_figure(questions: Sequence[PairQuestion], name: str, mark: str, ends: Mapping[str, tuple[str, str]]) -> str:
     """Return the figure.
 
     Parameters
@@ -34,19 +34,19 @@ def likert_figure(questions: Sequence[Result], name: str, mark: str, ends: Mappi
     ends
         Words at the lowest and highest point of the scale, by question.
     """
-    points = len(questions[0]["distribution"])
+    points = len(questions[0].distribution)
     places = [-float(row) for row in range(len(questions))]
     with style():
         figure, (bars, means) = new_figure(7.2, 0.62 * len(questions) + 1.35, 1, 2, width_ratios=(1.9, 1), sharey=True)
         widest = max(_bar(bars, question, at, points) for question, at in zip(questions, places, strict=True))
         for question, at in zip(questions, places, strict=True):
-            _mean(means, question["participants"], at)
-        bars.set_yticks(places, [_label(question["item"], ends) for question in questions])
+            _mean(means, question.participants, at)
+        bars.set_yticks(places, [_label(question.item, ends) for question in questions])
         bars.set_ylim(places[-1] - 0.6, 0.6)
         _percent_axis(bars, widest, questions[0])
         means.set_xlim(-0.15, points - 0.85)
         means.set_xticks(range(points))
-        means.axvline(questions[0]["middle"], color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
+        means.axvline(questions[0].middle, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
         means.set_xlabel("mean score")
         quiet_grid(means, "x")
         for axes in (bars, means):
@@ -74,10 +74,10 @@ def shades(points: int) -> list[str]:
     return found
 
 
-def _bar(axes: Axes, question: Result, at: float, points: int) -> float:
+def _bar(axes: Axes, question: PairQuestion, at: float, points: int) -> float:
     """One question's bar; how far it reaches from the middle, percent."""
-    counts = list(question["distribution"].values())
-    shares = [100 * count / question["answers"] for count in counts]
+    counts = list(question.distribution.values())
+    shares = [100 * count / question.answers for count in counts]
     middle = (points - 1) / 2
     left = -sum(share for point, share in enumerate(shares) if point < middle)
     left -= shares[int(middle)] / 2 if middle.is_integer() else 0.0
@@ -91,21 +91,21 @@ def _bar(axes: Axes, question: Result, at: float, points: int) -> float:
     return reach
 
 
-def _percent_axis(axes: Axes, widest: float, question: Result) -> None:
+def _percent_axis(axes: Axes, widest: float, question: PairQuestion) -> None:
     """Percentages to both sides of the middle, and which side favours whom."""
     edge = min(100, 25 * -(-int(widest + 0.999) // 25))
     steps = range(-edge, edge + 1, 25 if edge <= 75 else 50)
     axes.set_xlim(-edge - 3, edge + 3)
     axes.set_xticks(list(steps), [f"{abs(step)}{'%' if step == steps[-1] else ''}" for step in steps])
     axes.axvline(0, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=0)
-    axes.set_xlabel(f"← {readable(question['method_a'])} · answers for · {readable(question['method_b'])} →")
+    axes.set_xlabel(f"← {readable(question.method_a)} · answers for · {readable(question.method_b)} →")
 
 
-def _mean(axes: Axes, found: Result, at: float) -> None:
-    if found["low"] is not None:
-        axes.plot([found["low"], found["high"]], [at, at], color=BLUE, linewidth=2)
-    axes.plot([found["mean"]], [at], "s", color=BLUE, markersize=5.5)
-    axes.annotate(f"{found['mean']:.2f}", (found["mean"], at), xytext=(0, 6), textcoords="offset points",
+def _mean(axes: Axes, found: ScoreTest, at: float) -> None:
+    if found.low is not None and found.high is not None:
+        axes.plot([found.low, found.high], [at, at], color=BLUE, linewidth=2)
+    axes.plot([found.mean], [at], "s", color=BLUE, markersize=5.5)
+    axes.annotate(f"{found.mean:.2f}", (found.mean, at), xytext=(0, 6), textcoords="offset points",
                   ha="center", fontsize=8.5, color=INK)  # fmt: skip
 
 
@@ -121,9 +121,9 @@ def _keys(points: int) -> list[Any]:
     return [Patch(facecolor=colour, label=str(point)) for point, colour in enumerate(shades(points))]
 
 
-def _spoken(questions: Sequence[Result]) -> str:
+def _spoken(questions: Sequence[PairQuestion]) -> str:
     parts = []
     for question in questions:
-        counts = ", ".join(f"{count} at {point}" for point, count in question["distribution"].items())
-        parts.append(f"{readable(question['item'] or 'rating')}: {counts}; mean {question['participants']['mean']:.2f}")
+        counts = ", ".join(f"{count} at {point}" for point, count in question.distribution.items())
+        parts.append(f"{readable(question.item or 'rating')}: {counts}; mean {question.participants.mean:.2f}")
     return "; ".join(parts)

@@ -1,0 +1,154 @@
+"""Answers of a same-different task counted by participant and difference, and the percentages of 2004 Figure 6."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.analysis import estimates
+from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+Side = Literal["shorter", "longer"]
+SIDES: tuple[Side, Side] = ("shorter", "longer")
+
+NEEDED_COLUMNS = ("participant", "difference_frames", "answer")
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Answers counted by participant and level.
+
+    Attributes
+    ----------
+    participants
+        In the order of the rows below.
+    differences : ndarray, shape (levels,)
+        Signed difference in blend length, frames, rising: comparison minus reference.
+    different, shown : ndarray, shape (participants, levels)
+        Answers "different", and all answers given; missed answers are in neither.
+    """
+
+    participants: tuple[str, ...]
+    differences: FloatArray
+    different: FloatArray
+    shown: FloatArray
+
+
+@dataclass(frozen=True)
+class PercentDifferent:
+    """How often a difference was seen (a point of 2004 Figure 6).
+
+    Attributes
+    ----------
+    difference_frames
+        Signed difference in blend length.
+    participants, answers, different
+        How many answered, how often, and how many of these answers were "different".
+    percent, standard_error
+        Mean over participants of their percentages, and its standard error; None for one participant.
+    low, high
+        Wilson's interval of the answers as if independent, in percent: it says something even where all answers agree.
+    note
+        Why there is no standard error.
+    """
+
+    difference_frames: float
+    participants: int
+    answers: int
+    different: int
+    percent: float
+    standard_error: float | None
+    low: float | None
+    high: float | None
+    note: str
+
+
+def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers given in same-different tasks, missed ones left out.
+
+    Raises
+    ------
+    AnalysisError
+        When a column is missing, or an answer is neither "same" nor "different".
+    """
+    estimates.check_columns(answers, NEEDED_COLUMNS, "a same-different analysis")
+    chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
+    given = chosen[chosen["answer"].notna() & chosen["difference_frames"].notna()]
+    estimates.check_participants(given)
+    strange = sorted(set(given["answer"].astype(str)) - {"same", "different"})
+    if strange:
+        raise AnalysisError(f'expected the answers "same" and "different", found {strange[0]!r}; recode the column')
+    return given
+
+
+def count_answers(answers: pd.DataFrame) -> Counts:
+    """Count answers by participant and signed difference in blend length."""
+    import pandas as pd
+
+    given = same_different_answers(answers)
+    if given.empty:
+        nothing = np.zeros((0, 0))
+        return Counts((), np.zeros(0), nothing, nothing)
+    yes = (given["answer"] == "different").astype(float)
+    differences = estimates.numbers(given["difference_frames"], "difference_frames")
+    if not np.isfinite(differences).all():
+        raise AnalysisError("expected finite numbers in difference_frames, found an infinite one; leave out that row")
+    groups = yes.groupby([given["participant"].astype(str), pd.Series(differences, index=given.index)])
+    shown, different = groups.size().unstack(fill_value=0), groups.sum().unstack(fill_value=0)
+    return Counts(
+        tuple(str(name) for name in shown.index),
+        shown.columns.to_numpy(dtype=np.float64),
+        different.to_numpy(dtype=np.float64),
+        shown.to_numpy(dtype=np.float64),
+    )
+
+
+def both_sides(differences: FloatArray) -> FloatArray:
+    """Return sizes of the differences, shape (levels, 2): where it is shorter, and where longer; 0 elsewhere."""
+    return np.column_stack([np.maximum(-differences, 0.0), np.maximum(differences, 0.0)])
+
+
+def frames_by_side(differences: FloatArray) -> tuple[FloatArray, list[int]]:
+    """Return sizes of the differences in a column a side that was shown, and these sides."""
+    both = both_sides(differences)
+    sides = [index for index in range(2) if both[:, index].any()]
+    return both[:, sides], sides
+
+
+def percentages(counts: Counts) -> FloatArray:
+    """Return the share of "different" of every participant and level; NaN where a participant gave no answer."""
+    share = np.full(counts.shown.shape, np.nan)
+    np.divide(counts.different, counts.shown, out=share, where=counts.shown > 0)
+    return share
+
+
+def percent_different(counts: Counts, confidence: float = 0.95) -> tuple[PercentDifferent, ...]:
+    """Return percent "different" by signed difference in blend length (2004 Figure 6)."""
+    rows = []
+    for share, difference, different, shown in zip(
+        percentages(counts).T, counts.differences, counts.different.sum(axis=0), counts.shown.sum(axis=0), strict=True
+    ):
+        share = share[np.isfinite(share)]
+        interval = estimates.wilson_interval(different, shown, confidence)
+        rows.append(
+            PercentDifferent(
+                difference_frames=float(difference),
+                participants=len(share),
+                answers=int(shown),
+                different=int(different),
+                percent=100 * float(share.mean()),
+                standard_error=100 * float(share.std(ddof=1)) / math.sqrt(len(share)) if len(share) > 1 else None,
+                low=None if interval.low is None else 100 * interval.low,
+                high=None if interval.high is None else 100 * interval.high,
+                note="" if len(share) > 1 else "one participant: no spread to judge by",
+            )
+        )
+    return tuple(rows)

@@ -1,0 +1,122 @@
+"""Whether the order of presentation matters in a same-different task: answers in, shares by order and tests out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from study.analysis import estimates
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class OrderShare:
+    """Percent "different", at pairs with a difference, where the reference came first or second."""
+
+    reference_first: bool
+    answers: int
+    percent: float
+
+
+@dataclass(frozen=True)
+class OrderTest:
+    """Test that a pair is answered alike in both orders.
+
+    Attributes
+    ----------
+    difference_percent, low, high
+        Share "different" where the reference came first, less where second: mean over participants and levels.
+    t, degrees_of_freedom, p_value
+        Of that mean, over participants.
+    chi_square, chi_square_degrees_of_freedom, chi_square_p_value
+        Likelihood ratio over levels, answers as independent.
+    note
+        Why something can't be given.
+    """
+
+    difference_percent: float | None = None
+    low: float | None = None
+    high: float | None = None
+    t: float | None = None
+    degrees_of_freedom: int | None = None
+    p_value: float | None = None
+    chi_square: float | None = None
+    chi_square_degrees_of_freedom: int | None = None
+    chi_square_p_value: float | None = None
+    note: str = ""
+
+
+def shares_by_order(given: pd.DataFrame) -> tuple[OrderShare, ...]:
+    """Return the share of "different" where the reference came first and where it came second.
+
+    Under the differencing rule the order does not matter; a gap points to a drift between first and second, or to
+    another rule.
+    """
+    if "reference_first" not in given.columns:
+        return ()
+    known = given[given["reference_first"].notna() & (given["difference_frames"] != 0)]
+    return tuple(
+        OrderShare(bool(first), len(part), 100 * int((part["answer"] == "different").sum()) / len(part))
+        for first, part in known.groupby(known["reference_first"].astype(bool), sort=True)
+    )
+
+
+def order_test(given: pd.DataFrame) -> OrderTest:
+    """Test that a pair is answered alike in both orders, as both rules have it.
+
+    Parameters
+    ----------
+    given
+        Answers with `participant`, `difference_frames`, `reference_first`, `answer`; pairs without a difference have
+        no order.
+    """
+    if "reference_first" not in given.columns or given["reference_first"].isna().all():
+        return OrderTest(note="the order of presentation is not known")
+    known = given[given["reference_first"].notna() & (given["difference_frames"] != 0)]
+    different = (known["answer"] == "different").astype(float)
+    first = known["reference_first"].astype(bool)
+    if first.all() or not first.any():
+        return OrderTest(note="every pair came in one and the same order")
+    keys = [known["participant"].astype(str), known["difference_frames"], first]
+    shares = different.groupby(keys).mean().unstack().dropna()
+    gaps = (shares[True] - shares[False]).groupby(level=0).mean().to_numpy(dtype=np.float64)
+    test = estimates.mean_test(100 * gaps, 0.0)
+    found = OrderTest(
+        difference_percent=test.mean,
+        low=test.interval.low,
+        high=test.interval.high,
+        t=test.statistic,
+        degrees_of_freedom=test.degrees_of_freedom,
+        p_value=test.p_value,
+        note=test.note,
+    )
+    return _with_ratio(found, different, known["difference_frames"], first)
+
+
+def _with_ratio(
+    found: OrderTest, different: pd.Series[float], levels: pd.Series[float], first: pd.Series[bool]
+) -> OrderTest:
+    """The test with the likelihood ratio of a share a level and order against one a level."""
+
+    def log_likelihood(keys: list[pd.Series[Any]]) -> tuple[float, int]:
+        from scipy.special import xlogy
+
+        sums = different.groupby(keys).agg(["sum", "count"])
+        yes, shown = sums["sum"].to_numpy(dtype=np.float64), sums["count"].to_numpy(dtype=np.float64)
+        return float((xlogy(yes, yes / shown) + xlogy(shown - yes, 1 - yes / shown)).sum()), len(yes)
+
+    (free, cells), (held, fewer) = log_likelihood([levels, first]), log_likelihood([levels])
+    freedom = cells - fewer
+    if freedom < 1:
+        return found
+    ratio = max(2 * (free - held), 0.0)
+    return replace(
+        found,
+        chi_square=ratio,
+        chi_square_degrees_of_freedom=freedom,
+        chi_square_p_value=estimates.chi_square_probability(ratio, freedom),
+    )

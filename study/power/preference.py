@@ -1,0 +1,130 @@
+"""The effect of a preference study: a share of answers for the first method, over participants who differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from study.analysis.preference.analyse import Preference
+from study.analysis.preference.participants import default_p_values
+from study.errors import AnalysisError
+from study.models.choice import PreferenceObserver
+from study.power.curve import Run
+from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
+from study.tasks.observer import ObserverSettings, default_observer
+
+if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
+    from study.experiment.protocol.studies import AnalysisSettings
+    from study.experiment.protocol.whole import StudySpec
+
+
+def preference_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
+    """Return a mean share over participants, their correlation, and what being shown first adds."""
+    share, correlation, bias, alpha = options["share"], options["correlation"], options["order_bias"], decided.alpha
+    return Effect(
+        observer=preference_observer(study, share, correlation, bias, options["missed"]),
+        stated={"share": share, "correlation": correlation, "order_bias": bias},
+        icc=correlation,
+        test=f"Student's t over participants at {alpha:g}",
+        aim=f"find a preference of {100 * share:g}% at the level {alpha:g}",
+        study=lambda design: preference_study(design, alpha, share),
+        found=lambda analysis: preference_found(analysis, study.name, share, alpha),
+    )
+
+
+def preference_found(analysis: Analysis, name: str, share: float, alpha: float) -> bool:
+    """Return whether the default test found the preference, in the right direction."""
+    result = analysis.of(Preference).get(name)
+    test = result.comparisons[0].participants if result and result.comparisons else None
+    if test is None or test.p_value is None or test.mean_percent is None:
+        return False
+    return test.p_value < alpha and (share == 0.5 or (test.mean_percent > 50) == (share > 0.5))
+
+
+def preference_observer(
+    study: StudySpec, share: float, correlation: float, order_bias: float, missed: float
+) -> ObserverSettings:
+    """An observer whose shares over participants have this mean and intraclass correlation, orders balanced."""
+    mean, spread = logit_normal(share, correlation, order_bias)
+    utility: dict[str, float] = {study.reference: mean, study.comparison or "": 0.0}
+    preference = PreferenceObserver(utility=utility, order_bias=order_bias, lapse=0.0, participant_sd=spread)
+    return replace(default_observer(), preference=preference, missed=missed)
+
+
+def logit_normal(share: float, correlation: float, order_bias: float = 0.0) -> tuple[float, float]:
+    """Return mean and standard deviation, in logits, of participants with this mean share and correlation.
+
+    Parameters
+    ----------
+    share
+        Mean share over participants, between 0 and 1.
+    correlation
+        Intraclass correlation of their answers: variance of the participants' shares over share x (1 - share).
+    order_bias
+        Logits for what is shown first; shares are the means of both orders.
+
+    Raises
+    ------
+    AnalysisError
+        When share or correlation can't be.
+    """
+    if not 0 < share < 1 or not 0 <= correlation <= 0.9:
+        raise AnalysisError(
+            f"expected a share between 0 and 1 and a correlation from 0 to 0.9, found {share:g} and {correlation:g}"
+        )
+    from scipy.optimize import brentq
+    from scipy.special import expit
+
+    points, weights = np.polynomial.hermite_e.hermegauss(61)
+    weights = weights / weights.sum()
+
+    def shares(mean: float, spread: float) -> FloatArray:
+        both = [expit(mean + spread * points + bias) for bias in (order_bias, -order_bias)]
+        return np.asarray(np.mean(both, axis=0), dtype=np.float64)
+
+    def mean_for(spread: float) -> float:
+        return float(brentq(lambda mean: float(weights @ shares(mean, spread)) - share, -60, 60))
+
+    def excess(spread: float) -> float:
+        own = shares(mean_for(spread), spread)
+        return float(weights @ (own - share) ** 2) / (share * (1 - share)) - correlation
+
+    if correlation == 0:
+        return mean_for(0.0), 0.0
+    spread = float(brentq(excess, 1e-6, 25.0))
+    return mean_for(spread), spread
+
+
+def preference_study(design: Design, alpha: float, share: float) -> Run:
+    """Whether the test over participants finds the preference, in the right direction (2004 section 5.2)."""
+    trials, typical = design.trials(), design.settings.preference
+    signs = np.array([[1.0 if trial.a_first else -1.0 for trial in own] for own in trials])
+    lean = typical.utility[design.study.reference] - typical.utility.get(design.study.comparison or "", 0.0)
+
+    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        from scipy.special import expit
+
+        people = max(sizes)
+        own = lean + typical.participant_sd * rng.standard_normal((studies, people, 1))
+        chance = expit(own + typical.order_bias * signs[:people])
+        chose_a = rng.random(chance.shape) < chance
+        response_s, given = times(design, rng, np.abs(2 * chance - 1))
+        kept = kept_of(design, rng, response_s, given)
+        chosen, shown = (chose_a & kept).sum(axis=2), kept.sum(axis=2)
+        return np.column_stack(
+            [_found(chosen[:, :size].astype(float), shown[:, :size].astype(float), share, alpha) for size in sizes]
+        )
+
+    return run
+
+
+def _found(chosen: FloatArray, shown: FloatArray, share: float, alpha: float) -> BoolArray:
+    """Significant, and towards the method that is really favoured (either way where none is)."""
+    people = np.maximum((shown > 0).sum(axis=1), 1)
+    mean = (chosen / np.maximum(shown, 1)).sum(axis=1) / people
+    towards = (mean > 0.5) == (share > 0.5) if share != 0.5 else np.ones(len(chosen), dtype=bool)
+    return np.asarray((default_p_values(chosen, shown) < alpha) & towards)

@@ -1,0 +1,133 @@
+"""The effect of a rating study: points by which one method is rated higher, by participants who differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from study.analysis.estimates import student_p_values
+from study.analysis.ratings.analyse import PairRatings, Ratings
+from study.models.choice import PreferenceObserver
+from study.models.ordinal import RatingObserver
+from study.power.curve import Run
+from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
+from study.tasks.observer import ObserverSettings, default_observer
+from study.tasks.registry import task_of
+
+if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
+    from study.experiment.protocol.studies import AnalysisSettings
+    from study.experiment.protocol.whole import StudySpec
+
+
+def rating_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
+    """Return a difference in points between the methods, and the correlation of a participant's ratings."""
+    difference, correlation, alpha = options["difference"], options["correlation"], decided.alpha
+    paired = task_of(study).slots > 1
+    found = pair_rating_found if paired else rating_found
+    return Effect(
+        observer=rating_observer(study, difference, correlation, options["missed"]),
+        stated={"difference": difference, "correlation": correlation},
+        icc=correlation,
+        test=f"Student's t of participants' {'mean scores' if paired else 'differences'} at {alpha:g}, one question",
+        aim=f"find a difference of {difference:g} points in one question at the level {alpha:g}",
+        study=lambda design: rating_study(design, alpha, difference),
+        found=lambda analysis: found(analysis, study, difference, alpha),
+    )
+
+
+def rating_found(analysis: Analysis, study: StudySpec, difference: float, alpha: float) -> bool:
+    """Return whether the test of the first question found the difference, in the right direction."""
+    result = analysis.of(Ratings).get(study.name)
+    test = result.questions[0].difference if result and result.questions else None
+    if test is None or test.p_value is None or test.mean is None:
+        return False
+    # Differences are of the later method by name from the earlier; the effect is of the comparison.
+    sign = 1 if test.of.startswith(f"{study.comparison} minus") else -1
+    return test.p_value < alpha and (difference == 0 or (sign * test.mean > 0) == (difference > 0))
+
+
+def pair_rating_found(analysis: Analysis, study: StudySpec, difference: float, alpha: float) -> bool:
+    """Return whether the test of the first question against the middle of the scale found the difference."""
+    result = analysis.of(PairRatings).get(study.name)
+    test = result.questions[0].participants if result and result.questions else None
+    if test is None or test.p_value is None or test.t is None:
+        return False
+    return test.p_value < alpha and (difference == 0 or (test.t > 0) == (difference > 0))
+
+
+def rating_observer(study: StudySpec, difference: float, correlation: float, missed: float) -> ObserverSettings:
+    """An observer who rates the comparison higher by `difference` points before they are rounded to the scale."""
+    typical = RatingObserver()
+    spread = typical.noise_sd * np.sqrt(correlation / (1 - correlation))
+    utility: dict[str, float] = {study.comparison or "": difference / typical.utility_weight}
+    return replace(
+        default_observer(),
+        preference=PreferenceObserver(utility=utility),
+        rating=replace(typical, participant_sd=float(spread)),
+        missed=missed,
+    )
+
+
+def rating_study(design: Design, alpha: float, difference: float) -> Run:
+    """Whether the t test over participants finds how the methods differ, for one question.
+
+    Of each participant's own difference of the two methods' ratings; where pairs are rated, of the mean score less the
+    middle of the scale.
+    """
+    if task_of(design.study).slots > 1:
+        return _pair_rating_study(design, alpha, difference)
+    trials, rating = design.trials(), design.settings.rating
+    sides = np.array([[1.0 if trial.methods[0] == design.study.comparison else 0.0 for trial in own] for own in trials])
+    points = design.study.scale_points
+
+    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        people = max(sizes)
+        leniency = rating.participant_sd * rng.standard_normal((studies, people, 1))
+        middle = (points - 1) / 2 + difference * sides[:people] + leniency
+        given = np.clip(np.round(middle + rating.noise_sd * rng.standard_normal(middle.shape)), 0, points - 1)
+        response_s, answered = times(design, rng, np.full(middle.shape, 0.5))
+        kept = kept_of(design, rng, response_s, answered)
+        means, seen = [], np.ones(kept.shape[:2], dtype=bool)
+        for side in (1.0, 0.0):
+            rows = kept & (sides[:people] == side)
+            count = rows.sum(axis=2)
+            seen &= count > 0
+            means.append((given * rows).sum(axis=2) / np.maximum(count, 1))
+        return _apart(means[0] - means[1], seen, sizes, alpha, difference)
+
+    return run
+
+
+def _pair_rating_study(design: Design, alpha: float, difference: float) -> Run:
+    """Scores of the comparison against the reference; whether a trial showed one or the other first changes nothing."""
+    trials, rating = design.trials(), design.settings.rating
+    shown, points = len(trials[0]), design.study.scale_points
+
+    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        people, middle = max(sizes), (points - 1) / 2
+        leaning = middle + difference + rating.participant_sd * rng.standard_normal((studies, people, 1))
+        noise = rating.noise_sd * rng.standard_normal((studies, people, shown))
+        given = np.clip(np.round(leaning + noise), 0, points - 1)
+        response_s, answered = times(design, rng, np.full(given.shape, 0.5))
+        kept = kept_of(design, rng, response_s, answered)
+        count = kept.sum(axis=2)
+        apart = (given * kept).sum(axis=2) / np.maximum(count, 1) - middle
+        return _apart(apart, count > 0, sizes, alpha, difference)
+
+    return run
+
+
+def _apart(apart: FloatArray, seen: BoolArray, sizes: Sequence[int], alpha: float, difference: float) -> BoolArray:
+    """Significant, and in the right direction (either way where there is no difference), for each number of people."""
+    found = []
+    for size in sizes:
+        there = seen[:, :size]
+        p_value = student_p_values(apart[:, :size], there, 0.0)
+        mean = (apart[:, :size] * there).sum(axis=1)
+        towards = (mean > 0) == (difference > 0) if difference else np.ones(len(apart), dtype=bool)
+        found.append((p_value < alpha) & towards)
+    return np.column_stack(found)

@@ -1,0 +1,38 @@
+"""What a study of each task is to find, by the task's name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from study.errors import AnalysisError
+from study.power.design import Effect
+from study.power.preference import preference_effect
+from study.power.ratings import rating_effect
+from study.power.same_different import same_different_effect
+
+if TYPE_CHECKING:
+    from study.experiment.protocol.studies import AnalysisSettings
+    from study.experiment.protocol.whole import StudySpec
+
+Make = Callable[["StudySpec", Mapping[str, float], "AnalysisSettings"], Effect]
+"""From a study, the numbers of its effect by name, and what was decided about the analysis."""
+
+EFFECTS: Mapping[str, Make] = {
+    "same-different": same_different_effect,
+    "preference": preference_effect,
+    "rating": rating_effect,
+}
+
+
+def effect_of(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
+    """Return what a study is to find.
+
+    Raises
+    ------
+    AnalysisError
+        When nothing can be planned for its task.
+    """
+    if study.task not in EFFECTS:
+        raise AnalysisError(f"{study.name}: expected one of the tasks {', '.join(EFFECTS)}, found {study.task!r}")
+    return EFFECTS[study.task](study, options, decided)

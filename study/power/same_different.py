@@ -1,0 +1,90 @@
+"""The effect of a same-different study: thresholds, to be told with a stated precision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from study.analysis.same_different.analyse import SameDifferent
+from study.analysis.same_different.counts import Counts
+from study.analysis.same_different.model import ModelFit, fit_model
+from study.experiment.observers import person
+from study.models.population import probability_different
+from study.power.curve import Run
+from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
+from study.tasks.observer import ObserverSettings, default_observer
+
+if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
+    from study.experiment.protocol.studies import AnalysisSettings
+    from study.experiment.protocol.whole import StudySpec
+
+
+def same_different_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
+    """Return thresholds shorter and longer, how participants differ, and how precisely both are to be told."""
+    shorter, longer, spread, precision = (options[name] for name in ("shorter", "longer", "spread", "precision"))
+    return Effect(
+        observer=same_different_observer(shorter, longer, spread, options["missed"]),
+        stated={"shorter": shorter, "longer": longer, "spread": spread, "precision": precision},
+        icc=None,
+        test="width of the differencing model's 95% intervals",
+        aim=f"tell both thresholds to ± {precision:g} frames",
+        study=lambda design: same_different_study(design, precision, decided.threshold),
+        found=lambda analysis: thresholds_found(analysis, study.name, precision),
+        slow=True,
+    )
+
+
+def thresholds_found(analysis: Analysis, name: str, precision: float) -> bool:
+    """Return whether the model's intervals of both thresholds are as narrow as asked."""
+    result = analysis.of(SameDifferent).get(name)
+    return _narrow(result.model if result else None, precision)
+
+
+def _narrow(model: ModelFit | str | None, precision: float) -> bool:
+    ends = [threshold.interval for threshold in model.jnd.values()] if isinstance(model, ModelFit) else []
+    return bool(ends) and all(
+        end.low is not None and end.high is not None and end.high - end.low <= 2 * precision for end in ends
+    )
+
+
+def same_different_observer(shorter: float, longer: float, spread: float, missed: float) -> ObserverSettings:
+    """An observer with these thresholds over participants, who differ by `spread`."""
+    settings = default_observer(shorter, longer)
+    typical = replace(settings.same_different, log_sensitivity_sd=spread, criterion_sd=spread)
+    return replace(settings, same_different=typical, missed=missed)
+
+
+def same_different_study(design: Design, precision: float, level: float) -> Run:
+    """Whether the model's intervals of both thresholds are as narrow as asked (half their width, in frames)."""
+    asked = np.array([[float(trial.difference_frames or 0) for trial in own] for own in design.trials()])
+    levels = np.unique(asked)
+
+    def narrow(different: FloatArray, shown: FloatArray) -> bool:
+        there = shown.sum(axis=1) > 0
+        names = tuple(str(place) for place in range(int(there.sum())))
+        fit = fit_model(Counts(names, levels, different[there], shown[there]), level=level) if names else None
+        return _narrow(fit, precision)
+
+    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        people = max(sizes)
+        found = np.zeros((studies, len(sizes)), dtype=bool)
+        for number in range(studies):
+            seed = int(rng.integers(2**31))
+            who = [
+                person(design.settings, f"power-{place:03}", seed).settings.same_different for place in range(people)
+            ]
+            chance = np.array([probability_different(one, own) for one, own in zip(who, asked, strict=False)])
+            different = rng.random(chance.shape) < chance
+            response_s, given = times(design, rng, np.abs(2 * chance - 1)[None])
+            kept = kept_of(design, rng, response_s, given)[0]
+            at = asked[:people, :, None] == levels
+            shown = (at & kept[:, :, None]).sum(axis=1).astype(float)
+            yes = (at & (kept & different)[:, :, None]).sum(axis=1).astype(float)
+            found[number] = [narrow(yes[:size], shown[:size]) for size in sizes]
+        return found
+
+    return run

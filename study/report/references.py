@@ -1,0 +1,38 @@
+"""Works that a report cites, as a list of references gives them."""
+
+from __future__ import annotations
+
+FIELLER_1954 = (
+    "Fieller, E. C. (1954). Some problems in interval estimation. Journal of the Royal Statistical Society B, 16, "
+    "175–185."
+)
+MACMILLAN_2005 = (
+    "Macmillan, N. A., & Creelman, C. D. (2005). Detection theory: A user’s guide (2nd ed., ch. 9). Erlbaum."
+)
+WILSON_1927 = (
+    "Wilson, E. B. (1927). Probable inference, the law of succession, and statistical inference. Journal of the "
+    "American Statistical Association, 22, 209–212."
+)
+HOLM_1979 = (
+    "Holm, S. (1979). A simple sequentially rejective multiple test procedure. Scandinavian Journal of Statistics, 6, "
+    "65–70."
+)
+LIANG_1986 = (
+    "Liang, K.-Y., & Zeger, S. L. (1986). Longitudinal data analysis using generalized linear models. Biometrika, 73, "
+    "13–22."
+)
+MANCL_2001 = (
+    "Mancl, L. A., & DeRouen, T. A. (2001). A covariance estimator for GEE with improved small-sample properties. "
+    "Biometrics, 57, 126–134."
+)
+SCHUIRMANN_1987 = (
+    "Schuirmann, D. J. (1987). A comparison of the two one-sided tests procedure and the power approach. Journal of "
+    "Pharmacokinetics and Biopharmaceutics, 15, 657–680."
+)
+ROUDER_2009 = (
+    "Rouder, J. N., Speckman, P. L., Sun, D., Morey, R. D., & Iverson, G. (2009). Bayesian t tests for accepting and "
+    "rejecting the null hypothesis. Psychonomic Bulletin & Review, 16, 225–237."
+)
+BRADLEY_1952 = (
+    "Bradley, R. A., & Terry, M. E. (1952). Rank analysis of incomplete block designs. Biometrika, 39, 324–345."
+)

@@ -1,0 +1,69 @@
+"""The figure of a preference study: a comparison in, SVG text out.
+
+Blue is what is corrected, dark grey the data and what is as published.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from study.analysis.preference.analyse import Comparison
+from study.report.drawing import (
+    BLUE,
+    INK,
+    RULE,
+    SOFT,
+    add_mark,
+    new_figure,
+    quiet_grid,
+    style,
+    to_svg,
+)
+from study.report.words import readable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
+    """Percent favouring the first method: every motion with Wilson's interval, and all together over participants."""
+    motions, people, pooled = comparison.motions, comparison.participants, comparison.published
+    labels = [readable(row.motion) for row in motions]
+    with style():
+        figure, axes = new_figure(7.2, 0.34 * (len(motions) + 3) + 0.9)
+        axes.axvline(50, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
+        for row, motion in enumerate(motions):
+            if motion.percent is not None:
+                axes.plot([motion.low, motion.high], [-row, -row], color=INK, linewidth=1.4)
+                axes.plot([motion.percent], [-row], "o", color=INK, markersize=4.5)
+            _at_the_right(axes, -row, f"{motion.favouring} / {motion.answers}")
+        foot = -len(motions) - 0.3
+        if pooled.percent is not None:
+            ends = [100 * (end or 0.0) for end in (pooled.interval.low, pooled.interval.high)]
+            axes.plot(ends, [foot, foot], color=INK, linewidth=2.4)
+            axes.plot([pooled.percent], [foot], "o", color=INK, markersize=6)
+        _at_the_right(axes, foot, f"{pooled.favouring} / {pooled.answers}")
+        if people.low is not None:
+            axes.plot([people.low, people.high], [foot - 1, foot - 1], color=BLUE, linewidth=2.4)
+        axes.plot([people.mean_percent], [foot - 1], "s", color=BLUE, markersize=6)
+        _at_the_right(axes, foot - 1, f"{people.mean_percent:.1f}%", BLUE)
+        axes.axhline(-len(motions) + 0.35, color=RULE, linewidth=0.9)
+        places = [*(-row for row in range(len(motions))), foot, foot - 1]
+        axes.set_yticks(places, [*labels, "all answers", "all, over participants"])
+        axes.tick_params(axis="y", labelcolor=INK)
+        axes.spines["left"].set_visible(False)
+        quiet_grid(axes, "x")
+        axes.set_xlim(-1, 101)
+        axes.set_xticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
+        a, b = readable(comparison.method_a), readable(comparison.method_b)
+        axes.set_xlabel(f"answers that favoured {a} over {b}")
+        add_mark(figure, mark)
+        known = [row for row in motions if row.percent is not None]
+        spoken = "; ".join(f"{readable(row.motion)}: {row.percent:.0f}%" for row in known)
+        return to_svg(figure, name, f"Percent favouring {a} over {b}", spoken)
+
+
+def _at_the_right(axes: Axes, height: float, text: str, colour: str = INK) -> None:
+    """A number in a column beside the axes."""
+    axes.annotate(text, (1.0, height), xycoords=("axes fraction", "data"), xytext=(52, 0), textcoords="offset points",
+                  ha="right", va="center", fontsize=8.5, color=colour)  # fmt: skip

@@ -1,0 +1,195 @@
+"""Figures of a same-different study: its result in, SVG text out.
+
+Blue is the model, dark grey the data and what is as published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
+from study.analysis.same_different.counts import PercentDifferent, Side
+from study.analysis.same_different.threshold import Threshold
+from study.report.drawing import (
+    BLUE,
+    FAINT,
+    INK,
+    ORANGE,
+    RULE,
+    SOFT,
+    add_mark,
+    new_figure,
+    quiet_grid,
+    style,
+    to_svg,
+)
+from study.report.words import readable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SIGNS: Mapping[Side, float] = {"shorter": -1.0, "longer": 1.0}
+
+
+def _points(axes: Axes, rows: Sequence[PercentDifferent], size: float = 5.0) -> None:
+    """Percentages with bars of one standard error, joined by straight lines as in 2004 Figure 6."""
+    across = [row.difference_frames for row in rows]
+    up = [row.percent for row in rows]
+    errors = [row.standard_error or 0.0 for row in rows]
+    axes.plot(across, up, color=FAINT, linewidth=1.0, linestyle=(0, (4, 2)), zorder=2)
+    axes.errorbar(across, up, yerr=errors, fmt="o", color=INK, markersize=size, elinewidth=1.1, capsize=2.5, zorder=4)
+
+
+def _percent_axis(axes: Axes, level: float) -> None:
+    axes.set_ylim(-3, 103)
+    axes.set_yticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
+    quiet_grid(axes)
+    axes.axhline(100 * level, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
+    axes.axvline(0, color=RULE, linewidth=0.9, zorder=0)
+
+
+def _level_ticks(axes: Axes, rows: Sequence[PercentDifferent]) -> None:
+    levels = [row.difference_frames for row in rows]
+    axes.set_xticks(levels, [f"{level:+.0f}".replace("-", "−") if level else "k" for level in levels])
+
+
+def _model_threshold(axes: Axes, threshold: Threshold, level: float, label: bool) -> None:
+    """A drop line at the threshold and, at its foot, the interval."""
+    if threshold.frames is None:
+        return
+    sign = SIGNS[threshold.side]
+    place = sign * threshold.frames
+    axes.plot([place, place], [0, 100 * level], color=BLUE, linewidth=1.0, zorder=3)
+    low, high = threshold.interval.low, threshold.interval.high
+    if low is not None and high is not None:
+        axes.plot([sign * low, sign * high], [0, 0], color=BLUE, linewidth=4, solid_capstyle="butt", zorder=3)
+    if label:
+        text = f"k {'+' if sign > 0 else '−'} {threshold.frames:.1f}"
+        axes.annotate(
+            text, (place, 0), xytext=(5 * sign, 7), textcoords="offset points", color=BLUE, fontsize=10,
+            ha="left" if sign > 0 else "right", fontweight="bold",
+        )  # fmt: skip
+
+
+def same_different_figure(result: SameDifferent, name: str, mark: str) -> str:
+    """Percent "different" by difference in blend length, with both readings of the threshold (2004 Figure 6)."""
+    rows, model = result.percent_different, result.model
+    with style():
+        figure, axes = new_figure(7.2, 3.9)
+        _percent_axis(axes, result.level)
+        _points(axes, rows)
+        _level_ticks(axes, rows)
+        if model:
+            across, up = zip(*model.curve, strict=True)
+            axes.plot(across, up, color=BLUE, linewidth=1.8, zorder=3)
+            for threshold in model.jnd.values():
+                _model_threshold(axes, threshold, result.level, label=True)
+        axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
+        axes.set_ylabel("answers “different”")
+        _key(axes, bool(model))
+        add_mark(figure, mark)
+        return to_svg(figure, name, "Percent “different” by difference in blend length", _spoken_levels(rows))
+
+
+def _key(axes: Axes, with_model: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=FAINT, linestyle=(0, (4, 2)), marker="o", markerfacecolor=INK, markeredgecolor=INK,
+               markersize=4.5, label="mean ± standard error over participants"),
+    ]  # fmt: skip
+    if with_model:
+        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label="differencing model, thresholds with interval"))
+    axes.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8.5, labelcolor=SOFT)
+
+
+def _spoken_levels(rows: Sequence[PercentDifferent]) -> str:
+    return "; ".join(f"{row.difference_frames:+.0f} frames: {row.percent:.0f}%" for row in rows)
+
+
+def motions_figure(result: SameDifferent, name: str, mark: str) -> str:
+    """The same curve for every motion, side by side."""
+    motions = result.motions
+    columns = min(len(motions), 3)
+    lines = -(-len(motions) // columns)
+    with style():
+        figure, grid = new_figure(7.2, 2.5 * lines + 0.25, lines, columns, sharey=True, sharex=True, squeeze=False)
+        for axes, motion in zip(grid.flat, motions, strict=False):
+            _percent_axis(axes, result.level)
+            _points(axes, motion.percent_different, size=3.5)
+            if motion.model:
+                across, up = zip(*motion.model.curve, strict=True)
+                axes.plot(across, up, color=BLUE, linewidth=1.5, zorder=3)
+                for threshold in motion.model.jnd.values():
+                    _model_threshold(axes, threshold, result.level, label=False)
+            axes.set_title(readable(motion.motion))
+        for axes in grid.flat[len(motions) :]:
+            axes.set_axis_off()
+        figure.supylabel("answers “different”", fontsize=9.5)
+        for axes in grid[-1]:
+            axes.set_xlabel("difference, frames")
+        add_mark(figure, mark)
+        spoken = ". ".join(f"{readable(m.motion)}: {_spoken_levels(m.percent_different)}" for m in motions)
+        return to_svg(figure, name, "Percent “different” for every motion", spoken)
+
+
+def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mapping[Side, float]) -> str:
+    """Thresholds with intervals: all motions and each one, straight lines and model, shorter and longer."""
+    entries: list[tuple[str, SameDifferent | MotionThresholds]] = [("all motions", result)]
+    entries += [(readable(motion.motion), motion) for motion in result.motions if len(result.motions) > 1]
+    with style():
+        figure, axes = new_figure(7.2, 0.62 * len(entries) + 1.15)
+        axes.axvline(0, color=FAINT, linewidth=0.9)
+        for row, (_, entry) in enumerate(entries):
+            for side in SIGNS:
+                _bar(axes, entry.published[side], -row + 0.14, INK, "o")
+                if entry.model and side in entry.model.jnd:
+                    _bar(axes, entry.model.jnd[side], -row - 0.14, BLUE, "s")
+        for side, place in known.items():
+            axes.axvline(SIGNS[side] * place, color=ORANGE, linewidth=1.0, linestyle=(0, (2, 2)), zorder=0)
+        axes.set_yticks([-row for row in range(len(entries))], [label for label, _ in entries])
+        axes.tick_params(axis="y", labelcolor=INK)
+        axes.set_ylim(-len(entries) + 0.5, 0.5)
+        axes.spines["left"].set_visible(False)
+        quiet_grid(axes, "x")
+        ticks = sorted({row.difference_frames for row in result.percent_different})
+        if ticks:
+            axes.set_xlim(min(*ticks, -1) * 1.02, max(*ticks, 1) * 1.02)
+            axes.set_xticks(ticks, [f"{tick:+.0f}".replace("-", "−") if tick else "k" for tick in ticks])
+        axes.set_xlabel(f"{100 * result.level:.0f}% “different”, frames from k")
+        _threshold_key(axes, bool(known))
+        add_mark(figure, mark)
+        return to_svg(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries))
+
+
+def _bar(axes: Axes, threshold: Threshold, height: float, colour: str, marker: str) -> None:
+    """A point with its interval, where it is closed; nothing where there is no threshold."""
+    sign = SIGNS[threshold.side]
+    low, high = threshold.interval.low, threshold.interval.high
+    if threshold.frames is None:
+        return
+    if low is not None and high is not None:
+        axes.plot([sign * low, sign * high], [height, height], color=colour, linewidth=1.6, solid_capstyle="butt")
+    axes.plot([sign * threshold.frames], [height], marker=marker, color=colour, markersize=5)
+
+
+def _threshold_key(axes: Axes, known: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=INK, marker="o", markersize=4.5, label="straight lines (as published)"),
+        Line2D([], [], color=BLUE, marker="s", markersize=4.5, label="differencing model"),
+    ]
+    if known:
+        handles.append(Line2D([], [], color=ORANGE, linestyle=(0, (2, 2)), label="known of the simulated observers"))
+    axes.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8.5, labelcolor=SOFT)
+
+
+def _spoken_thresholds(entries: Sequence[tuple[str, SameDifferent | MotionThresholds]]) -> str:
+    parts = []
+    for label, entry in entries:
+        for side in SIGNS:
+            found = entry.published[side].frames
+            parts.append(f"{label}, {side}: " + (f"{found:.1f} frames" if found is not None else "not found"))
+    return "; ".join(parts)
