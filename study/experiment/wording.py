@@ -59,9 +59,10 @@ def welcome_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
 
 
 def _welcome_standard(protocol: Protocol) -> str:
-    """The built-in welcome: by whether films are shown in pairs, one at a time, or both."""
+    """The built-in welcome: by how many films a trial shows, or that it differs from part to part."""
     kinds = {task_of(study).welcome for study in protocol.studies}
-    name = kinds.pop() if len(kinds) == 1 else "welcome_films_and_pairs"
+    name = "welcome_films_and_pairs" if kinds == {"welcome_films", "welcome_pairs"} else "welcome_mixed"
+    name = kinds.pop() if len(kinds) == 1 else name
     parts = ["parts"] if len(protocol.studies) > 1 else []
     return "\n\n".join(_standard(protocol, each) for each in (name, *parts))
 

@@ -30,6 +30,12 @@ ORDERS = {
 }
 
 
+ORDERS_OF_SEVERAL = {
+    "both": "Each set was shown in every order",
+    "random": "The order within each set was drawn at random",
+    "balanced": "Each order was used for an equal share of the sets",
+    "by-group": "The order followed from the participant’s group",
+}
 SINGLE_ORDERS = {
     **dict.fromkeys(("both", "random", "balanced"), "Transitions were shown one at a time, in random order"),
     "by-group": "Transitions were shown one at a time; which method came first followed from the participant’s group",
@@ -91,7 +97,7 @@ def _study(protocol: Protocol, study: StudySpec) -> str:
     title = words.readable(study.title or study.name)
     what = task_of(study).in_words(study, lambda method: _blends(protocol, study, method))
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
-    order = (ORDERS if task_of(study).slots > 1 else SINGLE_ORDERS)[study.order]
+    order = {1: SINGLE_ORDERS, 2: ORDERS}.get(task_of(study).slots, ORDERS_OF_SEVERAL)[study.order]
     return f"In “{title}”, participants {what}. {order}{repeated}."
 
 
@@ -142,8 +148,9 @@ def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:
 
 def _procedure(protocol: Protocol, analysis: Analysis, presentations: pd.DataFrame) -> str:
     timing = protocol.timing
-    paired = any(task_of(study).slots > 1 for study in protocol.studies)
-    pair = f"The two stimuli of a pair followed each other after {timing.gap_s:g} s. " if paired else ""
+    most = max(task_of(study).slots for study in protocol.studies)
+    those = "two stimuli of a pair" if most == 2 else "stimuli of a trial"
+    pair = f"The {those} followed each other after {timing.gap_s:g} s. " if most > 1 else ""
     rest = f" A break was offered after every {counted(timing.break_after, 'trial')}." if timing.break_after else ""
     limit = (
         f"Participants had {timing.answer_s:g} s to answer; an answer not given in time was recorded as missed. "

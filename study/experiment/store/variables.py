@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from study.tasks.registry import NAMES, TASKS
+
 
 @dataclass(frozen=True)
 class Variable:
@@ -23,11 +25,7 @@ ANSWERS: Mapping[str, Variable] = {
     "study": Variable("Name of the study in the protocol."),
     "task": Variable(
         "What was decided.",
-        levels={
-            "same-different": "whether two transitions are the same",
-            "preference": "which of two transitions is more natural",
-            "rating": "points of a scale for one transition, or for the second of a pair compared with the first",
-        },
+        levels={name: ", or ".join(task.decides for task in TASKS.values() if task.asked_as == name) for name in NAMES},
     ),
     "trial": Variable("Number of the trial in the participant's plan, from 1.", "number"),
     "attempt": Variable("Which showing of the trial it was, from 1; faulty ones are shown again.", "number"),
