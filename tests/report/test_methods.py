@@ -88,7 +88,8 @@ def test_own_methods_are_described_by_their_parts_and_settings(results_folder: M
 
 def test_given_transitions_are_not_called_blends(results_folder: MakeFolder) -> None:
     material = gather(results_folder(2, videos=0))
-    given = '\n[[methods]]\nname = "ours"\nmake = "given"\n[methods.files]\n'
+    given = '\n[[methods]]\nname = "ours"\nmake = "given"\nwords = "blends by our network"\nsource = "Doe (2026)."\n'
+    given += "[methods.files]\n"
     files = "".join(
         f'{one.name} = {{ file = "{one.name}.bvh", start_frame = 3, end_frame = 9 }}\n'
         for one in material.protocol.transitions
@@ -98,8 +99,9 @@ def test_given_transitions_are_not_called_blends(results_folder: MakeFolder) -> 
     )
     named = [replace(one, method="ours") if one.method == "fixed" else one for one in material.manifest.records]
     shown = replace(material.manifest, records=tuple(named))
-    told, _ = paragraphs(replace(material, protocol=protocol, manifest=shown))
-    assert "and “ours” (the researchers’ own transitions)" in told["Participants and design"]
+    told, cited = paragraphs(replace(material, protocol=protocol, manifest=shown))
+    assert "and “ours” (blends by our network)" in told["Participants and design"]
+    assert "Doe (2026)." in cited
     assert "under a linear weight" in told["Stimuli"]
     assert "Those by “ours” were read from motion files." in told["Stimuli"]
     alone = replace(material.manifest, records=tuple(one for one in named if one.method == "ours"))

@@ -42,6 +42,11 @@ class _OwnMethod(Part):
         le=10,
         description="How natural simulated observers find it: log-odds of being chosen over a blend of fixed length.",
     )
+    words: str = Field(
+        default="",
+        description="What the report's Methods section calls its transitions, instead of words for its parts.",
+    )
+    source: str = Field(default="", description="The work that it comes from, as the report's references cite it.")
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -82,7 +87,7 @@ class _OwnMethod(Part):
     def method(self, defaults: Mapping[str, Any]) -> Method:
         """The method, with settings from elsewhere where it has none of its own."""
         points, length, make = self.parts
-        chosen = Method(self.name, points(), length(), make(), self.utility)
+        chosen = Method(self.name, points(), length(), make(), self.utility, self.words, self.source)
         return chosen.with_settings({**defaults, **self.settings})
 
 

@@ -272,7 +272,8 @@ class Make(MethodPart):
 class Method:
     """A method: a name, its three parts, and how natural simulated observers find its transitions.
 
-    `utility` are log-odds of being chosen over a blend of fixed length.
+    `utility` are log-odds of being chosen over a blend of fixed length. `words` and `source` stand in a Methods section
+    for the words of the parts, and beside their sources.
     """
 
     name: str
@@ -280,6 +281,8 @@ class Method:
     length: Length
     make: Make
     utility: float
+    words: str = ""
+    source: str = ""
 
     def with_settings(self, settings: Mapping[str, Any]) -> Method:
         """The same method with those of the settings that its parts take."""
@@ -292,6 +295,8 @@ class Method:
 
     def in_words(self, fps: float) -> str:
         """What a Methods section calls its transitions, at a frame rate."""
+        if self.words:
+            return self.words
         length, points = self.length.in_words(fps), self.points.in_words(fps)
         said = self.make.in_words(fps).format(length=length, points=points)
         return " ".join(said.split())
@@ -299,7 +304,8 @@ class Method:
     @property
     def sources(self) -> tuple[str, ...]:
         """The works that it rests on, as references."""
-        return tuple(dict.fromkeys((*self.points.sources, *self.length.sources, *self.make.sources)))
+        own = (self.source,) if self.source else ()
+        return tuple(dict.fromkeys((*self.points.sources, *self.length.sources, *self.make.sources, *own)))
 
     def room(self, fps: float, longest_frames: int | None) -> Room:
         """What it needs around its points."""
