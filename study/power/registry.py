@@ -24,6 +24,9 @@ EFFECTS: Mapping[str, Make] = {
     "rating": rating_effect,
 }
 
+WITHOUT_EFFECT: Mapping[str, str] = {}
+"""Tasks for which no number of participants can be planned, and why."""
+
 
 def effect_of(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
     """Return what a study is to find.
@@ -33,6 +36,8 @@ def effect_of(study: StudySpec, options: Mapping[str, float], decided: AnalysisS
     AnalysisError
         When nothing can be planned for its task.
     """
+    if study.task in WITHOUT_EFFECT:
+        raise AnalysisError(f"{study.name}: expected another task than {study.task}: {WITHOUT_EFFECT[study.task]}")
     if study.task not in EFFECTS:
         raise AnalysisError(f"{study.name}: expected one of the tasks {', '.join(EFFECTS)}, found {study.task!r}")
     return EFFECTS[study.task](study, options, decided)
