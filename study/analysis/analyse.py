@@ -14,6 +14,7 @@ from study.analysis.registry import ANALYSES, analysis_of
 from study.analysis.study_result import Settings, StudyResult
 from study.analysis.to_json import to_json
 from study.errors import AnalysisError
+from study.models.up_down import UpDown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,6 +58,10 @@ class Decided(Protocol):
     @property
     def scale_points(self) -> Mapping[str, int]:
         """Points of the scale of each rating study."""
+
+    @property
+    def staircases(self) -> Mapping[str, UpDown]:
+        """The rule of each study whose trials came by staircases."""
 
 
 @dataclass(frozen=True)
@@ -179,6 +184,7 @@ def analyse_folder(
         resamples=resamples,
         margin=decided.equivalence_points / 100.0,
         scale_points=protocol.scale_points,
+        staircases=protocol.staircases,
     )
     rules = rules or rules_of(decided.exclusions)
     return analyse(answers, settings, family=decided.confirmatory or None, rules=rules, checks=checks)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from study.analysis.preference.no_effect import MARGIN
+from study.models.up_down import UpDown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,6 +47,8 @@ class Settings:
         How far from an even split a preference may lie and count as none; 0.1 is 40 to 60%.
     scale_points
         Points of the scale of each rating study, by its name; needed where pairs were rated.
+    staircases
+        The rule of each study whose trials came by staircases, by its name.
     """
 
     threshold: float = 0.75
@@ -55,6 +58,7 @@ class Settings:
     seed: int = 0
     margin: float = MARGIN
     scale_points: Mapping[str, int] = field(default_factory=dict)
+    staircases: Mapping[str, UpDown] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

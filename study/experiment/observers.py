@@ -24,6 +24,7 @@ from study.experiment.store.answers import has_event, record_answer, record_even
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
 from study.models.population import LEAST_CRITERION
+from study.models.up_down import target
 from study.tasks.observer import ObserverSettings, Person, default_observer
 from study.tasks.registry import task_of, task_of_trial
 from study.tasks.trial import Pair, Trial
@@ -41,11 +42,17 @@ def knowing(settings: ObserverSettings, protocol: Protocol) -> ObserverSettings:
 def truth(protocol: Protocol, settings: ObserverSettings) -> dict[str, Any]:
     """What an analysis should find: the observer's parameters, and study by study what follows from them.
 
-    Rounded to six digits, so that it is the same everywhere.
+    Of a study with staircases there is also what they aim at (`staircase`). Rounded to six digits, so that it is the
+    same everywhere.
     """
-    level = protocol.analysis.threshold
-    known = {study.name: task_of(study).truth(settings, study, level) for study in protocol.studies}
-    studies = {name: found for name, found in known.items() if found is not None}
+    studies = {}
+    for study in protocol.studies:
+        task = task_of(study)
+        found = task.truth(settings, study, protocol.analysis.threshold)
+        if found is not None and study.procedure.rule is not None:
+            found = {**found, "staircase": task.truth(settings, study, target(study.procedure.rule))}
+        if found is not None:
+            studies[study.name] = found
     return {"observer": asdict(settings), "studies": studies}
 
 

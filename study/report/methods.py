@@ -71,6 +71,7 @@ def methods_paragraphs(
 def references(protocol: Protocol, analysis: Analysis) -> list[str]:
     """Return the works that the methods rest on, by author; only those whose methods were used."""
     used = {work for method in _methods(protocol).values() for work in method.sources}
+    used |= {work for study in protocol.studies for work in study.procedure.sources}
     for kind, shown in SECTIONS.items():
         if found := analysis.of(kind):
             used |= shown.references(found.values())
@@ -98,7 +99,8 @@ def _study(protocol: Protocol, study: StudySpec) -> str:
     what = task_of(study).in_words(study, lambda method: _blends(protocol, study, method))
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
     order = {1: SINGLE_ORDERS, 2: ORDERS}.get(task_of(study).slots, ORDERS_OF_SEVERAL)[study.order]
-    return f"In “{title}”, participants {what}. {order}{repeated}."
+    chosen = f" Trials came by {by}." if (by := study.procedure.in_words()) else ""
+    return f"In “{title}”, participants {what}. {order}{repeated}.{chosen}"
 
 
 def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:

@@ -46,6 +46,8 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "favouring": ("favouring", "count"),
     # Estimates, how sure they are, and tests.
     "frames": ("frames", "two"),
+    "repeat": ("repeat", "count"),
+    "reversals": ("reversals", "count"),
     "seconds": ("seconds", "three"),
     "percent": ("percent", "one"),
     "population_percent": ("over participants", "one"),

@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from study.tasks.task import Asked, Condition, Problem
 from study.tasks.trial import Pair
 
+MOST_LISTED = 15
+"""Longer lists of levels are given by their ends."""
+
 
 def level_conditions(asked: Asked, for_practice: bool) -> tuple[Condition, ...]:
     """The reference beside each level; practice has the largest ones and no difference."""
@@ -37,5 +40,6 @@ def level_problems(asked: Asked) -> Iterator[Problem]:
 
 def levels_in_words(asked: Asked, blends: Callable[[str], str]) -> str:
     """The reference, and by how much the comparisons are longer."""
-    levels = ", ".join(f"{value:+d}".replace("-", "−") if value else "0" for value in asked.differences_frames)
+    each = [f"{value:+d}".replace("-", "−") if value else "0" for value in asked.differences_frames]
+    levels = ", ".join(each) if len(each) <= MOST_LISTED else f"{each[0]} to {each[-1]}"
     return f"{blends(asked.reference)}, against blends longer by {levels} frames"

@@ -169,3 +169,15 @@ def test_every_task_has_a_curve(capsys: pytest.CaptureFixture[str]) -> None:
 def test_refusals(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["power", *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_study_with_staircases_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = load("blend_length_jnd").text
+    levels = next(line for line in text.splitlines() if line.startswith("differences_frames"))
+    text = text.replace(f"{levels}\n", "").replace('order = "both"\n', "")
+    protocol = tmp_path / "staircases.toml"
+    protocol.write_text(f'{text}\n[studies.procedure]\nname = "staircase"\nstart_frames = 10\nmost_frames = 15\n')
+    assert run(["power", str(protocol)]) == 2
+    said = capsys.readouterr().err
+    assert "expected a study whose trials are known beforehand, found adaptive staircases in" in said
+    assert "segue simulate" in said

@@ -7,7 +7,7 @@ differ across motions. Beside it the differencing model, d-prime at each level, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -30,6 +30,7 @@ from study.analysis.same_different.model import ModelFit, fit_model
 from study.analysis.same_different.motions import AcrossMotions, across_motions
 from study.analysis.same_different.order import OrderShare, OrderTest, order_test, shares_by_order
 from study.analysis.same_different.profiles import profile_intervals
+from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.same_different.threshold import Threshold
 
 if TYPE_CHECKING:
@@ -85,6 +86,8 @@ class SameDifferent:
         Intervals of the model's thresholds by profile likelihood, by side.
     answer
         The thresholds in sentences.
+    staircases
+        Thresholds as means of reversals, where trials came by staircases.
     """
 
     keys: ClassVar[Mapping[str, str]] = {"jnd": ""}
@@ -108,6 +111,7 @@ class SameDifferent:
     rules: Rules
     profile: dict[Side, estimates.Interval]
     answer: str
+    staircases: Staircases | None = None
 
     def sentences(self, alpha: float) -> list[str]:
         """Return the thresholds in words; they rest on no level of significance."""
@@ -170,14 +174,17 @@ def analyse_jnd(
 
 def analyse_same_different(answers: pd.DataFrame, name: str, settings: Settings) -> SameDifferent:
     """Analyse one same-different study as was decided beforehand."""
-    del name
-    return analyse_jnd(
+    found = analyse_jnd(
         answers,
         level=settings.threshold,
         confidence=settings.confidence,
         resamples=settings.resamples,
         seed=settings.seed,
     )
+    if name not in settings.staircases:
+        return found
+    own = staircase_thresholds(answers, settings.staircases[name], settings.confidence)
+    return replace(found, staircases=own, answer=f"{own.in_words()} The following rest on all trials. {found.answer}")
 
 
 def in_words(

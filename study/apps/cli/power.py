@@ -39,16 +39,20 @@ def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
     Raises
     ------
     AnalysisError
-        When there is more than one to choose from, or none of that name.
+        When there is more than one to choose from, none of that name, or its trials depend on the responses.
     """
     names = ", ".join(study.name for study in protocol.studies)
-    if name is None:
-        if len(protocol.studies) > 1:
-            raise AnalysisError(f"{protocol.name}: expected --study with one of {names}")
-        return protocol.studies[0]
+    if name is None and len(protocol.studies) > 1:
+        raise AnalysisError(f"{protocol.name}: expected --study with one of {names}")
     for study in protocol.studies:
-        if study.name == name:
-            return study
+        if name not in (None, study.name):
+            continue
+        if study.procedure.trials(1, 1) is not None:
+            raise AnalysisError(
+                f"{protocol.name}: expected a study whose trials are known beforehand, found {study.procedure.title} "
+                f"in {study.name!r}; try numbers of participants with segue simulate and segue analyse"
+            )
+        return study
     raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
 
 

@@ -16,6 +16,7 @@ from typing import Protocol as Shape
 
 import numpy as np
 
+from study.models.up_down import UpDown
 from study.tasks.answer import Answer
 from study.tasks.trial import Pair, Trial
 
@@ -136,6 +137,11 @@ class Settings(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     sources: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def rule(self) -> UpDown | None:
+        """The rule by which it goes up and down, so that the analysis can follow it; None for other procedures."""
+        return None
 
     def problems(self, asked: Asked) -> Iterator[tuple[str, str]]:
         """What does not fit between the procedure and other keys of its study: the key, and what

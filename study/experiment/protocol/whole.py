@@ -27,6 +27,7 @@ from study.experiment.protocol.stimuli import Points, StimulusSettings, Timing, 
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
 from study.files import read_text
+from study.models.up_down import UpDown
 from study.tasks.registry import task_of
 from study.toml_text import LARGEST_TEXT, parse_toml
 from study.transitions.methods.method import Method
@@ -171,6 +172,11 @@ class Protocol(Part):
     def path_of(self, file: str) -> Path:
         """A file that the protocol names, from the folder of the protocol's own file."""
         return (self._path.parent if self._path else Path()) / file
+
+    @property
+    def staircases(self) -> dict[str, UpDown]:
+        """The rule of each study whose procedure goes up and down, by its name."""
+        return {study.name: rule for study in self.studies if (rule := study.procedure.rule) is not None}
 
     @property
     def scale_points(self) -> dict[str, int]:

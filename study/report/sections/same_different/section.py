@@ -14,6 +14,7 @@ from study.analysis.same_different.counts import Side
 from study.analysis.same_different.mixed import MixedThresholds
 from study.analysis.same_different.model import EqualSlopes, ModelFit
 from study.analysis.same_different.motions import AcrossMotions
+from study.analysis.same_different.staircases import Staircases
 from study.analysis.same_different.threshold import Threshold
 from study.counting import counted
 from study.report import words
@@ -25,6 +26,7 @@ from study.report.sections.same_different.tables import (
     motion_table,
     percent_table,
     recovery_table,
+    staircase_table,
     threshold_table,
 )
 from study.report.sections.section import About, Course, Drawing, Headline, MainResult, Reading, Section, SectionKind
@@ -61,6 +63,7 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
             percent_table(name, result),
             *([motion_table(name, result, about.fps)] if several else []),
             d_prime_table(name, result),
+            *([staircase_table(name, result.staircases)] if result.staircases else []),
         ),
         readings=tuple(_readings(result)),
     )
@@ -182,9 +185,20 @@ def _with_interval(threshold: Threshold, sign: str) -> str:
     return f"k {sign} {threshold.frames:.2f} frames [{ends}]"
 
 
+def _staircase_note(found: Staircases) -> str:
+    spreads = [f"{spread:.1f} frames {side}" for side, spread in found.spread.items()]
+    spread = f"; within a staircase these differ by a standard deviation of {words.joined(spreads)}" if spreads else ""
+    return (
+        f"Trials came by staircases that aim at {100 * found.target:.1f}% “different”. Their threshold is the mean of "
+        f"the last {found.averaged} reversals of each, averaged over the staircases of a participant and then over "
+        f"participants{spread}. It assumes no model and moves with the rate of false alarms. The differencing model is "
+        "fitted to all trials; straight lines between levels that were seldom shown mean little here."
+    )
+
+
 def _notes(result: SameDifferent) -> list[str]:
     """What the thresholds rest on, and the tests beside them, one sentence each."""
-    notes = []
+    notes = [_staircase_note(result.staircases)] if result.staircases else []
     if result.model:
         notes += _model_notes(result.model)
     if result.mixed:

@@ -8,6 +8,7 @@ from typing import Any
 
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
 from study.analysis.same_different.counts import Side
+from study.analysis.same_different.staircases import Staircases
 from study.analysis.same_different.threshold import Threshold
 from study.report import words
 from study.report.tables import Table, make
@@ -21,6 +22,9 @@ def _threshold_rows(entry: SameDifferent | MotionThresholds, fps: float) -> list
     if model := entry.model:
         kinds += [("model", model.jnd), ("model", _profiled(entry))]
         kinds += [("model, best criterion", model.corrected), ("model, Abbott’s correction", model.guess_corrected)]
+    if isinstance(entry, SameDifferent) and (staircases := entry.staircases):
+        share = f"{100 * staircases.target:.1f}%"
+        kinds.append((f"staircases, mean of the last {staircases.averaged} reversals ({share})", staircases.thresholds))
     if isinstance(entry, SameDifferent) and (mixed := entry.mixed):
         kinds += [("mixed model, median observer", mixed.typical), ("mixed model, group", mixed.population)]
     return [
@@ -48,6 +52,7 @@ def _interval_by(threshold: Threshold) -> str:
         "jackknife": "jackknife",
         "one participant": "one participant",
         "profile": "profile likelihood",
+        "reversals": "Student’s t",
     }
     return next((name for part, name in names.items() if part in threshold.method), "curvature")
 
@@ -129,15 +134,30 @@ def d_prime_table(name: str, result: SameDifferent) -> Table:
     )
 
 
+def staircase_table(name: str, found: Staircases) -> Table:
+    """Return every staircase."""
+    rows = [{**vars(run), "motion": words.readable(run.motion)} for run in found.runs]
+    return make(
+        f"{name}_staircases",
+        f"Every staircase: mean and standard deviation of its last {found.averaged} reversals, in frames. A dash where "
+        "it stopped before it had as many.",
+        "participant motion side repeat trials reversals frames spread",
+        rows,
+        headings={"spread": "standard deviation"},
+    )
+
+
 def recovery_table(name: str, result: SameDifferent, known: Mapping[str, Any]) -> Table:
     """Return the thresholds that the simulated observers had beside those that were found."""
     rows = []
     for side, _ in SIDES:
-        for label, thresholds, key in (
-            ("differencing model", result.model.jnd if result.model else {}, f"threshold_{side}_frames"),
-            ("straight lines", result.published, f"interpolated_{side}_frames"),
+        own = result.staircases.thresholds if result.staircases else {}
+        for label, thresholds, truths, key in (
+            ("differencing model", result.model.jnd if result.model else {}, known, f"threshold_{side}_frames"),
+            ("straight lines", result.published, known, f"interpolated_{side}_frames"),
+            ("staircases", own, known.get("staircase", {}), f"threshold_{side}_frames"),
         ):
-            truth, found = known.get(key), thresholds.get(side)
+            truth, found = truths.get(key), thresholds.get(side)
             if truth is None or found is None or found.frames is None:
                 continue
             error, away = found.standard_error, found.frames - abs(truth)
@@ -155,7 +175,7 @@ def recovery_table(name: str, result: SameDifferent, known: Mapping[str, Any]) -
     return make(
         f"{name}_recovery",
         "What the simulated observers had and what was found, in frames. For straight lines the known value is where "
-        "they would cross with endless data.",
+        "they would cross with endless data; for staircases it is where the observers reach what these aim at.",
         "estimate side known found standard_error distance standard_errors",
         rows,
     )
