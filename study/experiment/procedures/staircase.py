@@ -130,7 +130,7 @@ class Staircase(Settings):
         levels = [difference for difference in self.differences() if difference]
         return (
             f"{self.up}-up/{self.down}-down staircases{weights}, which aim at {100 * target(self.rule):.1f}% right "
-            f"responses, with differences from {min(levels)} to {max(levels)} frames"
+            f"responses, with differences from {_signed(min(levels))} to {_signed(max(levels))} frames"
         )
 
     def course(self, draw: Draw, first: int) -> Course:
@@ -170,6 +170,10 @@ class Staircase(Settings):
             return set()
         starts = np.arange(0, count, self.catch_every)
         return {int(place) for place in starts + rng.integers(0, self.catch_every, len(starts))}
+
+
+def _signed(frames: int) -> str:
+    return f"{frames}".replace("-", "−")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pydantic import Field, PlainValidator, model_validator
 
 from study.experiment.procedures.constant_stimuli import Constant
 from study.experiment.procedures.procedure import Settings, SettingsError
-from study.experiment.procedures.registry import settings_of
+from study.experiment.procedures.registry import PROCEDURES, settings_of
 from study.experiment.protocol.errors import KeyMismatchError
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
@@ -103,7 +103,8 @@ class StudySpec(Part):
     one_hop: OneHop = Field(default=OneHop(), description="How the method `one-hop` finds its hops.")
     procedure: Annotated[Settings, PlainValidator(_procedure)] = Field(
         default=Constant(),
-        description="How the trials are chosen: `constant` (all of them beforehand), or `staircase` (by the answers).",
+        description="How the trials are chosen: "
+        f"{', '.join(f'`{name}` ({member.title})' for name, member in PROCEDURES.items())}.",
     )
     order: Order = Field(
         default="random",
