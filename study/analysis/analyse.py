@@ -25,27 +25,13 @@ Data = Literal["collected", "simulated", "mixed", "none"]
 
 
 class Decisions(Protocol):
-    """What a protocol decides about the analysis; see `Settings`."""
+    """What a protocol decides about the analysis: see `Settings`, `analyse` and `Rules`."""
 
-    @property
-    def threshold(self) -> float:
-        """Share of "different" at the just noticeable difference."""
-
-    @property
-    def alpha(self) -> float:
-        """Level of significance."""
-
-    @property
-    def equivalence_points(self) -> float:
-        """How far from an even split, in percentage points, a preference may lie and count as none."""
-
-    @property
-    def confirmatory(self) -> Sequence[str]:
-        """Studies whose tests decide; all preference studies where empty."""
-
-    @property
-    def exclusions(self) -> object:
-        """Who and what is left out: the attributes of `Rules`."""
+    threshold: float
+    alpha: float
+    equivalence_points: float
+    confirmatory: tuple[str, ...]
+    exclusions: Any
 
 
 class Decided(Protocol):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,31 +44,24 @@ class NotFitted:
 
 
 @dataclass(frozen=True)
-class MeanTest:
-    """The mean over participants against an expected value.
-
-    Attributes
-    ----------
-    participants
-        How many participants the mean rests on.
-    mean, standard_error
-        Over participants; None where there are too few.
-    interval
-        Of the mean, by Student's t.
-    statistic, degrees_of_freedom, p_value
-        Student's t; None where the participants are all alike and t can't be formed.
-    note
-        What could not be estimated, and why; empty where all could.
-    """
+class Mean:
+    """The mean over participants, with Student's interval; None where there are too few, and `note` says why."""
 
     participants: int
     mean: float | None
     standard_error: float | None
-    interval: Interval
-    statistic: float | None
+    low: float | None
+    high: float | None
+    note: str
+
+
+@dataclass(frozen=True)
+class MeanTest(Mean):
+    """The mean against an expected value; `t` is None where the participants are all alike and it can't be formed."""
+
+    t: float | None
     degrees_of_freedom: int | None
     p_value: float | None
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -159,44 +152,47 @@ def binomial_probability(successes: int, trials: int, expected: float = 0.5) -> 
     return min(1.0, float(np.exp(logarithms[as_rare]).sum()))
 
 
-def mean_test(values: ArrayLike, expected: float = 0.5, confidence: float = 0.95) -> MeanTest:
-    """Test the mean of one value a participant against `expected`, by Student's t.
+def mean_of(values: ArrayLike, confidence: float = 0.95) -> Mean:
+    """Return the mean of one value a participant, with Student's interval.
 
     Parameters
     ----------
     values : array_like, shape (participants,)
         One number a participant; NaN is left out.
-    expected
-        The mean where there is no effect.
     confidence
         Of the interval.
 
     Notes
     -----
     Where all participants give the same value, the spread is not known to be zero, it was only not seen: the interval
-    stays open and no t is given.
+    stays open.
     """
     data = np.asarray(values, dtype=np.float64)
     data = data[np.isfinite(data)]
     count = len(data)
     if count == 0:
-        return MeanTest(0, None, None, Interval(None, None, confidence), None, None, None, "no answers")
+        return Mean(0, None, None, None, None, "no answers")
     mean = float(data.mean())
-    open_interval = Interval(None, None, confidence)
     if count == 1:
-        return MeanTest(1, mean, None, open_interval, None, None, None, "one participant: no spread to judge by")
+        return Mean(1, mean, None, None, None, "one participant: no spread to judge by")
     spread = float(data.std(ddof=1))
     if spread <= 1e-12:
         people = counted(count, "participant")
         note = f"all {people} gave the same value: the spread between participants can't be estimated"
-        return MeanTest(count, mean, 0.0, open_interval, None, count - 1, None, note)
+        return Mean(count, mean, 0.0, None, None, note)
     error = spread / math.sqrt(count)
     half = t_quantile(confidence, count - 1) * error
-    statistic = (mean - expected) / error
-    probability = t_probability(statistic, count - 1)
-    return MeanTest(
-        count, mean, error, Interval(mean - half, mean + half, confidence), statistic, count - 1, probability
-    )
+    return Mean(count, mean, error, mean - half, mean + half, "")
+
+
+def mean_test(values: ArrayLike, expected: float = 0.5, confidence: float = 0.95) -> MeanTest:
+    """Test the mean of one value a participant (see `mean_of`) against `expected`, by Student's t."""
+    found = mean_of(values, confidence)
+    freedom = found.participants - 1
+    if not found.standard_error or found.mean is None:
+        return MeanTest(**vars(found), t=None, degrees_of_freedom=freedom if freedom > 0 else None, p_value=None)
+    t = (found.mean - expected) / found.standard_error
+    return MeanTest(**vars(found), t=t, degrees_of_freedom=freedom, p_value=t_probability(t, freedom))
 
 
 def student_p_values(values: FloatArray, there: NDArray[np.bool_], expected: float) -> FloatArray:
@@ -348,10 +344,3 @@ def numbers(values: ArrayLike, name: str) -> FloatArray:
         except (TypeError, ValueError):
             raise AnalysisError(f"expected numbers in {name}, found {value!r}; recode or leave out that row") from None
     raise AnalysisError(f"expected {name} as an array of numbers, found rows of different lengths")
-
-
-def finite(value: float | np.floating[Any] | None) -> float | None:
-    """Return a plain float, or None for None, NaN and infinities (which JSON does not know)."""
-    if value is None or not math.isfinite(float(value)):
-        return None
-    return float(value)

@@ -59,17 +59,7 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Exclusions:
-    """What is left out.
-
-    Attributes
-    ----------
-    rules
-        Those that were stated.
-    participants
-        Who is left out wholly.
-    answers_left_out
-        All of them, those of participants left out included.
-    """
+    """What is left out: by which rules, who wholly, and how many answers, those of participants left out included."""
 
     rules: tuple[RuleCount, ...]
     participants: tuple[LeftOut, ...]

@@ -45,20 +45,8 @@ def _longest_run(answers: list[str]) -> int:
 class ParticipantQuality:
     """How complete and plausible the answers of one participant are.
 
-    Attributes
-    ----------
-    median_response_s
-        None where no times are known.
-    too_fast
-        Answers sooner after the question than could answer it.
-    shown_badly
-        Answers after a stimulus that stalled or was hidden.
-    longest_run
-        Of one and the same answer.
-    false_alarms, same_pairs
-        "Different" at same-different pairs with no difference, of so many.
-    flags
-        In words, empty where there is nothing to say.
+    `shown_badly` counts answers after a stimulus that stalled or was hidden, `longest_run` one and the same answer,
+    `false_alarms` "different" at `same_pairs`; `flags` are in words, empty where there is nothing to say.
     """
 
     participant: str
@@ -80,16 +68,8 @@ class ParticipantQuality:
 class Quality:
     """How complete and how plausible the answers are.
 
-    Attributes
-    ----------
-    fastest_s
-        An answer sooner than this after the question can't be an answer to it. [seconds]
-    response_s
-        Quantiles of response times, by percent; empty where no times are known.
-    flagged, rules
-        How many participants are flagged, and by which rules in words.
-    table
-        One entry a participant.
+    An answer sooner than `fastest_s` seconds can't be one; `response_s` are quantiles by percent, empty where no times
+    are known; `table` has one entry a participant.
     """
 
     participants: int

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from study.errors import AnalysisError
-from study.report.power import read_power
+from study.report.power import FoundPower, read_power
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol
     from study.experiment.stimuli.manifest import Manifest
     from study.experiment.store.responses import Responses
-
-Result = Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +45,7 @@ class Material:
     sessions: pd.DataFrame
     presentations: pd.DataFrame
     withdrawn: int
-    power: tuple[Result, ...]
+    power: tuple[FoundPower, ...]
 
 
 def gather(folder: Path, database: str | None = None) -> Material:

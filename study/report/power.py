@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,32 @@ from study.report import tables, words
 from study.report.drawing import BLUE, INK, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
 from study.report.sections.section import Drawing
 
-Result = Mapping[str, Any]
 
-NEEDED = ("study", "aim", "points", "target", "needed", "note", "answers_per_participant")
+@dataclass(frozen=True)
+class Point:
+    """The power that studies with so many participants were found to have, with Wilson's interval."""
+
+    participants: int
+    studies: int
+    power: float
+    low: float
+    high: float
 
 
-def read_power(folder: Path) -> list[Result]:
+@dataclass(frozen=True)
+class FoundPower:
+    """What the page shows of a file that `segue power --json` printed."""
+
+    study: str
+    aim: str
+    points: tuple[Point, ...]
+    target: float
+    needed: int | None
+    note: str
+    answers_per_participant: int
+
+
+def read_power(folder: Path) -> list[FoundPower]:
     """Return what `segue power --json` printed into files `power*.json` of a results folder, by the files' names.
 
     Raises
@@ -29,65 +50,53 @@ def read_power(folder: Path) -> list[Result]:
     found = []
     for path in sorted(folder.glob("power*.json")):
         try:
-            content = json.loads(path.read_text(encoding="utf-8-sig"))
-        except (OSError, ValueError) as error:
-            raise AnalysisError(f"{path}: expected what `segue power --json` prints: {error}; make it anew") from error
-        missing = [key for key in NEEDED if not isinstance(content, dict) or key not in content] or _gaps(content)
-        if missing:
+            found.append(_parsed(json.loads(path.read_text(encoding="utf-8-sig"))))
+        except (OSError, ValueError, TypeError, KeyError) as error:
+            what = f"no {error}" if isinstance(error, KeyError) else error
             raise AnalysisError(
-                f"{path}: expected what `segue power --json` prints, found no {', '.join(missing)}; make it anew or "
-                "name "
-                "the file otherwise"
-            )
-        found.append(content)
+                f"{path}: expected what `segue power --json` prints, found {what}; make it anew, or name the file "
+                "otherwise"
+            ) from error
     return found
 
 
-def _gaps(content: dict[str, Any]) -> list[str]:
-    """What the points of a curve lack."""
-    points = content["points"]
-    if not isinstance(points, list) or not points or not all(isinstance(point, dict) for point in points):
-        return ["points"]
-    keys = ("participants", "studies", "power")
-    gaps = [f"points.{key}" for point in points for key in keys if not _is_number(point.get(key))]
-    intervals = [point.get("interval") for point in points]
-    ends = all(isinstance(one, dict) and {"low", "high"} <= one.keys() for one in intervals)
-    numbers = [key for key in ("target", "answers_per_participant") if not _is_number(content[key])]
-    return sorted({*gaps, *numbers}) + ([] if ends else ["points.interval"])
+def _parsed(content: Any) -> FoundPower:
+    points = []
+    for point in content["points"]:
+        low, high = (point["interval"][end] for end in ("low", "high"))
+        ends = 0.0 if low is None else float(low), 1.0 if high is None else float(high)
+        points.append(Point(int(point["participants"]), int(point["studies"]), float(point["power"]), *ends))
+    if not points:
+        raise ValueError("no points")
+    return FoundPower(
+        study=str(content["study"]),
+        aim=str(content["aim"]),
+        points=tuple(points),
+        target=float(content["target"]),
+        needed=None if content["needed"] is None else int(content["needed"]),
+        note=str(content["note"]),
+        answers_per_participant=int(content["answers_per_participant"]),
+    )
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def power_sentence(found: Result) -> str:
+def power_sentence(found: FoundPower) -> str:
     """Return how many participants are needed, in words."""
     who = (
-        f"{counted(found['needed'], 'participant')} are needed"
-        if found["needed"]
+        f"{counted(found.needed, 'participant')} are needed"
+        if found.needed
         else "no number of participants that was tried is enough"
     )
-    note = f" ({found['note']})" if found["note"] else ""
+    note = f" ({found.note})" if found.note else ""
     return (
-        f"{words.sentence(words.readable(found['study']))}: to {found['aim']} in {100 * found['target']:g}% of "
+        f"{words.sentence(words.readable(found.study))}: to {found.aim} in {100 * found.target:g}% of "
         "studies, "
-        f"with {counted(found['answers_per_participant'], 'answer')} of each participant, {who}{note}."
+        f"with {counted(found.answers_per_participant, 'answer')} of each participant, {who}{note}."
     )
 
 
-def power_table(found: Sequence[Result]) -> tables.Table:
+def power_table(found: Sequence[FoundPower]) -> tables.Table:
     """Return the power at every number of participants that was tried."""
-    rows = [
-        {
-            "study": words.readable(entry["study"]),
-            "participants": point["participants"],
-            "studies": point["studies"],
-            "power": point["power"],
-            **{end: point["interval"][end] for end in ("low", "high")},
-        }
-        for entry in found
-        for point in entry["points"]
-    ]
+    rows = [vars(point) | {"study": words.readable(entry.study)} for entry in found for point in entry.points]
     return tables.make(
         "power",
         "Power. The share of simulated studies, through the real plan and the real analysis, that found what is there, "
@@ -97,15 +106,14 @@ def power_table(found: Sequence[Result]) -> tables.Table:
     )
 
 
-def power_drawing(found: Result, name: str, asked: int) -> Drawing:
+def power_drawing(found: FoundPower, name: str, asked: int) -> Drawing:
     """Draw one study's power by the number of participants; `asked` is how many took part."""
-    points = found["points"]
-    across, up = [point["participants"] for point in points], [point["power"] for point in points]
-    below = [p["power"] - (p["interval"]["low"] or 0.0) for p in points]
-    above = [(1.0 if p["interval"]["high"] is None else p["interval"]["high"]) - p["power"] for p in points]
+    points = found.points
+    across, up = [point.participants for point in points], [point.power for point in points]
+    below, above = [one.power - one.low for one in points], [one.high - one.power for one in points]
     with style():
         figure, axes = new_figure(7.2, 2.6)
-        axes.axhline(found["target"], color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
+        axes.axhline(found.target, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
         axes.errorbar(across, up, yerr=[below, above], color=BLUE, marker="o", markersize=4.5, linewidth=1.5,
                       elinewidth=1, capsize=2.5)  # fmt: skip
         if asked and min(across) <= asked <= max(across):
@@ -114,7 +122,7 @@ def power_drawing(found: Result, name: str, asked: int) -> Drawing:
                 f"{asked} in this study", (asked, 0), xytext=(4, 4), textcoords="offset points", color=INK, fontsize=8.5
             )
         axes.annotate(
-            f"aim {found['target']:g}", (across[0], found["target"]), xytext=(-6, 3), textcoords="offset points",
+            f"aim {found.target:g}", (across[0], found.target), xytext=(-6, 3), textcoords="offset points",
             color=SOFT, fontsize=8.5,
         )  # fmt: skip
         axes.set_ylim(-0.02, 1.04)
@@ -122,6 +130,6 @@ def power_drawing(found: Result, name: str, asked: int) -> Drawing:
         axes.set_title("power")
         quiet_grid(axes)
         add_mark(figure, "simulated studies")
-        spoken = "; ".join(f"{counted(point['participants'], 'participant')}: {point['power']:.2f}" for point in points)
-        svg = to_svg(figure, f"power-{found['study']}", f"Power of {words.readable(found['study'])}", spoken)
-    return Drawing(name, svg, f"Power to {found['aim']}, by simulation, with Wilson’s 95% intervals.")
+        spoken = "; ".join(f"{counted(point.participants, 'participant')}: {point.power:.2f}" for point in points)
+        svg = to_svg(figure, f"power-{found.study}", f"Power of {words.readable(found.study)}", spoken)
+    return Drawing(name, svg, f"Power to {found.aim}, by simulation, with Wilson’s 95% intervals.")

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from study.analysis.ratings.analyse import anova_sentences
 from study.analysis.ratings.comparisons import rating_anova
-from study.analysis.ratings.words import anova_sentences
 from study.analysis.variance.effect_sizes import effect_size
 from study.analysis.variance.two_way import Squares, two_way
 from study.errors import AnalysisError

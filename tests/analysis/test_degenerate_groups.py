@@ -14,9 +14,9 @@ import pytest
 from study.analysis.analyse import analyse, analysis_json
 from study.analysis.confirmatory import confirmatory
 from study.analysis.preference.analyse import Preference, compare, strengths
+from study.analysis.ratings.analyse import anova_sentences
 from study.analysis.ratings.comparisons import rating_anova
 from study.analysis.ratings.table import rating_table
-from study.analysis.ratings.words import anova_sentences
 from study.analysis.study_result import Settings
 from study.analysis.to_json import to_json
 from study.errors import AnalysisError

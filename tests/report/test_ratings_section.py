@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from study.analysis.estimates import MeanTest
 from study.analysis.ratings.analyse import Ratings
 from study.analysis.ratings.comparisons import MethodDifference, MixedDesign, Question, Ranks, rating_anova
 from study.analysis.ratings.table import MethodRating, rating_table
@@ -15,9 +16,8 @@ from study.report.sections.section import About, Section
 
 def question(item: str, mean: float, f: float, p: float) -> Question:
     effect = VarianceEffect("method", f, 1, f, f, 48, p, partial_eta_squared=0.1)
-    difference = MethodDifference(
-        "cut-wang2003 minus cut-lee2002", 26, mean, 0.0, 1.0, 2.0, 25, p, "Student's t", "", holm_p_value=p
-    )
+    test = MeanTest(26, mean, 0.2, 0.0, 1.0, "", t=2.0, degrees_of_freedom=25, p_value=p)
+    difference = MethodDifference(**vars(test), of="cut-wang2003 minus cut-lee2002", test="Student's t", holm_p_value=p)
     return Question(
         item=item,
         participants=26,
@@ -35,7 +35,7 @@ def question(item: str, mean: float, f: float, p: float) -> Question:
 
 
 ROWS = tuple(
-    MethodRating("natural", method, 26, 26, mean, 0.2, mean - 0.4, mean + 0.4, "", 1.0, 2.0, {"2": 26})
+    MethodRating(26, mean, 0.2, mean - 0.4, mean + 0.4, "", "natural", method, 26, 1.0, 2.0, {"2": 26})
     for method, mean in (("cut-lee2002", 1.5), ("cut-wang2003", 2.2))
 )
 

@@ -35,24 +35,8 @@ if TYPE_CHECKING:
 class Comparison:
     """Two methods compared.
 
-    Attributes
-    ----------
-    published, ties
-        The pooled test, and how many answers, left out of it, were for neither.
-    participants
-        One share a participant against one half, a tie as half an answer.
-    clustering
-        How alike the answers of a participant are.
-    motions, motions_as_sample
-        The pooled test a motion pair, and tests that hold for other motions too.
-    order
-        Effect of the order of presentation.
-    no_preference
-        Equivalence test and Bayes factor.
-    answer
-        A sentence.
-    models
-        Mixed model and estimating equations; None where they were not asked for.
+    `published` leaves `ties` out, the test over `participants` takes them as half an answer; `answer` is a sentence.
+    `models` is None where they were not asked for.
     """
 
     method_a: str

@@ -31,17 +31,7 @@ NO_ORDER = "without a term for the order of presentation, which is not known or 
 
 @dataclass(frozen=True)
 class GroupModel:
-    """What a model says of the group, orders balanced.
-
-    Attributes
-    ----------
-    percent, low, high, p_value
-        Favouring the first method.
-    order_logit, order_p_value
-        What being shown first adds.
-    note
-        What can't be estimated, and why.
-    """
+    """What a model says of the group: percent for the first method, orders balanced, and what coming first adds."""
 
     percent: float | None = None
     low: float | None = None

@@ -77,13 +77,13 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> MotionsAs
     if "motion" not in part.columns or part["motion"].nunique() < 2:
         return MotionsAsSample(None, None, "fewer than two motions: they can't stand for others")
     shares = part.groupby(part["motion"].astype(str))["chose_a"].mean().to_numpy(dtype=np.float64)
-    test = estimates.mean_test(shares, 0.5, confidence)
+    test = estimates.mean_test(100 * shares, 50.0, confidence)
     by_motion = ByMotion(
         motions=test.participants,
         mean_percent=100 * float(shares.mean()),
-        low=None if test.interval.low is None else 100 * max(test.interval.low, 0.0),
-        high=None if test.interval.high is None else 100 * min(test.interval.high, 1.0),
-        t=test.statistic,
+        low=None if test.low is None else max(test.low, 0.0),
+        high=None if test.high is None else min(test.high, 100.0),
+        t=test.t,
         degrees_of_freedom=test.degrees_of_freedom,
         p_value=test.p_value,
     )

@@ -60,14 +60,14 @@ def no_preference(shares: ArrayLike, margin: float = MARGIN, alpha: float = 0.05
     from scipy.special import stdtr
 
     test = mean_test(shares, 0.5, 1 - 2 * alpha)
-    if test.statistic is None or test.standard_error is None or test.mean is None or test.degrees_of_freedom is None:
+    if test.t is None or test.standard_error is None or test.mean is None or test.degrees_of_freedom is None:
         return NoEffect(margin, None, Interval(None, None, 1 - 2 * alpha), None, test.note)
     freedom, error = test.degrees_of_freedom, test.standard_error
     above = float(stdtr(freedom, -(test.mean - (0.5 - margin)) / error))
     below = float(stdtr(freedom, (test.mean - (0.5 + margin)) / error))
     half = t_quantile(1 - 2 * alpha, freedom) * error
     interval = Interval(test.mean - half, test.mean + half, 1 - 2 * alpha)
-    return NoEffect(margin, max(above, below), interval, bayes_factor_null(test.statistic, test.participants))
+    return NoEffect(margin, max(above, below), interval, bayes_factor_null(test.t, test.participants))
 
 
 def bayes_factor_null(statistic: float, participants: int, scale: float = PRIOR_SCALE) -> float | None:

@@ -15,18 +15,10 @@ ONE_ORDER = "the two were always shown in the same order: a preference can't be 
 
 @dataclass(frozen=True)
 class OrderEffect:
-    """How far the order of presentation decided the answer.
+    """How far the order of presentation decided the answer; `note` says why something can't be given.
 
-    Attributes
-    ----------
-    first_percent, answers
-        How often the one shown first was favoured, of how many answers.
-    p_value
-        The default test of one share a participant against one half.
-    percent_a_first, percent_a_second, balanced_percent
-        Favouring the first method, by place, and the mean of these two: free of the order effect.
-    note
-        Why something can't be given.
+    `first_percent` is how often the one shown first was favoured, tested by one share a participant against one half;
+    the others are percentages for the first method by its place, and their mean, which is free of the order effect.
     """
 
     answers: int

@@ -17,22 +17,10 @@ STUDENT, SIGN = "Student's t over participants", "exact sign test"
 
 @dataclass(frozen=True)
 class ParticipantTests:
-    """The preference with one number a participant.
+    """The preference with one number a participant; `note` says why something can't be given.
 
-    Attributes
-    ----------
-    participants, mean_percent, standard_error, low, high
-        Mean over participants of their percentages, with Student's interval.
-    t, degrees_of_freedom, p_value, test
-        Against one half, see `default_p_values`.
-    wilcoxon_p_value
-        By signed ranks.
-    robust_chi_square, robust_p_value
-        Pooled difference over its variance between participants, referred to F(1, participants - 1).
-    for_a, for_b, undecided
-        Participants.
-    note
-        Why something can't be given.
+    `test` and `p_value` are those of `default_p_values`; the robust chi-square is the pooled difference over its
+    variance between participants, referred to F(1, participants - 1).
     """
 
     participants: int
@@ -89,18 +77,16 @@ def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0
     """
     yes, total = np.asarray(chosen, dtype=np.float64), np.asarray(shown, dtype=np.float64)
     share = yes[total > 0] / total[total > 0]
-    test = estimates.mean_test(share, 0.5, confidence)
-    p_value = estimates.finite(float(default_p_values(yes, total)))
-    robust = _robust_chi_square(yes, total)
-    low, high = test.interval.low, test.interval.high
-    by_ranks = signed_rank(share - 0.5)
+    test = estimates.mean_test(100 * share, 50.0, confidence)
+    p_value = float(default_p_values(yes, total)) if test.participants > 1 else None
+    robust, by_ranks = _robust_chi_square(yes, total), signed_rank(share - 0.5)
     return ParticipantTests(
         participants=test.participants,
-        mean_percent=None if test.mean is None else 100 * test.mean,
-        standard_error=None if test.standard_error is None else 100 * test.standard_error,
-        low=None if low is None else 100 * max(low, 0.0),
-        high=None if high is None else 100 * min(high, 1.0),
-        t=test.statistic,
+        mean_percent=test.mean,
+        standard_error=test.standard_error,
+        low=None if test.low is None else max(test.low, 0.0),
+        high=None if test.high is None else min(test.high, 100.0),
+        t=test.t,
         degrees_of_freedom=test.degrees_of_freedom,
         p_value=p_value,
         test="none" if p_value is None else SIGN if test.p_value is None else STUDENT,

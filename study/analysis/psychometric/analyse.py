@@ -75,20 +75,8 @@ class LevelAnswers:
 class PsychometricStudy:
     """The result of a 2AFC or yes-no study.
 
-    Attributes
-    ----------
-    participants, pooled
-        Each participant's own function, and that of all answers taken as one person's.
-    likelihood
-        Maximum, profile interval and deviance of the same.
-    group
-        Mean over participants of their thresholds.
-    mixed, mixed_note
-        Threshold of a typical participant by a mixed model, or why it can't be had.
-    levels
-        Answers by level.
-    answer
-        A sentence.
+    `pooled` and `likelihood` are of all answers taken as one person's; `group` is the mean over participants of their
+    thresholds, `mixed` the threshold of a typical one, and `mixed_note` says why it can't be had.
     """
 
     confidence: float
@@ -193,8 +181,8 @@ def _group(own: tuple[OwnFunction, ...], model: Model, confidence: float) -> Gro
     return GroupThreshold(
         participants=test.participants,
         mean_threshold=back(test.mean),
-        low=back(test.interval.low),
-        high=back(test.interval.high),
+        low=back(test.low),
+        high=back(test.high),
         standard_deviation=float(axis.std(ddof=1)) if len(axis) > 1 else None,
         note="; ".join(filter(None, (test.note, f"{left_out} of {have_none}" if left_out else ""))),
     )

@@ -17,16 +17,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TypicalThreshold:
-    """Where a typical participant's curve is half way.
+    """Where a typical participant's curve is half way, with Student's interval; None where there is none, see `note`.
 
-    Attributes
-    ----------
-    threshold, standard_error, low, high
-        By the delta method, with Student's interval; None where there is none.
-    slope, intercept_spread, slope_spread, correlation
-        Of the curve on the scale of its link, and how participants differ in it.
-    note
-        Why something can't be given.
+    Slope and spreads are on the scale of the link.
     """
 
     threshold: float | None = None

@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class MethodDifference:
+class MethodDifference(estimates.MeanTest):
     """How much higher the other of two methods was rated: mean of each participant's own difference, with its test.
 
     `test` is Student's t, or the exact sign test where all participants differ alike; `holm_p_value` is adjusted over
@@ -38,15 +38,7 @@ class MethodDifference:
     """
 
     of: str
-    participants: int
-    mean: float | None
-    low: float | None
-    high: float | None
-    t: float | None
-    degrees_of_freedom: int | None
-    p_value: float | None
     test: str
-    note: str
     holm_p_value: float | None = None
 
 
@@ -113,17 +105,8 @@ class Ordinal:
 class Question:
     """Methods compared in one question.
 
-    Attributes
-    ----------
-    anova, balanced, type_ii
-        As published, by type III (empty where it can't be had); whether all combinations have as many answers, and the
-        same by type II where they have not.
-    differences, difference
-        Of each pair of methods over participants; the only one where there are two methods, else None.
-    mixed_design, ranks, ordinal
-        Tests beside; `ordinal` is None where no models were asked for.
-    note
-        What can't be had.
+    `anova` is as published, by type III sums of squares, and `type_ii` the same where the combinations have not as many
+    answers; `difference` is the only one of `differences` where there are two methods. `note` says what can't be had.
     """
 
     item: str
@@ -217,16 +200,9 @@ def _difference(one: pd.Series[float], other: pd.Series[float], confidence: floa
     p_value = signed_rank(apart) if test.p_value is None else test.p_value
     note = "the two were rated alike by everybody" if len(apart) > 1 and not apart.any() else test.note
     return MethodDifference(
+        **vars(test) | {"p_value": p_value, "note": note if len(apart) else "nobody rated both"},
         of=f"{other.name} minus {one.name}",
-        participants=test.participants,
-        mean=test.mean,
-        low=test.interval.low,
-        high=test.interval.high,
-        t=test.statistic,
-        degrees_of_freedom=test.degrees_of_freedom,
-        p_value=p_value,
         test="none" if p_value is None else "exact sign test" if test.p_value is None else "Student's t",
-        note="nobody rated both" if not len(apart) else note,
     )
 
 

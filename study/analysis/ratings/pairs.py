@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
+from study.analysis.estimates import Mean, MeanTest, mean_of, mean_test
 from study.analysis.rank_tests import NO_RANKS, signed_rank
 from study.analysis.ratings.answers import rated
 from study.counting import counted
@@ -36,31 +37,16 @@ class AllAnswers:
 
 
 @dataclass(frozen=True)
-class ScoreTest:
-    """One mean score a participant, with Student's interval, against an expected score."""
-
-    participants: int
-    mean: float
-    standard_error: float | None
-    low: float | None
-    high: float | None
-    t: float | None
-    degrees_of_freedom: int | None
-    p_value: float | None
-    note: str
-
-
-@dataclass(frozen=True)
-class PeopleTest(ScoreTest):
-    """The same with the spread between participants, and by signed ranks."""
+class ScoreTest(MeanTest):
+    """One mean score a participant against the middle of the scale, by Student's t and by signed ranks."""
 
     standard_deviation: float | None
     signed_rank_p_value: float | None
 
 
 @dataclass(frozen=True)
-class MotionScore(ScoreTest):
-    """The same for one motion, adjusted over the motions by Holm's method."""
+class MotionScore(MeanTest):
+    """The same for one motion, by Student's t, adjusted over the motions by Holm's method."""
 
     motion: str
     answers: int
@@ -68,33 +54,19 @@ class MotionScore(ScoreTest):
 
 
 @dataclass(frozen=True)
-class OrderScore:
+class OrderScore(Mean):
     """Scores where the method `first` was shown first."""
 
     first: str
     answers: int
-    participants: int
-    mean: float
-    standard_error: float | None
-    low: float | None
-    high: float | None
-    note: str
 
 
 @dataclass(frozen=True)
 class OrderTest:
     """How far a score depends on which method was shown first.
 
-    Attributes
-    ----------
-    rows
-        One an order.
-    kind
-        "between" where each participant saw one order, as in 2003, else "within"; empty where there is one order alone.
-    f, degrees_of_freedom, error_degrees_of_freedom, p_value
-        Analysis of variance of participants' means by order; within participants, t squared of their own differences.
-    balanced_mean
-        The mean of both orders.
+    `kind` is "between" where each participant saw one order, as in 2003, else "within", and empty where there is one
+    order alone. F is of participants' means by order; within participants, t squared of their own differences.
     """
 
     rows: tuple[OrderScore, ...] = ()
@@ -111,16 +83,8 @@ class OrderTest:
 class PairQuestion:
     """How method b compares with method a in one question.
 
-    Attributes
-    ----------
-    of
-        "b compared with a".
-    middle, distribution
-        The score that means no difference, and the answers at each point of the scale.
-    published, participants
-        Of all answers, and of one mean score a participant against the middle.
-    order, motions
-        Which was shown first, and the same test a motion.
+    `middle` is the score that means no difference; `published` is of all answers, `participants` of one mean score a
+    participant against the middle, `motions` the same a motion.
     """
 
     item: str
@@ -131,7 +95,7 @@ class PairQuestion:
     middle: float
     distribution: dict[str, int]
     published: AllAnswers
-    participants: PeopleTest
+    participants: ScoreTest
     order: OrderTest
     motions: tuple[MotionScore, ...]
 
@@ -208,28 +172,12 @@ def _means(part: pd.DataFrame) -> pd.Series[float]:
     return part.groupby("participant")["score"].mean()
 
 
-def _over_participants(part: pd.DataFrame, middle: float, confidence: float) -> PeopleTest:
-    """One mean score a participant against the middle of the scale, by Student's t and by signed ranks."""
+def _over_participants(part: pd.DataFrame, middle: float, confidence: float) -> ScoreTest:
     means = _means(part)
-    found, by_ranks = _against(means, middle, confidence), signed_rank(means - middle)
+    found, by_ranks = mean_test(means, middle, confidence), signed_rank(means - middle)
     note = "; ".join(filter(None, (found.note, NO_RANKS if by_ranks is None else "")))
     spread = float(means.std(ddof=1)) if len(means) > 1 else None
-    return PeopleTest(**vars(found) | {"note": note}, standard_deviation=spread, signed_rank_p_value=by_ranks)
-
-
-def _against(means: pd.Series[float], expected: float, confidence: float) -> ScoreTest:
-    test = estimates.mean_test(means, expected, confidence)
-    return ScoreTest(
-        participants=test.participants,
-        mean=float(means.mean()),
-        standard_error=test.standard_error,
-        low=test.interval.low,
-        high=test.interval.high,
-        t=test.statistic,
-        degrees_of_freedom=test.degrees_of_freedom,
-        p_value=test.p_value,
-        note=test.note,
-    )
+    return ScoreTest(**vars(found) | {"note": note}, standard_deviation=spread, signed_rank_p_value=by_ranks)
 
 
 def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> OrderTest:
@@ -247,19 +195,8 @@ def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> OrderTest:
         own = part[part["a_first"] == a_first]
         if len(own):
             groups.append(_means(own))
-            test = _against(groups[-1], 0.0, confidence)
-            rows.append(
-                OrderScore(
-                    first=str(own.iloc[0]["method_a" if a_first else "method_b"]),
-                    answers=len(own),
-                    participants=test.participants,
-                    mean=test.mean,
-                    standard_error=test.standard_error,
-                    low=test.low,
-                    high=test.high,
-                    note=test.note,
-                )
-            )
+            first = str(own.iloc[0]["method_a" if a_first else "method_b"])
+            rows.append(OrderScore(**vars(mean_of(groups[-1], confidence)), first=first, answers=len(own)))
     if len(groups) < 2:
         return OrderTest(tuple(rows), note="one order of presentation: its effect can't be estimated")
     balanced = float(np.mean([group.mean() for group in groups]))
@@ -282,10 +219,10 @@ def _between(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
 
 def _within(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
     """Each participant's own difference between the orders; those who saw one order alone are left out."""
-    test = estimates.mean_test((first - second).to_numpy(dtype=np.float64), 0.0)
-    if test.statistic is None or test.degrees_of_freedom is None:
+    test = mean_test(first - second, 0.0)
+    if test.t is None or test.degrees_of_freedom is None:
         return OrderTest(note=f"effect of order: {test.note}")
-    return _tested(test.statistic**2, test.degrees_of_freedom)
+    return _tested(test.t**2, test.degrees_of_freedom)
 
 
 def _tested(f: float, left: int) -> OrderTest:
@@ -297,7 +234,7 @@ def _motions(part: pd.DataFrame, middle: float, confidence: float) -> tuple[Moti
     if "motion" not in part.columns:
         return ()
     groups = [(str(motion), own) for motion, own in part.groupby("motion", sort=False)]
-    tests = [_against(_means(own), middle, confidence) for _, own in groups]
+    tests = [mean_test(_means(own), middle, confidence) for _, own in groups]
     adjusted = estimates.holm([test.p_value for test in tests])
     return tuple(
         MotionScore(**vars(test), motion=motion, answers=len(own), holm_p_value=p_value)

@@ -9,9 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from study.analysis.estimates import mean_test
+from study.analysis.estimates import Mean, mean_of
 from study.analysis.ratings.answers import first_seen, rated
 
 if TYPE_CHECKING:
@@ -19,18 +17,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class MeanRating:
-    """The mean over participants of their means, with its standard error and Student's interval."""
+class MeanRating(Mean):
+    """How a method was rated in one question: the mean over participants of their means."""
 
     item: str
     method: str
     answers: int
-    participants: int
-    mean: float
-    standard_error: float | None
-    low: float | None
-    high: float | None
-    note: str
 
 
 @dataclass(frozen=True)
@@ -103,18 +95,5 @@ def rating_cells(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[CellR
 
 def _mean(item: str, method: str, values: pd.Series[float], who: pd.Series[str], confidence: float) -> dict[str, Any]:
     """The fields of a `MeanRating`."""
-    means = values.groupby(who.loc[values.index]).mean().to_numpy(dtype=np.float64)
-    test = mean_test(means, 0.0, confidence)
-    return vars(
-        MeanRating(
-            item=item,
-            method=method,
-            answers=len(values),
-            participants=test.participants,
-            mean=float(means.mean()),
-            standard_error=test.standard_error,
-            low=test.interval.low,
-            high=test.interval.high,
-            note=test.note,
-        )
-    )
+    mean = mean_of(values.groupby(who.loc[values.index]).mean(), confidence)
+    return vars(mean) | {"item": item, "method": method, "answers": len(values)}

@@ -40,46 +40,41 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class MotionThresholds:
-    """A same-different study by one motion; see `SameDifferent`."""
+class Thresholds:
+    """What all motions together and each by itself have; see `SameDifferent`."""
 
-    motion: str
     answers: int
-    percent_where_different: float | None
-    percent_where_same: float | None
-    note: str
+    percent_different: tuple[PercentDifferent, ...]
     published: dict[Side, Threshold]
     model: ModelFit | None
     model_note: str
-    percent_different: tuple[PercentDifferent, ...]
 
 
 @dataclass(frozen=True)
-class SameDifferent:
+class MotionThresholds(Thresholds):
+    """A same-different study by one motion."""
+
+    motion: str
+    percent_where_different: float | None
+    percent_where_same: float | None
+    note: str
+
+
+@dataclass(frozen=True)
+class SameDifferent(Thresholds):
     """The result of a same-different study.
 
     Attributes
     ----------
-    participants, answers, missed
-        How many answered, how often, and how many answers were missed.
     level
         Share of "different" at threshold.
-    percent_different
-        The points of Figure 6.
-    published
-        Crossings of straight lines, by side.
-    model, model_note
-        The differencing model of the group's curve, and what to be careful about, or why there is none.
-    mixed, mixed_note
-        The same of participants who differ: the median observer, and the group.
-    d_prime
-        Sensitivity at each level.
+    percent_different, published
+        The points of Figure 6, and where straight lines between them cross, by side.
+    model, mixed
+        The differencing model of the group's curve, and that of participants who differ; their notes say what to be
+        careful about, or why there is none.
     clustering
         How alike the answers of a participant are, at the pairs with a difference.
-    motions, across_motions
-        The same per motion, and tests that performance is the same across them.
-    order, order_test
-        Share of "different" by which came first, and the test that it does not matter.
     rules
         Differencing against independent observations.
     profile
@@ -93,13 +88,8 @@ class SameDifferent:
     keys: ClassVar[Mapping[str, str]] = {"jnd": ""}
 
     participants: int
-    answers: int
     missed: int
     level: float
-    percent_different: tuple[PercentDifferent, ...]
-    published: dict[Side, Threshold]
-    model: ModelFit | None
-    model_note: str
     mixed: MixedThresholds | None
     mixed_note: str
     d_prime: tuple[LevelDPrime, ...]
@@ -142,22 +132,17 @@ def analyse_jnd(
     estimates.check_share(level, "level")
     rng = np.random.default_rng(seed)
     counts = count_answers(answers)
-    published = crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng)
-    fitted = fit_model(counts, level=level, confidence=confidence)
+    found = _thresholds(counts, level, confidence, resamples, rng)
     mixed = fit_mixed_thresholds(counts, level=level, confidence=confidence)
     moved = counts.differences != 0
     given = same_different_answers(answers)
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
-    likelihood = fitted.log_likelihood if isinstance(fitted, ModelFit) else None
+    likelihood = found.model.log_likelihood if found.model else None
     return SameDifferent(
+        **vars(found),
         participants=len(counts.participants),
-        answers=int(counts.shown.sum()),
         missed=len(chosen) - len(given),
         level=level,
-        percent_different=percent_different(counts, confidence),
-        published=published,
-        model=fitted if isinstance(fitted, ModelFit) else None,
-        model_note=fitted.note if isinstance(fitted, ModelFit) else fitted,
         mixed=mixed if isinstance(mixed, MixedThresholds) else None,
         mixed_note=mixed.note if isinstance(mixed, MixedThresholds) else mixed,
         d_prime=d_prime_table(counts, confidence),
@@ -168,7 +153,20 @@ def analyse_jnd(
         order_test=order_test(given),
         rules=compare_rules(fit_independent(counts, level), likelihood),
         profile=profile_intervals(counts, level, confidence),
-        answer=in_words(published, fitted, mixed, level),
+        answer=in_words(found, mixed, level),
+    )
+
+
+def _thresholds(
+    counts: Counts, level: float, confidence: float, resamples: int, rng: np.random.Generator
+) -> Thresholds:
+    fitted = fit_model(counts, level=level, confidence=confidence)
+    return Thresholds(
+        answers=int(counts.shown.sum()),
+        percent_different=percent_different(counts, confidence),
+        published=crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng),
+        model=fitted if isinstance(fitted, ModelFit) else None,
+        model_note=fitted.note if isinstance(fitted, ModelFit) else fitted,
     )
 
 
@@ -187,15 +185,14 @@ def analyse_same_different(answers: pd.DataFrame, name: str, settings: Settings)
     return replace(found, staircases=own, answer=f"{own.in_words()} The following rest on all trials. {found.answer}")
 
 
-def in_words(
-    published: Mapping[Side, Threshold], fitted: ModelFit | str, mixed: MixedThresholds | str, level: float
-) -> str:
+def in_words(found: Thresholds, mixed: MixedThresholds | str, level: float) -> str:
     """Return the thresholds in sentences: as published, corrected, and those of the median observer."""
     first = f"Read off straight lines, as published, {100 * level:.0f}% of the answers are “different” at "
-    first += _sides_in_words(published)
-    if isinstance(fitted, str):
-        return f"{first}. No model was fitted: {fitted}."
-    text = f"{first}. By the differencing model the just noticeable difference is {_sides_in_words(fitted.jnd)}."
+    first += _sides_in_words(found.published)
+    if found.model is None:
+        return f"{first}. No model was fitted: {found.model_note}."
+    jnd = _sides_in_words(found.model.jnd)
+    text = f"{first}. By the differencing model the just noticeable difference is {jnd}."
     if isinstance(mixed, str):
         return text
     return f"{text} That is the group's; the median observer's is {_sides_in_words(mixed.typical)}."
@@ -224,19 +221,14 @@ def _by_motion(
     rows = []
     for motion, part in given.groupby(given["motion"].astype(str), sort=False):
         counts = count_answers(part)
-        fitted = fit_model(counts, level=level, confidence=confidence)
         moved = counts.differences != 0
         rows.append(
             MotionThresholds(
+                **vars(_thresholds(counts, level, confidence, resamples, rng)),
                 motion=str(motion),
-                answers=int(counts.shown.sum()),
                 percent_where_different=_percent(counts, moved),
                 percent_where_same=_percent(counts, ~moved),
                 note="" if moved.any() and not moved.all() else "pairs with a difference only, or without one",
-                published=crossings(counts, level=level, confidence=confidence, resamples=resamples, rng=rng),
-                model=fitted if isinstance(fitted, ModelFit) else None,
-                model_note=fitted.note if isinstance(fitted, ModelFit) else fitted,
-                percent_different=percent_different(counts, confidence),
             )
         )
     return tuple(rows)

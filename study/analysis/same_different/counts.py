@@ -46,18 +46,8 @@ class Counts:
 class PercentDifferent:
     """How often a difference was seen (a point of 2004 Figure 6).
 
-    Attributes
-    ----------
-    difference_frames
-        Signed difference in blend length.
-    participants, answers, different
-        How many answered, how often, and how many of these answers were "different".
-    percent, standard_error
-        Mean over participants of their percentages, and its standard error; None for one participant.
-    low, high
-        Wilson's interval of the answers as if independent, in percent: it says something even where all answers agree.
-    note
-        Why there is no standard error.
+    `percent` is the mean over participants of their percentages, with its standard error; `low` and `high` are Wilson's
+    interval of the answers as if independent, in percent: it says something even where all answers agree.
     """
 
     difference_frames: float

@@ -15,18 +15,10 @@ from study.models.differencing import ROOT_TWO, detected
 
 @dataclass(frozen=True)
 class DPrime:
-    """Sensitivity under the differencing rule; None where there are no pairs of a kind.
+    """Sensitivity under the differencing rule, answers taken as independent; None where there are no pairs of a kind.
 
-    Attributes
-    ----------
-    d_prime
-        0 where hits do not exceed false alarms.
-    criterion
-        Standard deviations of one impression.
-    standard_error
-        Of d-prime, by the delta method; answers are taken as independent.
-    low, high
-        By profile likelihood; `high` is None where the answers set no upper end.
+    `d_prime` is 0 where hits do not exceed false alarms. Its error is by the delta method, `low` and `high` are by
+    profile likelihood; `high` is None where the answers set no upper end.
     """
 
     d_prime: float | None

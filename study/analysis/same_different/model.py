@@ -24,18 +24,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EqualSlopes:
-    """Tests that shorter and longer blends are told apart equally well.
+    """Tests that shorter and longer blends are told apart equally well; `note` says why there is no t.
 
-    Attributes
-    ----------
-    likelihood_ratio, degrees_of_freedom, p_value_answers_independent
-        Against one slope for both sides, answers as independent.
-    slope_ratio_longer_to_shorter
-        How many times as well a frame longer is seen.
-    t, t_degrees_of_freedom, p_value_participants_independent
-        Of the logarithm of that ratio, over participants (jackknife); None where they do not spread.
-    note
-        Why there is no t.
+    The likelihood ratio is against one slope for both sides; t is of the logarithm of the ratio of the slopes, over
+    participants (jackknife), and None where they do not spread.
     """
 
     likelihood_ratio: float
@@ -188,7 +180,7 @@ class _Spread:
         """Standard error of the criterion."""
         if self.left_out is not None:
             return estimates.jackknife_error(self.left_out.criterion)
-        return estimates.finite(float(best.criterion[0]) * math.sqrt(max(float(self.covariance[0, 0]), 0.0)))
+        return float(best.criterion[0]) * math.sqrt(max(float(self.covariance[0, 0]), 0.0))
 
 
 def _spread_of(

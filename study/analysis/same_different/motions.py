@@ -19,17 +19,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AcrossMotions:
-    """Tests that performance is the same across motions.
+    """Tests that performance is the same across motions; `note` says why one can't be given.
 
-    Attributes
-    ----------
-    chi_square, chi_square_degrees_of_freedom, chi_square_p_value
-        Correct and wrong answers by motion, every answer taken as independent.
-    f, f_degrees_of_freedom, f_p_value
-        Hotelling's test on the participants' own percentages correct, which asks neither independence nor equal
-        variances.
-    note
-        Why something can't be given.
+    The chi-square is of correct and wrong answers by motion, every answer taken as independent; F is Hotelling's test
+    on the participants' own percentages correct, which asks neither independence nor equal variances.
     """
 
     chi_square: float | None = None

@@ -24,18 +24,10 @@ class OrderShare:
 
 @dataclass(frozen=True)
 class OrderTest:
-    """Test that a pair is answered alike in both orders.
+    """Test that a pair is answered alike in both orders; `note` says why something can't be given.
 
-    Attributes
-    ----------
-    difference_percent, low, high
-        Share "different" where the reference came first, less where second: mean over participants and levels.
-    t, degrees_of_freedom, p_value
-        Of that mean, over participants.
-    chi_square, chi_square_degrees_of_freedom, chi_square_p_value
-        Likelihood ratio over levels, answers as independent.
-    note
-        Why something can't be given.
+    `difference_percent`, with interval and t over participants, is the share "different" where the reference came first
+    less where second, mean over levels; the chi-square is a likelihood ratio over levels, answers as independent.
     """
 
     difference_percent: float | None = None
@@ -87,9 +79,9 @@ def order_test(given: pd.DataFrame) -> OrderTest:
     test = estimates.mean_test(100 * gaps, 0.0)
     found = OrderTest(
         difference_percent=test.mean,
-        low=test.interval.low,
-        high=test.interval.high,
-        t=test.statistic,
+        low=test.low,
+        high=test.high,
+        t=test.t,
         degrees_of_freedom=test.degrees_of_freedom,
         p_value=test.p_value,
         note=test.note,

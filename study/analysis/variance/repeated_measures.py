@@ -27,18 +27,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class WithinEffect(Sizes):
-    """An effect of a mixed design.
+    """An effect of a mixed design; F and tests are None where nothing varies that it could be judged by.
 
-    Attributes
-    ----------
-    source, error
-        The effect, and what it is judged by.
-    epsilon, huynh_feldt_epsilon
-        How far sphericity holds (Greenhouse & Geisser; Huynh & Feldt); 1 with one degree of freedom within.
-    f, p_value, corrected_p_value, huynh_feldt_p_value
-        None where nothing varies that it could be judged by; the corrected one is by Greenhouse and Geisser.
-    generalized_eta_squared
-        Olejnik & Algina 2003: comparable with a design between participants.
+    `epsilon` is Greenhouse & Geisser's, by which `corrected_p_value` is corrected; `generalized_eta_squared` (Olejnik &
+    Algina 2003) is comparable with a design between participants.
     """
 
     source: str
@@ -61,13 +53,9 @@ class WithinEffect(Sizes):
 class Likeness:
     """How alike the values of one participant are, and what that does to tests that take them for independent.
 
-    Attributes
-    ----------
-    intraclass_correlation
-        Consistency, groups and columns taken out; below zero where people are more alike than chance would have it.
-    between_effect, within_effect
-        By how much the error variance of a comparison between groups is larger, and of one within participants smaller,
-        than that of independent values.
+    The correlation is of consistency, groups and columns taken out, and below zero where people are more alike than
+    chance would have it; the effects are by how much the error variance of a comparison between groups is larger, and
+    of one within participants smaller, than that of independent values.
     """
 
     intraclass_correlation: float | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from study.report import tables
 from study.report.tables import Table
@@ -80,17 +80,6 @@ class Section:
     readings: tuple[Reading, ...] = ()
 
 
-class OfMotion(Protocol):
-    """A result of one motion."""
-
-    @property
-    def motion(self) -> str:
-        """Its name."""
-
-
-MotionRow = TypeVar("MotionRow", bound=OfMotion)
-
-
 @dataclass(frozen=True)
 class About:
     """What a section knows of its study beside the result.
@@ -124,10 +113,9 @@ class About:
     transitions: tuple[str, ...] = ()
     known: Mapping[str, Any] = field(default_factory=dict)
 
-    def in_order(self, rows: Iterable[MotionRow]) -> tuple[MotionRow, ...]:
-        """Return results by motion in the protocol's order rather than that of the first participant's plan."""
-        places = {name: place for place, name in enumerate(self.transitions)}
-        return tuple(sorted(rows, key=lambda row: places.get(row.motion, len(places))))
+    def place(self, motion: str) -> int:
+        """Where a motion stands in the protocol; the first participant's plan has another order."""
+        return self.transitions.index(motion) if motion in self.transitions else len(self.transitions)
 
 
 Result = TypeVar("Result")

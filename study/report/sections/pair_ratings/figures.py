@@ -102,10 +102,11 @@ def _percent_axis(axes: Axes, widest: float, question: PairQuestion) -> None:
 
 
 def _mean(axes: Axes, found: ScoreTest, at: float) -> None:
+    mean = found.mean or 0.0
     if found.low is not None and found.high is not None:
         axes.plot([found.low, found.high], [at, at], color=BLUE, linewidth=2)
-    axes.plot([found.mean], [at], "s", color=BLUE, markersize=5.5)
-    axes.annotate(f"{found.mean:.2f}", (found.mean, at), xytext=(0, 6), textcoords="offset points",
+    axes.plot([mean], [at], "s", color=BLUE, markersize=5.5)
+    axes.annotate(f"{mean:.2f}", (mean, at), xytext=(0, 6), textcoords="offset points",
                   ha="center", fontsize=8.5, color=INK)  # fmt: skip
 
 

@@ -26,7 +26,10 @@ def pair_ratings_section(result: PairRatings, about: About) -> Section | None:
     """Return the section of a study in which pairs were rated; None without a question."""
     if not result.questions:
         return None
-    questions = [replace(question, motions=about.in_order(question.motions)) for question in result.questions]
+    questions = [
+        replace(question, motions=tuple(sorted(question.motions, key=lambda row: about.place(row.motion))))
+        for question in result.questions
+    ]
     name, top = about.name, len(questions[0].distribution) - 1
     scale = f"on a scale of 0 to {top}; {questions[0].middle:g} means that both were the same"
     caption = (
@@ -75,8 +78,8 @@ def _headline(questions: Sequence[PairQuestion], top: int, alpha: float) -> Head
             statement += f"; across participants {told} ({words.p(test.p_value)})"
         return Headline(f"{statement}.", f"{_size(questions)}. {detail}")
     detail = f"{_size(questions)}, {scale}. {detail}"
-    up = [test for test in known if test.mean > first.middle]
-    down = [test for test in known if test.mean < first.middle]
+    up = [test for test in known if (test.mean or 0.0) > first.middle]
+    down = [test for test in known if (test.mean or 0.0) < first.middle]
     side, which = ("above", up) if len(up) >= len(down) else ("below", down)
     if not which:
         return Headline(

@@ -41,7 +41,8 @@ def preference_section(result: Preference, about: About) -> Section | None:
     drawings, shown, folded, notes = [], [], [], []
     for place, comparison in enumerate(comparisons):
         suffix = f"_{place + 1}" if len(comparisons) > 1 else ""
-        ordered = replace(comparison, motions=about.in_order(comparison.motions))
+        motions = sorted(comparison.motions, key=lambda row: about.place(row.motion))
+        ordered = replace(comparison, motions=tuple(motions))
         drawings.append(_drawing(f"{name}_forest{suffix}", ordered, about.mark))
         shown.append(preference_table(name + suffix, ordered))
         folded += [make(name + suffix, ordered) for make in (motion_table, order_table, no_preference_table)]

@@ -85,7 +85,7 @@ def _cell_line(axes: Axes, own: Sequence[CellRating], methods: Sequence[str], pl
     """One order's means, with their intervals, a little to the side of the other's."""
     across = [methods.index(row.method) + 0.08 * (place - (orders - 1) / 2) for row in own]
     look = _order_style(place)
-    axes.plot(across, [row.mean for row in own], linewidth=1.2, markersize=4.5, **look)
+    axes.plot(across, [row.mean or 0.0 for row in own], linewidth=1.2, markersize=4.5, **look)
     for at, row in zip(across, own, strict=True):
         if row.low is not None and row.high is not None:
             axes.plot([at, at], [row.low, row.high], color=look["color"], linewidth=1.2)

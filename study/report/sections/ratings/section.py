@@ -73,7 +73,7 @@ def _headline(result: Ratings, points: int, alpha: float) -> Headline:
 
 def _highest(rows: Sequence[MethodRating], points: int) -> Headline:
     """The highest mean, or the only one, or that there is no highest."""
-    top = max(row.mean for row in rows)
+    top = max(row.mean or 0.0 for row in rows)
     best = [row for row in rows if row.mean == top]
     what = words.joined([words.readable(": ".join(filter(None, (row.item, row.method)))) for row in best])
     verb = "were rated alike," if len(best) > 1 else "was rated" if len(rows) == 1 else "was rated highest,"

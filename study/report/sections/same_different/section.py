@@ -47,7 +47,8 @@ SUBJECTS: Mapping[str, Callable[[int], str]] = {
 
 def same_different_section(result: SameDifferent, about: About) -> Section:
     """Return the section of a same-different study."""
-    result, name = replace(result, motions=about.in_order(result.motions)), about.name
+    motions = sorted(result.motions, key=lambda row: about.place(row.motion))
+    result, name = replace(result, motions=tuple(motions)), about.name
     several = len(result.motions) > 1
     return Section(
         anchor=f"study-{name}",
