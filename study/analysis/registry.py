@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from study.analysis.oddity.analyse import Oddity, analyse_oddity
 from study.analysis.preference.analyse import Preference, analyse_preference
 from study.analysis.ratings.analyse import PairRatings, Ratings, analyse_ratings
 from study.analysis.same_different.analyse import SameDifferent, analyse_same_different
@@ -14,6 +15,7 @@ ANALYSES: Mapping[str, TaskAnalysis] = {
     "same-different": TaskAnalysis(analyse_same_different, (SameDifferent,)),
     "preference": TaskAnalysis(analyse_preference, (Preference,)),
     "rating": TaskAnalysis(analyse_ratings, (Ratings, PairRatings)),
+    "oddity": TaskAnalysis(analyse_oddity, (Oddity,)),
 }
 
 

@@ -24,7 +24,7 @@ EFFECTS: Mapping[str, Make] = {
     "rating": rating_effect,
 }
 
-WITHOUT_EFFECT: Mapping[str, str] = {}
+WITHOUT_EFFECT: Mapping[str, str] = {"oddity": "no effect on it can be stated yet"}
 """Tasks for which no number of participants can be planned, and why."""
 
 

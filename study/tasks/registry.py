@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from study.tasks.answer import Answer
+from study.tasks.oddity import ODDITY
 from study.tasks.pair_rating import PAIR_RATING
 from study.tasks.preference import PREFERENCE
 from study.tasks.rating import RATING
@@ -13,7 +14,7 @@ from study.tasks.same_different import SAME_DIFFERENT
 from study.tasks.task import Asked, Problem, Task
 from study.tasks.trial import Trial
 
-TASKS: Mapping[str, Task] = {task.name: task for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING)}
+TASKS: Mapping[str, Task] = {task.name: task for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING, ODDITY)}
 
 NAMES: tuple[str, ...] = tuple(dict.fromkeys(task.asked_as for task in TASKS.values()))
 """What a protocol may call a task."""

@@ -91,7 +91,8 @@ class StudySpec(Part):
     )
     differences_frames: Annotated[tuple[Difference, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(),
-        description="Same-different: comparison minus reference blend length, a pair each; 0 shows one twice. [frames]",
+        description="Same-different, oddity: comparison minus reference blend length, a pair each; 0 shows one twice, "
+        "in same-different studies. [frames]",
     )
     fixed_frames: int | None = Field(
         default=None,

@@ -109,10 +109,11 @@ class Keys(Part):
     different: Key = Field(default="d", description="Answers that they differ.")
     first: Key = Field(default="1", description="Answers with the first of a pair.")
     second: Key = Field(default="2", description="Answers with the second of a pair.")
+    third: Key = Field(default="3", description="Answers with the third of three.")
 
     @model_validator(mode="after")
     def _differ(self) -> Self:
-        for one, other in (("same", "different"), ("first", "second")):
+        for one, other in (("same", "different"), ("first", "second"), ("first", "third"), ("second", "third")):
             if getattr(self, one) == getattr(self, other):
                 raise KeyMismatchError(f"expected two keys for {one} and {other}, found one; change it", other)
         return self
@@ -135,6 +136,7 @@ class Texts(Part):
     different: str = Field(default="Different", min_length=1, description="The answer `different`.")
     first: str = Field(default="First", min_length=1, description="The answer `first`.")
     second: str = Field(default="Second", min_length=1, description="The answer `second`.")
+    third: str = Field(default="Third", min_length=1, description="The answer `third`.")
     practice: str = Field(default="Practice", description="Shown above practice trials.")
     practice_right: str = Field(default="That was right.", description="After a right answer in practice.")
     practice_wrong: str = Field(

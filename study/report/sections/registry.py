@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from study.analysis.oddity.analyse import Oddity
 from study.analysis.preference.analyse import Preference
 from study.analysis.ratings.analyse import PairRatings, Ratings
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.study_result import StudyResult
+from study.report.sections.oddity import section as oddity
 from study.report.sections.pair_ratings import section as pair_ratings
 from study.report.sections.preference import section as preference
 from study.report.sections.ratings import section as ratings
@@ -20,4 +22,5 @@ SECTIONS: Mapping[type[StudyResult], SectionKind[Any]] = {
     Preference: preference.KIND,
     Ratings: ratings.KIND,
     PairRatings: pair_ratings.KIND,
+    Oddity: oddity.KIND,
 }

@@ -1,0 +1,158 @@
+"""Which of three differs: answers of an oddity task in; right answers, d' and thresholds out.
+
+For each difference in blend length the share of right answers, one number a participant, and the d' at which an
+observer of three percepts is right as often (`models.oddity`). For each side a psychometric function with a guess rate
+of one third; its threshold lies half of the way from chance to never wrong, at 67% right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from study.analysis import estimates
+from study.analysis.psychometric.analyse import PsychometricStudy, analyse_psychometric
+from study.analysis.psychometric.model import make_model
+from study.models.oddity import CHANCE, d_prime_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.analysis.study_result import Settings
+
+Side = Literal["shorter", "longer"]
+SIGNS: Mapping[Side, int] = {"shorter": -1, "longer": 1}
+NEEDED_COLUMNS = ("participant", "difference_frames", "correct", "answer")
+
+
+@dataclass(frozen=True)
+class OddityLevel:
+    """Answers at one difference in blend length.
+
+    Attributes
+    ----------
+    difference_frames
+        Comparison minus reference.
+    participants, answers
+        Who gave any, and how many.
+    percent, low, high
+        Right answers: mean over participants, with Student's interval, cut at 0 and 100%.
+    p_value
+        That participants are right as often as by chance, one time in three.
+    d_prime
+        Of an observer who is right as often; None where that is always.
+    """
+
+    difference_frames: int
+    participants: int
+    answers: int
+    percent: float
+    low: float | None
+    high: float | None
+    p_value: float | None
+    d_prime: float | None
+
+
+@dataclass(frozen=True)
+class SideThreshold:
+    """A threshold in frames of difference, over participants where there are several."""
+
+    frames: float | None
+    low: float | None
+    high: float | None
+    note: str
+
+
+@dataclass(frozen=True)
+class Oddity:
+    """The result of an oddity study.
+
+    Attributes
+    ----------
+    levels
+        By difference, rising.
+    functions
+        The psychometric function of each side, over the size of the difference.
+    """
+
+    keys: ClassVar[Mapping[str, str]] = {"oddity": ""}
+
+    levels: tuple[OddityLevel, ...]
+    functions: Mapping[Side, PsychometricStudy]
+
+    @property
+    def thresholds(self) -> dict[Side, SideThreshold]:
+        """Return the threshold to be believed of each side."""
+        return {side: _believed(found) for side, found in self.functions.items()}
+
+    def sentences(self, alpha: float) -> list[str]:
+        """Return how well the odd one was found, and the thresholds, in words."""
+        del alpha
+        if not self.levels:
+            return ["No answers were given."]
+        best = max(self.levels, key=lambda level: level.percent)
+        told = [
+            f"The odd one of three was found in {best.percent:.0f}% of the trials at {best.difference_frames:+d} "
+            f"frames, where chance gives {100 * CHANCE:.0f}%."
+        ]
+        return [*told, *(f"Blends that are {side}: {found.answer}" for side, found in self.functions.items())]
+
+
+def _believed(found: PsychometricStudy) -> SideThreshold:
+    mixed, group, alone = found.mixed, found.group, found.pooled.threshold
+    if mixed is not None and mixed.threshold is not None:
+        return SideThreshold(mixed.threshold, mixed.low, mixed.high, "of a typical participant")
+    if group.participants > 1 and group.mean_threshold is not None:
+        return SideThreshold(group.mean_threshold, group.low, group.high, "mean over participants")
+    if alone is None:
+        return SideThreshold(None, None, None, found.pooled.note)
+    return SideThreshold(alone.value, alone.interval.low, alone.interval.high, alone.note or "of all answers")
+
+
+def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddity:
+    """Analyse one oddity study.
+
+    Parameters
+    ----------
+    answers
+        Columns `participant`, `difference_frames`, `correct`, `answer`; missed answers have no `answer`.
+    name
+        Of the study.
+    settings
+        The level of confidence counts.
+
+    Raises
+    ------
+    AnalysisError
+        When a column is missing.
+    """
+    del name
+    estimates.check_columns(answers, NEEDED_COLUMNS, "an oddity analysis")
+    given = answers[answers["answer"].notna() & answers["correct"].notna() & answers["difference_frames"].notna()]
+    estimates.check_participants(given)
+    trials = given.assign(
+        participant=given["participant"].astype(str),
+        level=given["difference_frames"].abs().astype(float),
+        yes=given["correct"].astype(float),
+        shown=1.0,
+    )
+    model = make_model("2afc", choices=3)
+    functions: dict[Side, PsychometricStudy] = {}
+    for side, sign in SIGNS.items():
+        own = trials[trials["difference_frames"].astype(float) * sign > 0]
+        if len(own):
+            functions[side] = analyse_psychometric(own, model, confidence=settings.confidence)
+    return Oddity(tuple(_levels(trials, settings.confidence)), functions)
+
+
+def _levels(trials: pd.DataFrame, confidence: float) -> list[OddityLevel]:
+    found = []
+    for difference, part in trials.groupby(trials["difference_frames"].astype(int), sort=True):
+        test = estimates.mean_test(part.groupby("participant")["yes"].mean().to_numpy(), CHANCE, confidence)
+        share = test.mean or 0.0
+        ends = (test.interval.low, test.interval.high)
+        low, high = (None if end is None else 100 * min(max(end, 0.0), 1.0) for end in ends)
+        counts = int(difference), test.participants, len(part)
+        found.append(OddityLevel(*counts, 100 * share, low, high, test.p_value, d_prime_of(share)))
+    return found

@@ -1,0 +1,143 @@
+"""An oddity study on the page: right answers by difference, d' and thresholds in, headline, figure and tables out."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import TYPE_CHECKING
+
+from study.analysis.oddity.analyse import SIGNS, Oddity, Side, SideThreshold
+from study.counting import counted
+from study.models.oddity import CHANCE, HALFWAY
+from study.report import tables, words
+from study.report.drawing import BLUE, INK, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.references import MACMILLAN_2005
+from study.report.sections.section import About, Course, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.analysis.analyse import Analysis
+
+
+def oddity_section(result: Oddity, about: About) -> Section | None:
+    """Return the section of an oddity study; None where nothing was answered."""
+    if not result.levels:
+        return None
+    name = about.name
+    known = [_recovered(name, result, about)] if about.known else []
+    caption = (
+        "Right answers by difference in blend length: means over participants with 95% intervals (Student’s t), and "
+        "psychometric functions of all answers. The dashed line is chance; the dotted one, at 67%, defines thresholds."
+    )
+    return Section(
+        anchor=f"study-{name}",
+        title=about.title,
+        headlines=(_headline(result, about.fps),),
+        drawings=(Drawing(f"{name}_right", oddity_figure(result, f"study-{name}-right", about.mark), caption),),
+        tables=(_levels_table(name, result), _threshold_table(name, result, about.fps), *known),
+        notes=tuple(f"Blends that are {side}: {found.answer}" for side, found in result.functions.items()),
+        readings=tuple(_readings(result)),
+    )
+
+
+def oddity_figure(result: Oddity, name: str, mark: str) -> str:
+    """Draw right answers by difference, with the function of each side and its threshold."""
+    levels = result.levels
+    with style():
+        figure, axes = new_figure(7.2, 3.7)
+        axes.set_ylim(-3, 103)
+        axes.set_yticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
+        quiet_grid(axes)
+        axes.axhline(100 * CHANCE, color=SOFT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.axhline(100 * HALFWAY, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
+        for side, found in result.functions.items():
+            line = [(SIGNS[side] * level, 100 * share) for level, share in found.pooled.curve]
+            if line:
+                axes.plot(*zip(*line, strict=True), color=BLUE, linewidth=1.8, zorder=3)
+        for level in levels:
+            if level.low is not None and level.high is not None:
+                axes.plot([level.difference_frames] * 2, [level.low, level.high], color=INK, linewidth=1.1, zorder=4)
+        axes.plot([one.difference_frames for one in levels], [one.percent for one in levels], "o", color=INK, zorder=5)
+        ticks = [one.difference_frames for one in levels]
+        axes.set_xticks(ticks, [f"{tick:+d}".replace("-", "−") for tick in ticks])
+        axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
+        axes.set_ylabel("right answers")
+        add_mark(figure, mark)
+        spoken = "; ".join(f"{one.difference_frames:+d} frames: {one.percent:.0f}%" for one in levels)
+        return to_svg(figure, name, "Percent of right answers by difference in blend length", spoken)
+
+
+def _frames(found: SideThreshold, fps: float) -> str:
+    if found.frames is None:
+        return f"is not known ({found.note})"
+    return f"is {found.frames:.1f} frames ({found.frames / fps:.3f} s)"
+
+
+def _headline(result: Oddity, fps: float) -> Headline:
+    told = [f"for {side} blends it {_frames(found, fps)}" for side, found in result.thresholds.items()]
+    answers, people = sum(one.answers for one in result.levels), max(one.participants for one in result.levels)
+    return Headline(
+        f"The threshold for finding the odd one of three, 67% right: {'; '.join(told)}.",
+        f"{counted(answers, 'answer')} of {counted(people, 'participant')}; chance gives 33% right.",
+    )
+
+
+def _levels_table(name: str, result: Oddity) -> Table:
+    return tables.make(
+        f"{name}_right",
+        "Right answers by difference, over participants; p against chance (one in three); d-prime of an observer of "
+        "three percepts who is right as often (Macmillan & Creelman 2005, chapter 9).",
+        "difference_frames participants answers percent low:one high:one p_value d_prime",
+        [vars(level) for level in result.levels],
+    )
+
+
+def _threshold_table(name: str, result: Oddity, fps: float) -> Table:
+    rows = [
+        {"side": side, "frames": found.frames, "low": found.low, "high": found.high, "remark": found.note}
+        | {"seconds": None if found.frames is None else found.frames / fps}
+        for side, found in result.thresholds.items()
+    ]
+    caption = f"Thresholds: the difference at which 67% of the answers are right; seconds at {fps:g} fps."
+    return tables.make(f"{name}_thresholds", caption, "side frames seconds low high remark", rows)
+
+
+def _recovered(name: str, result: Oddity, about: About) -> Table:
+    """What is known of simulated observers beside what was found."""
+    rows = []
+    for side, found in result.thresholds.items():
+        known = abs(float(about.known[f"threshold_{side}_frames"]))
+        rows.append({"side": side, "known": known, "found": found.frames, "low": found.low, "high": found.high})
+    caption = "Thresholds of the simulated observers, and as found, in frames."
+    return tables.make(f"{name}_recovery", caption, "side known found low high", rows)
+
+
+def _readings(result: Oddity) -> Iterator[Reading]:
+    signs: dict[Side, str] = {"shorter": "−", "longer": "+"}
+    for side, found in result.thresholds.items():
+        if found.frames is not None:
+            told = f"{signs[side]}{found.frames:.1f} [{words.bare_interval(found.low, found.high)}]"
+            yield Reading(f"threshold, {side} [frames]", "", told)
+
+
+def _main_results(result: Oddity, study: str) -> Iterator[MainResult]:
+    for side, found in result.thresholds.items():
+        yield MainResult(f"{words.readable(study)}: threshold, {side} [frames]", found.frames, found.low, found.high)
+
+
+def _methods(found: Collection[Oddity], analysis: Analysis) -> str:
+    del found, analysis
+    return (
+        "Right answers in the oddity task are means over participants with Student’s intervals, turned into d-prime by "
+        "a model of three percepts of which the one farthest from the others is named (Macmillan & Creelman 2005, "
+        "chapter 9). Thresholds are where a psychometric function with a guess rate of one third lies halfway between "
+        "chance and its upper end, of a typical participant by a mixed model."
+    )
+
+
+def _right(given: pd.DataFrame) -> pd.Series[bool]:
+    return given["correct"].astype(bool)
+
+
+KIND = SectionKind(oddity_section, _main_results, _methods, lambda _: {MACMILLAN_2005}, Course("right answers", _right))
