@@ -151,7 +151,7 @@ def _levels(trials: pd.DataFrame, confidence: float) -> list[OddityLevel]:
     for difference, part in trials.groupby(trials["difference_frames"].astype(int), sort=True):
         test = estimates.mean_test(part.groupby("participant")["yes"].mean().to_numpy(), CHANCE, confidence)
         share = test.mean or 0.0
-        ends = (test.interval.low, test.interval.high)
+        ends = (test.low, test.high)
         low, high = (None if end is None else 100 * min(max(end, 0.0), 1.0) for end in ends)
         counts = int(difference), test.participants, len(part)
         found.append(OddityLevel(*counts, 100 * share, low, high, test.p_value, d_prime_of(share)))
