@@ -186,3 +186,10 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
             orders = len(task_of(study).orders)
             groups = math.lcm(groups, orders if orders > 1 else max(own, 1))
     return groups
+
+
+def questions(protocol: Protocol, plan: Plan) -> int:
+    """How many answers a plan asks for at most, repeats of trials that were badly shown apart."""
+    items = {study.name: max(1, len(study.items)) for study in protocol.studies}
+    known = sum(1 if trial.role == "check" else items[trial.study] for trial in plan.trials)
+    return known + sum(course.most * items[course.study] for course in plan.courses)

@@ -26,10 +26,10 @@ from study.apps.player.pages import Look
 from study.apps.player.scripted import Act, ScriptedWindow, press
 from study.apps.player.store import ResponsesStore
 from study.apps.server.web import make_app
-from study.experiment.observers import simulate
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import advanced, answered, current, filled, open_session
+from study.experiment.simulation import simulate
 from study.experiment.steps import answer_keys
 from study.experiment.stimuli.manifest import Manifest
 from study.experiment.stimuli.prepare import prepare

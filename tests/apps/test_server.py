@@ -8,8 +8,8 @@ import sqlalchemy as sa
 from serving import PROTOCOL, QUESTIONS, answer_to, protocol_of
 
 from study.apps.server import views
-from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
+from study.experiment.simulation import simulate
 from study.experiment.store.answers import stored_form
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses

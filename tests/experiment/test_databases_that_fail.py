@@ -9,7 +9,7 @@ import pytest
 import sqlalchemy as sa
 
 from study.errors import SegueError, SessionError
-from study.experiment.observers import simulate
+from study.experiment.simulation import simulate
 from study.experiment.store import databases
 from study.experiment.store.databases import may_pass, patiently, try_to_write
 from study.experiment.store.frames import answers_frame

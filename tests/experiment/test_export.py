@@ -11,8 +11,8 @@ import pytest
 from toys import keep_answer
 
 from study.errors import SessionError
-from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
+from study.experiment.simulation import simulate
 from study.experiment.store.answers import Presentation, record_form
 from study.experiment.store.export import export, label, labels
 from study.experiment.store.frames import export_csv

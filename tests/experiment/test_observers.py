@@ -15,9 +15,10 @@ import pandas as pd
 import pytest
 
 from study.errors import SessionError
-from study.experiment.observers import person, simulate, truth
+from study.experiment.observers import person, truth
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import open_session, walk
+from study.experiment.simulation import simulate
 from study.experiment.store.answers import has_event
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
@@ -186,7 +187,7 @@ KILLED = """
 import sys
 sys.path.insert(0, "tests/experiment")
 import toys as c
-from study.experiment.observers import simulate
+from study.experiment.simulation import simulate
 from study.experiment.protocol.whole import find_protocol, load_protocol
 from study.experiment.store.responses import open_responses
 from study.models.choice import PreferenceObserver, preference_probability

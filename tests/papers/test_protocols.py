@@ -6,10 +6,11 @@ from collections import Counter
 
 import pytest
 
-from study.experiment.observers import simulate, truth
+from study.experiment.observers import truth
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.proofreading import to_do
 from study.experiment.protocol.whole import find_protocol, load_protocol, protocols_folder
+from study.experiment.simulation import simulate
 from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses

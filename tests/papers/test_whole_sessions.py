@@ -12,9 +12,9 @@ from study.analysis.analyse import analyse
 from study.analysis.preference.analyse import Preference
 from study.analysis.ratings.analyse import PairRatings, Ratings
 from study.analysis.study_result import Settings
-from study.experiment.observers import simulate
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import find_protocol, load_protocol
+from study.experiment.simulation import simulate
 from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses

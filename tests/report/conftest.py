@@ -14,8 +14,8 @@ import av
 import numpy as np
 import pytest
 
-from study.experiment.observers import simulate
 from study.experiment.protocol.whole import Protocol, load_protocol
+from study.experiment.simulation import simulate
 from study.experiment.stimuli.manifest import MANIFEST_VERSION, read_manifest
 from study.experiment.stimuli.stimulus import MotionUse, StimulusRecord
 from study.experiment.store.responses import open_responses

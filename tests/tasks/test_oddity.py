@@ -11,10 +11,11 @@ import pytest
 from study.analysis.oddity.analyse import Oddity, analyse_oddity
 from study.analysis.study_result import Settings
 from study.errors import AnalysisError, ProtocolError
-from study.experiment.observers import simulate, truth
+from study.experiment.observers import truth
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import advanced, answered, current, open_session
+from study.experiment.simulation import simulate
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.models.oddity import d_prime_of, oddity_correct

@@ -94,7 +94,7 @@ def simulate_participants(
 
     `goes_wrong` are shares of the observers' settings, such as `missed`; the usual ones where they are left out.
     """
-    from study.experiment.observers import simulate as simulate_all
+    from study.experiment.simulation import simulate as simulate_all
     from study.experiment.stimuli.manifest import read_manifest
     from study.experiment.store.responses import open_responses
     from study.experiment.store.sessions import refuse_other_stimuli

@@ -18,7 +18,7 @@ from starlette.routing import Route
 
 from study.apps.server.hosting import Host, Sitting
 from study.experiment import session as flow
-from study.experiment.observers import questions
+from study.experiment.plan import questions
 from study.experiment.store import participants as people
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.sessions import session_by_id

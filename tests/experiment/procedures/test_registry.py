@@ -9,13 +9,15 @@ from pathlib import Path
 import pytest
 from toys import STAIRCASE, TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
 
-from study.experiment.observers import default_observer, person, respond, simulate
+from study.experiment.observers import person, respond
 from study.experiment.plan import draw_plan, plan_from_json
 from study.experiment.procedures.procedure import Settings, SettingsError
 from study.experiment.procedures.registry import PROCEDURES, settings_of
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import open_session, walk
+from study.experiment.simulation import simulate
 from study.experiment.store.responses import open_responses
+from study.tasks.observer import default_observer
 
 EXAMPLES = {"constant": TOY_PROTOCOL, "staircase": with_staircases()}
 """A protocol whose study `jnd` is run by each procedure."""

@@ -11,14 +11,16 @@ import pytest
 from toys import TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
 
 from study.errors import SessionError
-from study.experiment.observers import default_observer, person, respond, shown_well, simulate
+from study.experiment.observers import person, respond, shown_well
 from study.experiment.plan import Plan, draw_plan, plan_from_json
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import Session, advanced, answered, current, near, open_session, progress, walk
+from study.experiment.simulation import simulate
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import find_session
 from study.tasks.answer import Answer
+from study.tasks.observer import default_observer
 from study.tasks.trial import Trial
 
 # Staircases between practice and another study, with breaks; the same in an order drawn for each participant.

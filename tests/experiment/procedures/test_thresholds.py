@@ -7,13 +7,15 @@ from toys import TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
 
 from study.analysis.analyse import Analysis, analyse_folder, analysis_json
 from study.analysis.same_different.analyse import SameDifferent
-from study.experiment.observers import default_observer, simulate, truth
+from study.experiment.observers import truth
 from study.experiment.protocol.whole import Protocol, parse_protocol
+from study.experiment.simulation import simulate
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.models.population import population_different
 from study.report.sections.same_different.section import KIND
 from study.report.sections.section import About
+from study.tasks.observer import default_observer
 
 LONGER_RUNS = with_staircases().replace(
     "start_frames = 6\nmost_frames = 8\nsteps_frames = [2, 1]\nreversals = 3\naveraged = 2\nmost_trials = 14",

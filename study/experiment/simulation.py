@@ -1,0 +1,131 @@
+"""Simulation: simulated participants in whole sessions, stored like those of people.
+
+A protocol's pairs and a database come in; sessions that are marked as simulated for ever go out. They go through the
+same `session` as real front ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+from typing import Protocol as Shape
+
+from study.errors import SessionError
+from study.experiment.observers import knowing, person, respond, shown_well, truth
+from study.experiment.plan import Plan, draw_plan, questions
+from study.experiment.protocol.whole import Protocol
+from study.experiment.session import open_session, walk
+from study.experiment.store.answers import has_event, record_answer, record_event, stored_answers
+from study.experiment.store.responses import Responses
+from study.experiment.store.sessions import SessionRecord, begin_session, find_session
+from study.tasks.observer import ObserverSettings, default_observer
+from study.tasks.trial import Pair
+
+
+class StimulusSource(Shape):
+    """What a simulation needs to know of the stimuli: a `StimulusSet` or the manifest of a results folder."""
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """All pairs, in the protocol's order."""
+
+    @property
+    def library(self) -> str:
+        """Name of the motion library."""
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether its motions are synthetic."""
+
+
+@dataclass(frozen=True)
+class SimulationSummary:
+    """What a simulation did: participants in all, answers made now, answers that were there already."""
+
+    participants: int
+    answers: int
+    found: int
+    truth: dict[str, Any]
+
+
+def simulate(
+    protocol: Protocol,
+    stimuli: StimulusSource,
+    responses: Responses,
+    participants: int,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    settings: ObserverSettings | None = None,
+) -> SimulationSummary:
+    """Run simulated participants `sim-001`, `sim-002`, ... through their whole sessions.
+
+    Run again after an interruption it finishes the work: sessions that are there are taken up where they stopped, and
+    the answers are those of an uninterrupted run.
+
+    Parameters
+    ----------
+    participants
+        How many there should be in the end.
+    seed
+        Where chance comes from, besides the protocol's own seed for the plans.
+    progress
+        Called with the answers there are and the number of them in all, after each answer.
+    settings
+        The observer; that of 2004 section 5 where it is left out.
+
+    Raises
+    ------
+    SessionError
+        Where sessions of the same names were begun by another observer, seed, protocol or plan.
+    """
+    if participants < 1:
+        raise SessionError(f"Expected one participant or more to simulate, found {participants}.")
+    settings = knowing(settings or default_observer(), protocol)
+    known = {**truth(protocol, settings), "seed": seed}
+    names = [f"sim-{number:03d}" for number in range(1, participants + 1)]
+    plans = [draw_plan(protocol, stimuli.pairs, name, group=group) for group, name in enumerate(names)]
+    total = sum(questions(protocol, plan) for plan in plans)
+    made = found = 0
+    for plan in plans:
+        record = _open(protocol, stimuli, responses, plan, known)
+        before = stored_answers(responses, record.id)
+        found += len(before)
+        if has_event(responses, record, "finished"):
+            continue
+        who = person(settings, plan.participant, seed)
+        state = open_session(protocol, plan, before, passed=("consent", "form"))
+        for trial, answer in walk(state, partial(respond, who), partial(shown_well, who)):
+            record_answer(responses, record, trial, answer)
+            made += 1
+            if progress:
+                # Trials that come again are more than the plans ask for.
+                progress(found + made, max(total, found + made))
+        record_event(responses, record, "finished")
+    return SimulationSummary(participants, made, found, known)
+
+
+def _open(
+    protocol: Protocol, stimuli: StimulusSource, responses: Responses, plan: Plan, known: Mapping[str, Any]
+) -> SessionRecord:
+    """A simulated participant's session, begun, taken up, or finished already."""
+    stored = find_session(responses, plan.participant)
+    if stored is not None and stored.simulated and stored.truth != dict(known):
+        # Half a session by one observer and half by another would have no truth.
+        raise SessionError(
+            f"Expected the observer and seed under which {plan.participant!r} was begun, found others; "
+            "use the same ones, or another results folder."
+        )
+    if stored is not None and stored.plan == plan and stored.simulated and has_event(responses, stored, "finished"):
+        return stored
+    return begin_session(
+        responses,
+        protocol,
+        plan,
+        simulated=True,
+        library=stimuli.library,
+        library_synthetic=stimuli.synthetic,
+        truth=known,
+    )
