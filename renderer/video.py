@@ -14,7 +14,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -76,10 +76,6 @@ class VideoInfo:
     frames_sha256: str
     file_sha256: str
     bytes: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """For manifests; the path as a string."""
-        return {**asdict(self), "path": str(self.path)}
 
 
 def frame_rate(fps: float | Fraction) -> Fraction:

@@ -63,11 +63,6 @@ class FootslideResult:
     largest_change: float
 
     @property
-    def slide_before_m_per_s(self) -> float:
-        """Mean slide speed of a planted foot before the correction."""
-        return self.slide_before_m / self.contact_s if self.contact_s else 0.0
-
-    @property
     def slide_after_m_per_s(self) -> float:
         """Mean slide speed of a planted foot after the correction."""
         return self.slide_after_m / self.contact_s if self.contact_s else 0.0

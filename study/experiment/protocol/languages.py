@@ -58,8 +58,3 @@ def _question(known: Mapping[str, Any], field: Any) -> Any:
     if not isinstance(field, dict) or "label" in field or not isinstance(name := field.get("name"), str):
         return field
     return {**known.get(name, {}), **field}
-
-
-def built_in_questions() -> tuple[str, ...]:
-    """Names of the questions that a form can take by name."""
-    return tuple(words(FALLBACK)["form"])

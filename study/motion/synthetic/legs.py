@@ -73,17 +73,6 @@ class Contact:
     """1 for a running step, 0 for a walking step."""
 
 
-@dataclass(frozen=True)
-class LegChannels:
-    """The channels of `Targets` that belong to the legs, and which foot bears weight when."""
-
-    ankles: FloatArray
-    feet_angles: FloatArray
-    toes: FloatArray
-    hip_height: FloatArray
-    loads: FloatArray
-
-
 def on_grid(contacts: list[Contact], times: FloatArray) -> list[Contact]:
     """The same contacts with times on grid points, so that stance and swing meet on one."""
 
