@@ -181,7 +181,7 @@ def power(studies, seed):
     """Time of `segue power` for a preference study of 35 people: simulated and analysed studies a second."""
     from study.analysis.exclusions import Rules
     from study.apps.cli.power import AT_ONCE, plans_of
-    from study.apps.cli.study import load
+    from study.apps.cli.shared import load
     from study.power.curve import power_curve
     from study.power.design import Design
     from study.power.registry import effect_of

@@ -76,49 +76,32 @@ def rating_study(design: Design, alpha: float, difference: float) -> Run:
     """Whether the t test over participants finds how the methods differ, for one question.
 
     Of each participant's own difference of the two methods' ratings; where pairs are rated, of the mean score less the
-    middle of the scale.
+    middle of the scale (whether a trial showed one or the other first changes nothing).
     """
-    if task_of(design.study).slots > 1:
-        return _pair_rating_study(design, alpha, difference)
-    trials, rating = design.trials(), design.settings.rating
-    sides = np.array([[1.0 if trial.methods[0] == design.study.comparison else 0.0 for trial in own] for own in trials])
-    points = design.study.scale_points
-
-    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
-        people = max(sizes)
-        leniency = rating.participant_sd * rng.standard_normal((studies, people, 1))
-        middle = (points - 1) / 2 + difference * sides[:people] + leniency
-        given = np.clip(np.round(middle + rating.noise_sd * rng.standard_normal(middle.shape)), 0, points - 1)
-        response_s, answered = times(design, rng, np.full(middle.shape, 0.5))
-        kept = kept_of(design, rng, response_s, answered)
-        means, seen = [], np.ones(kept.shape[:2], dtype=bool)
-        for side in (1.0, 0.0):
-            rows = kept & (sides[:people] == side)
-            count = rows.sum(axis=2)
-            seen &= count > 0
-            means.append((given * rows).sum(axis=2) / np.maximum(count, 1))
-        return _apart(means[0] - means[1], seen, sizes, alpha, difference)
-
-    return run
-
-
-def _pair_rating_study(design: Design, alpha: float, difference: float) -> Run:
-    """Scores of the comparison against the reference; whether a trial showed one or the other first changes nothing."""
-    trials, rating = design.trials(), design.settings.rating
-    shown, points = len(trials[0]), design.study.scale_points
+    rating, points, paired = design.settings.rating, design.study.scale_points, task_of(design.study).slots > 1
+    raised = np.array(
+        [[paired or trial.methods[0] == design.study.comparison for trial in own] for own in design.trials()]
+    )
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
         people, middle = max(sizes), (points - 1) / 2
-        leaning = middle + difference + rating.participant_sd * rng.standard_normal((studies, people, 1))
-        noise = rating.noise_sd * rng.standard_normal((studies, people, shown))
-        given = np.clip(np.round(leaning + noise), 0, points - 1)
+        leniency = rating.participant_sd * rng.standard_normal((studies, people, 1))
+        leaning = middle + difference * raised[:people] + leniency
+        given = np.clip(np.round(leaning + rating.noise_sd * rng.standard_normal(leaning.shape)), 0, points - 1)
         response_s, answered = times(design, rng, np.full(given.shape, 0.5))
         kept = kept_of(design, rng, response_s, answered)
-        count = kept.sum(axis=2)
-        apart = (given * kept).sum(axis=2) / np.maximum(count, 1) - middle
-        return _apart(apart, count > 0, sizes, alpha, difference)
+        mean, seen = _mean(given, kept & raised[:people])
+        other, both = _mean(given, kept & ~raised[:people])
+        apart = mean - middle if paired else mean - other
+        return _apart(apart, seen if paired else seen & both, sizes, alpha, difference)
 
     return run
+
+
+def _mean(given: FloatArray, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Mean over these answers of each participant, and who gave one."""
+    count = rows.sum(axis=2)
+    return (given * rows).sum(axis=2) / np.maximum(count, 1), count > 0
 
 
 def _apart(apart: FloatArray, seen: BoolArray, sizes: Sequence[int], alpha: float, difference: float) -> BoolArray:

@@ -16,7 +16,7 @@ from study.analysis.analyse import Analysis
 from study.analysis.exclusions import Rules
 from study.apps.cli import run
 from study.apps.cli.power import plans_of
-from study.apps.cli.study import load
+from study.apps.cli.shared import load
 from study.power import preference as preferences
 from study.power import ratings, same_different
 from study.power.design import Design

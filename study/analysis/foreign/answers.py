@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from study.analysis.foreign.trials import column, few, numbers, row_of, taken
+from study.analysis.foreign.columns import column, few, numbers, row_of, taken
 from study.analysis.foreign.words import FIRST, SECOND
 from study.counting import counted
 from study.errors import AnalysisError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
     from study.analysis.foreign.answers import ForeignAnswers
     from study.analysis.foreign.trials import Trials
 
-TASKS = ("2afc", "yes-no", "same-different", "preference", "rating")
+Read = tuple["Trials | ForeignAnswers", Callable[[], object]]
+"""What was read, and its analysis: what JSON can be made of, with `answer` in words."""
+
 # What each task takes besides the columns that all have; any other of these options is refused with it.
 OWN = {
     "2afc": ("level", "shown", "yes", "sigmoid", "choices", "lapse"),
@@ -62,9 +65,10 @@ def _scale(given: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
     return tuple(found)
 
 
-def _pairs(where: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+def _where(options: dict[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Columns, and the value that a row must hold there."""
     found = []
-    for text in where:
+    for text in options["where"]:
         name, equals, value = text.partition("=")
         if not equals or not name.strip():
             raise AnalysisError(f"expected --where COLUMN=VALUE, found {text!r}")
@@ -72,26 +76,33 @@ def _pairs(where: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
-def _fit_function(trials: Trials, task: str, options: dict[str, Any]) -> dict[str, Any]:
+def _function(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     """2AFC or yes-no."""
     from study.analysis.psychometric.analyse import analyse_psychometric
     from study.analysis.psychometric.model import make_model
-    from study.analysis.to_json import to_json
 
+    trials = _trials(table, options)
     settings = {name: options[name] for name in ("guess", "lapse")}
-    model = make_model(task, sigmoid=options["sigmoid"] or "normal", choices=options["choices"] or 2, **settings)
-    return dict(to_json(analyse_psychometric(trials.table, model, confidence=options["confidence"], simulations=500)))
+    model = make_model(
+        options["task"], sigmoid=options["sigmoid"] or "normal", choices=options["choices"] or 2, **settings
+    )
+    return trials, lambda: analyse_psychometric(trials.table, model, confidence=options["confidence"], simulations=500)
 
 
-def _fit_pairs(trials: Trials, options: dict[str, Any]) -> dict[str, Any]:
+def _same_different(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     """Same-different, through the analysis of our own studies."""
+    from study.analysis.same_different.analyse import analyse_jnd
+
+    trials = _trials(table, options)
+    level, confidence = options["threshold"] or 0.75, options["confidence"]
+    return trials, lambda: analyse_jnd(_pairs_answered(trials.table, options), level=level, confidence=confidence)
+
+
+def _pairs_answered(table: pd.DataFrame, options: dict[str, Any]) -> pd.DataFrame:
+    """One row an answer, as our own studies have them."""
     import numpy as np
     import pandas as pd
 
-    from study.analysis.same_different.analyse import analyse_jnd
-    from study.analysis.to_json import to_json
-
-    table = trials.table
     parts = []
     for column, answer in (("yes", "different"), ("no", "same")):
         count = table["yes"] if column == "yes" else table["shown"] - table["yes"]
@@ -103,8 +114,7 @@ def _fit_pairs(trials: Trials, options: dict[str, Any]) -> dict[str, Any]:
     answers["task"] = "same-different"
     if options["order"]:
         answers["reference_first"] = _reference_first(answers["order"], options)
-    level = options["threshold"] or 0.75
-    return dict(to_json(analyse_jnd(answers, level=level, confidence=options["confidence"])))
+    return answers
 
 
 def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Series[bool]:
@@ -121,18 +131,37 @@ def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Serie
     return first
 
 
-def _analysed(found: ForeignAnswers, options: dict[str, Any]) -> dict[str, Any]:
-    """Preferences and ratings, through the analysis of our own studies; `answer` in words."""
+def _own_study(table: pd.DataFrame, options: dict[str, Any]) -> Read:
+    """Preferences and ratings, through the analysis of our own studies."""
     from study.analysis.analyse import analyse, analysis_json
+    from study.analysis.foreign.answers import AnswerColumns, read_preferences, read_ratings
     from study.analysis.study_result import Settings
 
-    analysis = analyse(found.table, Settings(confidence=options["confidence"], alpha=options["alpha"] or 0.05))
-    return {**analysis_json(analysis), "answer": "\n".join(analysis.sentences())}
+    own = {name: options[name] for name in ("first", "second", "method", "motion", "item", "ends")}
+    columns = AnswerColumns(**_shared(options), **own, scale=_scale(options["scale"]), tie=tuple(options["tie"]))
+    read = {"preference": read_preferences, "rating": read_ratings}[options["task"]](table, columns)
+    settings = Settings(confidence=options["confidence"], alpha=options["alpha"] or 0.05)
+
+    def analysed() -> dict[str, Any]:
+        analysis = analyse(read.table, settings)
+        return {**analysis_json(analysis), "answer": "\n".join(analysis.sentences())}
+
+    return read, analysed
+
+
+FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
+    "2afc": _function,
+    "yes-no": _function,
+    "same-different": _same_different,
+    "preference": _own_study,
+    "rating": _own_study,
+}
+"""How each task's data are read and analysed."""
 
 
 @click.command()
 @click.argument("data", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--task", type=click.Choice(TASKS), required=True)
+@click.option("--task", type=click.Choice(list(FITS)), required=True)
 @click.option("--answer", required=True, help="Column of the answer: right or wrong, yes or no, same or different, "
               "first or second (or the method chosen), a rating.")  # fmt: skip
 @click.option("--level", help="Column of the stimulus level (same-different: the signed difference).")
@@ -167,14 +196,15 @@ def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
 
     Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
     """
+    from study.analysis.to_json import to_json
+
     _refuse_others(task, options)
-    read = _read(data, task, options)
-    if task in ("preference", "rating"):
-        found = _analysed(read, options)  # type: ignore[arg-type]
-    elif task == "same-different":
-        found = _fit_pairs(read, options)  # type: ignore[arg-type]
-    else:
-        found = _fit_function(read, task, options)  # type: ignore[arg-type]
+    needed = tuple(options[name] for name in COLUMNS if options[name]) + tuple(name for name, _ in _where(options))
+    try:
+        read, analysed = FITS[task](read_table(data, needed, options["delimiter"]), options | {"task": task})
+    except AnalysisError as error:
+        raise AnalysisError(f"{data}: {error}") from error
+    found = to_json(analysed())
     counts = {"rows": read.rows, "used": read.used, "blank": read.blank, "missed": read.missed}
     people = read.table["participant"].nunique()
     text = (
@@ -194,21 +224,14 @@ def _refuse_others(task: str, options: dict[str, Any]) -> None:
         raise AnalysisError(f"expected --level with --task {task}: the column of the stimulus level")
 
 
-def _read(data: Path, task: str, options: dict[str, Any]) -> Trials | ForeignAnswers:
-    from study.analysis.foreign.answers import AnswerColumns, read_preferences, read_ratings
+def _trials(table: pd.DataFrame, options: dict[str, Any]) -> Trials:
     from study.analysis.foreign.trials import Columns, read_trials
 
-    shared = {name: options[name] for name in ("answer", "participant", "decimal")}
-    shared |= {"yes": tuple(options["yes"]), "where": _pairs(options["where"])}
-    needed = [options[name] for name in COLUMNS if options[name]] + [name for name, _ in shared["where"]]
-    try:
-        table = read_table(data, tuple(needed), options["delimiter"])
-        if task in ("preference", "rating"):
-            own = {name: options[name] for name in ("first", "second", "method", "motion", "item")}
-            rated = {"scale": _scale(options["scale"]), "ends": options["ends"]}
-            named = AnswerColumns(**shared, **own, **rated, tie=tuple(options["tie"]))
-            return (read_preferences if task == "preference" else read_ratings)(table, named)
-        levels = {name: options[name] for name in ("level", "shown", "order")}
-        return read_trials(table, Columns(**shared, **levels), task)
-    except AnalysisError as error:
-        raise AnalysisError(f"{data}: {error}") from error
+    levels = {name: options[name] for name in ("level", "shown", "order")}
+    return read_trials(table, Columns(**_shared(options), **levels), options["task"])
+
+
+def _shared(options: dict[str, Any]) -> dict[str, Any]:
+    """What every table's columns are named by."""
+    named = {name: options[name] for name in ("answer", "participant", "decimal")}
+    return named | {"yes": tuple(options["yes"]), "where": _where(options)}

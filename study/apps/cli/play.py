@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.console import database_option, emit, json_option, library_option, say
-from study.apps.cli.study import OUT, check_database, load_for_people, prepare_stimuli, results_folder
+from study.apps.cli.shared import OUT, check_database, load_for_people, prepare_stimuli, results_folder
 from study.counting import counted
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ AT_ONCE = 250
 
 def plans_of(protocol: Protocol, library: str | None, participants: int) -> tuple[Plan, ...]:
     """The real plans of this many participants."""
-    from study.apps.cli.study import prepare_stimuli
+    from study.apps.cli.shared import prepare_stimuli
     from study.experiment.plan import draw_plan
 
     pairs = prepare_stimuli(protocol, library).pairs
@@ -104,7 +104,7 @@ def power(
     """How many participants a protocol needs, at stated effects, by simulation."""
     from study.analysis.exclusions import rules_of
     from study.analysis.to_json import to_json
-    from study.apps.cli.study import load
+    from study.apps.cli.shared import load
     from study.files import check_place
     from study.power.curve import power_curve
     from study.power.design import Design

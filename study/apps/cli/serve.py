@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from study.apps.cli.console import database_option, library_option, say
-from study.apps.cli.study import (
+from study.apps.cli.shared import (
     OUT,
     WORKERS,
     check_database,

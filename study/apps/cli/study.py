@@ -9,77 +9,24 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.console import database_option, emit, json_option, library_option, progress, say
+from study.apps.cli.shared import (
+    OUT,
+    RESULTS,
+    WORKERS,
+    check_database,
+    load,
+    prepare_stimuli,
+    render_stimuli,
+    results_folder,
+)
 from study.apps.cli.shown import table_of, trials_between
 from study.counting import counted
 
 if TYPE_CHECKING:
     from study.analysis.analyse import Analysis
     from study.experiment.protocol.whole import Protocol
-    from study.experiment.stimuli.manifest import Manifest
-    from study.experiment.stimuli.stimulus import StimulusSet
 
-RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
-OUT = click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=None,
-    help="Results folder; results/<name of the protocol> unless given.",
-)
 SHARE = click.FloatRange(0.0, 1.0)
-WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes; one a core unless given.")
-
-
-def load(protocol: str) -> Protocol:
-    """A protocol by path, or by the name of one that comes with Segue."""
-    from study.experiment.protocol.whole import find_protocol, load_protocol
-
-    return load_protocol(find_protocol(protocol))
-
-
-def load_for_people(protocol: str) -> Protocol:
-    """A protocol that people are about to read; what has still to be written in it is said on standard error."""
-    from study.experiment.protocol.proofreading import to_do
-
-    loaded = load(protocol)
-    for note in to_do(loaded):
-        say(f"to do: {note}")
-    return loaded
-
-
-def results_folder(protocol: Protocol, out: Path | None) -> Path:
-    """Where a run of a protocol goes."""
-    return out if out is not None else Path("results") / protocol.name
-
-
-def prepare_stimuli(protocol: Protocol, library: str | None) -> StimulusSet:
-    """All stimuli of a protocol, with progress on standard error."""
-    from study.experiment.stimuli.prepare import prepare
-    from study.motion.library import open_library
-
-    opened = open_library(library or "synthetic")
-    with progress("transitions") as report:
-        return prepare(protocol, opened, lambda done, total: report(done / total, f"{done} of {total}"))
-
-
-def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> dict[str, Any]:
-    """Render what is not rendered yet, with progress on standard error; the numbers for `--json`."""
-    from study.experiment.stimuli.rendering import render as render_all
-
-    with progress("videos") as report:
-        summary = render_all(
-            stimuli, folder, workers, lambda state: report(state.videos / max(state.videos_total, 1), str(state))
-        )
-    return {**asdict(summary), "folder": str(folder)}
-
-
-def check_database(database: str | None, stimuli: StimulusSet | Manifest) -> None:
-    """Refuse a database elsewhere that can't be opened, or is about other stimuli, before anything is rendered."""
-    from study.experiment.store.responses import open_responses
-    from study.experiment.store.sessions import refuse_other_stimuli
-
-    if database is not None:
-        with open_responses(database) as responses:
-            refuse_other_stimuli(responses, [record.id for record in stimuli.records])
 
 
 def simulate_participants(
