@@ -82,12 +82,15 @@ def test_only_what_is_asked_now_counts(serve, responses):
     view = person.until(person.begin(), "trial")
     for change in ({"trial": 5}, {"attempt": 2}, {"item": "natural"}):
         assert person.post("/api/answer", {**answer_to(view), **change}).json()["counted"] is False
+    film = {"method": "none", "shown_well": True}
     for change, why in (
         ({"value": "first"}, "Expected one of same, different"),
         ({"response_s": None}, "Expected response_s"),
         ({"response_s": -1}, "response_s"),
         ({"nonsense": 1}, "nonsense"),
         ({"trial": "x"}, "trial"),
+        ({"shown": [{**film, "slot": 3}]}, "Expected one of the 2 films of trial 1, found 3"),
+        ({"shown": [{**film, "slot": 0}]}, "slot"),
     ):
         refused = person.post("/api/answer", {**answer_to(view), **change})
         assert refused.status_code == 422

@@ -17,9 +17,9 @@ from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing
 from study.apps.player.store import Store
 from study.errors import SessionError
-from study.experiment import session as sitting
 from study.experiment.form import LONGEST_TEXT, field_value
 from study.experiment.protocol.texts import FormField
+from study.experiment.session import Session, current
 
 _KEPT_PAGES = 6
 
@@ -35,7 +35,7 @@ class Stopped(Exception):  # noqa: N818 - not an error: the participant leaves
 class Desk:
     """A window with pages on it, and what was shown and went wrong in the present trial."""
 
-    def __init__(self, window: Display, session: sitting.Session, store: Store, look: Look) -> None:
+    def __init__(self, window: Display, session: Session, store: Store, look: Look) -> None:
         self.window, self.session, self.store, self.look = window, session, store, look
         self.protocol = session.protocol
         self.pages: dict[tuple[Page, tuple[int, int]], tuple[DrawnPage, Any]] = {}
@@ -108,7 +108,7 @@ class Desk:
             if isinstance(event, Focus) and not event.focused:
                 self.fault("focus lost")
             if isinstance(event, Focus):
-                step = sitting.current(self.session)
+                step = current(self.session)
                 self.store.event("focus", {"focused": event.focused, "trial": step.trial, "step": step.place})
         return leave
 
@@ -126,7 +126,7 @@ class Desk:
             for event in self.window.wait(None):
                 button = chosen(drawn, event)
                 if button is not None and button.name == "stop":
-                    step = sitting.current(self.session)
+                    step = current(self.session)
                     self.store.event("stopped", {"trial": step.trial, "step": step.place})
                     raise Stopped("stopped")
                 if button is not None or (isinstance(event, Key) and event.name == "escape"):

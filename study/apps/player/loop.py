@@ -23,7 +23,7 @@ from study.apps.player.pages import Look
 from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, find_rate, frame_at
 from study.apps.player.store import Store
-from study.experiment import session as sitting
+from study.experiment.session import Session, advanced, answered, current, filled, missed, progress, restarted
 from study.experiment.steps import Step
 from study.experiment.stimuli.stimulus import Stimulus
 from study.experiment.store.answers import Presentation
@@ -42,7 +42,7 @@ class Outcome:
 
 def play(
     window: Display,
-    session: sitting.Session,
+    session: Session,
     stimulus: Callable[[str], Stimulus],
     store: Store,
     look: Look,
@@ -79,7 +79,7 @@ class _Player(Desk):
     def __init__(
         self,
         window: Display,
-        session: sitting.Session,
+        session: Session,
         stimulus: Callable[[str], Stimulus],
         store: Store,
         look: Look,
@@ -101,7 +101,7 @@ class _Player(Desk):
         try:
             if not any(step.kind == "consent" for step in self.session.steps):
                 self.store.begin()
-            while (step := sitting.current(self.session)).kind != "done":
+            while (step := current(self.session)).kind != "done":
                 self._do(step)
             self.store.event("finished")
             self.read_until(screens.last_page(self.protocol, self.protocol.texts.finished))
@@ -144,11 +144,11 @@ class _Player(Desk):
             self._read(step)
 
     def _read(self, step: Step) -> None:
-        page = screens.reading_page(self.protocol, step, sitting.progress(self.session))
+        page = screens.reading_page(self.protocol, step, progress(self.session))
         while self.read_until(page) == "example":
             self._show(step.stimulus)
             self._blank_for(0.3)
-        self.session = sitting.advanced(self.session)
+        self.session = advanced(self.session)
 
     def _consent(self, step: Step) -> None:
         if self.read_until(screens.consent_page(self.protocol, step)) == "decline":
@@ -156,7 +156,7 @@ class _Player(Desk):
             raise Stopped("declined")
         self.store.begin()
         self.store.event("consent")
-        self.session = sitting.advanced(self.session)
+        self.session = advanced(self.session)
 
     # The form, one question at a time
 
@@ -170,7 +170,7 @@ class _Player(Desk):
             else:
                 values[name] = value
                 number += 1
-        self.session, taken = sitting.filled(self.session, values)
+        self.session, taken = filled(self.session, values)
         self.store.form(taken)
 
     # A trial
@@ -190,7 +190,7 @@ class _Player(Desk):
             self._start_again()
             return
         self.showings.append(showing)
-        self.session = sitting.advanced(self.session)
+        self.session = advanced(self.session)
 
     def _prepare(self, step: Step) -> None:
         """Lay out all that a trial shows, so that nothing has to be computed between its stimuli."""
@@ -202,7 +202,7 @@ class _Player(Desk):
         for identifier in wanted:
             self._drawing(identifier)
         asked = next(one for one in own if one.kind == "answer")
-        self.drawn(screens.answer_page(self.protocol, asked, sitting.progress(self.session)))
+        self.drawn(screens.answer_page(self.protocol, asked, progress(self.session)))
 
     def _drawing(self, identifier: str) -> Any:
         if identifier not in self._drawings:
@@ -244,18 +244,18 @@ class _Player(Desk):
 
     def _start_again(self) -> None:
         """After an interruption the trial starts from its first stimulus; it has no answer yet."""
-        step = sitting.current(self.session)
+        step = current(self.session)
         self.store.event("trial begun again", {"trial": step.trial, "attempt": step.attempt, "step": step.place})
-        self.session = sitting.restarted(self.session)
+        self.session = restarted(self.session)
 
     def _blank(self, step: Step) -> None:
         """A gap or a pause: the empty ground for its time. The next trial is laid out while it lasts."""
         if self._blank_for(step.duration_s or 0.0, prepare=step.kind == "pause"):
-            self.session = sitting.advanced(self.session)
+            self.session = advanced(self.session)
         elif step.kind == "gap":
             self._start_again()
         else:
-            self.session = sitting.advanced(self.session)
+            self.session = advanced(self.session)
 
     def _blank_for(self, duration_s: float, *, prepare: bool = False) -> bool:
         """Show nothing for a time; False where the participant interrupted it."""
@@ -279,13 +279,13 @@ class _Player(Desk):
 
     def _prepare_next(self, step: Step) -> None:
         before = self.session
-        self.session = sitting.advanced(before)
+        self.session = advanced(before)
         self._prepare(step)
         self.session = before
 
     def _answer(self, step: Step) -> None:
         """Ask, and store the answer with how its stimuli were shown before anything else."""
-        page = screens.answer_page(self.protocol, step, sitting.progress(self.session))
+        page = screens.answer_page(self.protocol, step, progress(self.session))
         zero_s = self.showings[-1].last_frame_s
         deadline_s = None if step.duration_s is None else zero_s + step.duration_s
         with calm():
@@ -295,9 +295,9 @@ class _Player(Desk):
         shown_well = not self.faults and all(showing.shown_well for showing in self.showings)
         before = self.session
         if button is None:
-            self.session, answer = sitting.missed(before, shown_well=shown_well)
+            self.session, answer = missed(before, shown_well=shown_well)
         else:
-            self.session, answer = sitting.answered(before, button.name, at - zero_s, shown_well=shown_well)
+            self.session, answer = answered(before, button.name, at - zero_s, shown_well=shown_well)
         first_item = before.steps[before.position - 1].kind != "answer"
         self.store.answer(before.trial(step.trial), answer, self._presentations(step) if first_item else ())
         self._answers += 1

@@ -23,19 +23,17 @@ from study.apps.server import views
 from study.apps.server.films import Film, whole_bytes
 from study.apps.server.limits import Guesses
 from study.apps.server.links import VISIT, filled_in
-from study.apps.server.messages import Answered, Begin, Done, Happened, Shown
+from study.apps.server.messages import Answered, Begin, Done, Happened, presented
 from study.apps.server.settings import Settings
 from study.apps.server.writer import Writer
 from study.errors import SessionError
-from study.experiment import session as flow
 from study.experiment.plan import draw_plan, groups_of
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import Session
+from study.experiment.session import Session, advanced, answered, current, filled, missed, open_session
 from study.experiment.steps import Step
 from study.experiment.stimuli.manifest import Manifest
 from study.experiment.store import participants as people
 from study.experiment.store.answers import (
-    Presentation,
     answer_rows,
     event_counts,
     event_row,
@@ -47,7 +45,6 @@ from study.experiment.store.participants import Participant
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, session_by_id
 from study.tasks.answer import Answer
-from study.tasks.trial import PLACES
 
 TAB_SECONDS = 45.0
 """A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
@@ -86,7 +83,7 @@ class Sitting:
     def is_under_way(self) -> bool:
         """Whether somebody is there who is not done yet."""
         silent_s = time.monotonic() - self.page_seen
-        return silent_s < (GONE_SECONDS if self.page else TAB_SECONDS) and flow.current(self.state).kind != "done"
+        return silent_s < (GONE_SECONDS if self.page else TAB_SECONDS) and current(self.state).kind != "done"
 
 
 class Host:
@@ -136,7 +133,7 @@ class Host:
         before = stored_answers(self.responses, record.id)
         happened = event_counts(self.responses, record)
         frames = {known.id: known.frames for known in self.manifest.records}
-        state = views.to_view(flow.open_session(self.protocol, record.plan, before, passed=happened, frames=frames))
+        state = views.to_view(open_session(self.protocol, record.plan, before, passed=happened, frames=frames))
         answers = {(a.trial, a.item, a.attempt): a for a in before}
         total, finished = sum(happened.values()), "finished" in happened
         return Sitting(record, participant, state, answers, events=total, finished=finished)
@@ -239,7 +236,7 @@ class Host:
     async def done(self, sitting: Sitting, message: Done) -> dict[str, Any]:
         """A page was read; sent twice, or late, it changes nothing."""
         async with sitting.lock:
-            step = flow.current(sitting.state)
+            step = current(sitting.state)
             read = step.kind in ("consent", "form", "instructions", "feedback", "break", "debrief")
             if not read or message.step != views.step_key(sitting.state):
                 return await self._view(sitting)
@@ -248,10 +245,10 @@ class Host:
                 self._forget(sitting.record.id)
                 return {"kind": "declined"}
             if step.kind == "form":
-                state, values = flow.filled(sitting.state, message.values)
+                state, values = filled(sitting.state, message.values)
                 await asyncio.to_thread(record_form, self.responses, sitting.record, values)
             else:
-                state = flow.advanced(sitting.state)
+                state = advanced(sitting.state)
                 if step.kind in ("consent", "debrief"):
                     await self._note(sitting, step.kind)
             sitting.state = views.to_view(state)
@@ -267,16 +264,17 @@ class Host:
             if state is None:
                 return {**await self._view(sitting), "counted": False}
             well = message.shown_well and all(shown.shown_well for shown in message.shown)
-            step = flow.current(state)
+            step = current(state)
             late = step.duration_s is not None and (message.response_s or 0.0) > step.duration_s
             if message.value is None or late:
-                state, answer = flow.missed(state, shown_well=well)
+                state, answer = missed(state, shown_well=well)
             elif message.response_s is None:
                 raise SessionError("Expected response_s with an answer, found none.")
             else:
-                state, answer = flow.answered(state, message.value, message.response_s, shown_well=well)
+                state, answer = answered(state, message.value, message.response_s, shown_well=well)
             at = datetime.now(UTC)
-            shown = [self._presentation(sitting, message, one) for one in message.shown]
+            stimuli = sitting.state.trial(message.trial).stimuli
+            shown = [presented(message, one, stimuli, self.frames) for one in message.shown]
             try:
                 await self.writer.put(answer_rows(sitting.record, state.trial(answer.trial), answer, shown, at))
             except sa.exc.IntegrityError:
@@ -299,29 +297,9 @@ class Host:
 
     def _at_question(self, state: Session, key: tuple[int, str, int]) -> Session | None:
         """The state at a question, past the films that the page has shown; None where another question is due."""
-        while (step := flow.current(state)).kind not in ("answer", "done", "form", "consent"):
-            state = flow.advanced(state)
+        while (step := current(state)).kind not in ("answer", "done", "form", "consent"):
+            state = advanced(state)
         return state if step.kind == "answer" and (step.trial, step.item, step.attempt) == key else None
-
-    def _presentation(self, sitting: Sitting, message: Answered, shown: Shown) -> Presentation:
-        stimuli = sitting.state.trial(message.trial).stimuli
-        if shown.slot > len(stimuli):
-            raise SessionError(
-                f"Expected one of the {len(stimuli)} films of trial {message.trial}, found {shown.slot}."
-            )
-        stimulus = stimuli[shown.slot - 1]
-        return Presentation(
-            trial=message.trial,
-            attempt=message.attempt,
-            place=PLACES[shown.slot - 1],
-            stimulus=stimulus,
-            method=shown.method,
-            frames_expected=self.frames.get(stimulus),
-            frames_presented=shown.frames_presented,
-            longest_gap_frames=shown.longest_gap_frames,
-            shown_well=shown.shown_well,
-            detail={"times_ms": shown.times_ms, "frames": shown.frames, **message.timing},
-        )
 
     async def happened(self, sitting: Sitting, message: Happened) -> None:
         """Something besides answers, told by the page."""
@@ -340,7 +318,7 @@ class Host:
     # What is shown
 
     async def _view(self, sitting: Sitting) -> dict[str, Any]:
-        step = flow.current(sitting.state)
+        step = current(sitting.state)
         view = views.view(sitting.state, sitting.participant, self.film_bytes)
         sitting.shown_trial = (step.trial, step.attempt) if step.slot == 1 else None
         if step.kind in ("debrief", "done"):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from study.errors import SessionError
+from study.experiment.store.answers import Presentation
+from study.tasks.trial import PLACES
 
 LONGEST_FILM_FRAMES = 40_000
 """Far above the longest stimulus (120 s at 240 frames a second); a page can't fill the database."""
@@ -115,3 +118,30 @@ def read(model: type[Message], data: bytes) -> Any:
         raise SessionError(
             f"Expected a message {model.__name__}, found a mistake at {where}: {first['msg']}."
         ) from None
+
+
+def presented(message: Answered, shown: Shown, stimuli: Sequence[str], frames: Mapping[str, int]) -> Presentation:
+    """How a film of an answered trial was presented, as it is stored.
+
+    Parameters
+    ----------
+    stimuli
+        Those of the trial, slot by slot.
+    frames
+        How many each stimulus has.
+    """
+    if shown.slot > len(stimuli):
+        raise SessionError(f"Expected one of the {len(stimuli)} films of trial {message.trial}, found {shown.slot}.")
+    stimulus = stimuli[shown.slot - 1]
+    return Presentation(
+        trial=message.trial,
+        attempt=message.attempt,
+        place=PLACES[shown.slot - 1],
+        stimulus=stimulus,
+        method=shown.method,
+        frames_expected=frames.get(stimulus),
+        frames_presented=shown.frames_presented,
+        longest_gap_frames=shown.longest_gap_frames,
+        shown_well=shown.shown_well,
+        detail={"times_ms": shown.times_ms, "frames": shown.frames, **message.timing},
+    )

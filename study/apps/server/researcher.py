@@ -17,8 +17,8 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from study.apps.server.hosting import Host, Sitting
-from study.experiment import session as flow
 from study.experiment.plan import questions
+from study.experiment.session import current
 from study.experiment.store import participants as people
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.sessions import session_by_id
@@ -104,7 +104,7 @@ def _listed(host: Host, row: Mapping[str, Any], sitting: Sitting | None, now: da
         "group": row["group_number"],
         "parameters": json.loads(row["parameters_json"]),
         "state": state,
-        "step": flow.current(sitting.state).kind if sitting is not None else "",
+        "step": current(sitting.state).place if sitting is not None else "",
         "answers": row["answers"],
         "questions": _questions(host, row["id"], sitting),
         "began_at": row["began_at"].isoformat(timespec="seconds"),

@@ -11,9 +11,8 @@ import hmac
 from functools import lru_cache
 from typing import Any
 
-from study.experiment import session as sitting
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import Session
+from study.experiment.session import Session, advanced, current, near, progress
 from study.experiment.steps import Step, answer_keys, answer_words
 from study.experiment.store.participants import Participant
 from study.tasks.registry import task_of
@@ -40,30 +39,30 @@ def _film_name(secret: str, place: str) -> str:
 
 def step_key(session: Session) -> str:
     """The name of a step that is read, the same after a restart of the server."""
-    step = sitting.current(session)
-    trial = next((other.trial for other in sitting.near(session)[0]), 0)
+    step = current(session)
+    trial = next((other.trial for other in near(session)[0]), 0)
     return f"{step.kind}/{step.study}/{trial}"
 
 
 def films_due(session: Session) -> list[Step]:
     """The steps whose films a participant may load now: those of this trial and of what may follow, or the example."""
-    step = sitting.current(session)
+    step = current(session)
     due = [step] if step.kind == "instructions" and step.stimulus else []
-    own, ahead = sitting.near(session)
+    own, ahead = near(session)
     return due + [other for other in own if other.slot] + ahead
 
 
 def to_view(session: Session) -> Session:
     """Past what a page does by itself: the pause, which belongs to the trial before it."""
-    while sitting.current(session).kind == "pause":
-        session = sitting.advanced(session)
+    while current(session).kind == "pause":
+        session = advanced(session)
     return session
 
 
 def view(session: Session, participant: Participant, film_bytes: int) -> dict[str, Any]:
     """What the page shows now; `film_bytes` is the size at which all films are sent."""
-    step, protocol = sitting.current(session), session.protocol
-    done, total = sitting.progress(session)
+    step, protocol = current(session), session.protocol
+    done, total = progress(session)
     shown: dict[str, Any] = {"kind": step.kind, "text": step.text, "progress": [done, total]}
     if step.slot == 1:
         return {**shown, **_trial(session, participant, film_bytes), "kind": "trial"}
@@ -85,7 +84,7 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
 
 
 def _trial(session: Session, participant: Participant, film_bytes: int) -> dict[str, Any]:
-    own, ahead = sitting.near(session)
+    own, ahead = near(session)
     question = next(other for other in own if other.kind == "answer")
     return {
         **_asking(session, question),
