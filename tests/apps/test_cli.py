@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from study import __version__
-from study.apps.cli import VERBS, run
+from study.apps.cli import run
+from study.apps.cli.group import VERBS
 
 ROOT = Path(__file__).parents[2]
 

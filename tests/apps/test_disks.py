@@ -16,7 +16,8 @@ from pathlib import Path
 import pytest
 from serving import PROTOCOL, unfilmed
 
-from study.apps.cli import VERBS, run
+from study.apps.cli import run
+from study.apps.cli.group import VERBS
 from study.experiment.store.databases import try_to_write
 from study.experiment.store.responses import open_responses
 from study.files import write_whole

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from study.apps.cli import VERBS, run
+from study.apps.cli import run
+from study.apps.cli.group import VERBS
 from study.motion.readers.other_formats import by_beginning
 
 ROOT = Path(__file__).parents[2]
