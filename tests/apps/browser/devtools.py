@@ -70,7 +70,10 @@ class Tab(Driven):
         self.call("Page.navigate", url=address)
 
     def reload(self) -> None:
+        self.run("window.beforeReload = true")
         self.call("Page.reload")
+        # The command returns before the page is gone; what is asked of it meanwhile may get no answer.
+        self.wait("!window.beforeReload")
 
     def run(self, script: str) -> Any:
         answer = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
