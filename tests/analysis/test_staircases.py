@@ -48,11 +48,12 @@ def table_of(runs: dict[tuple[str, str, int], list[tuple[int, str | None]]]) -> 
                 {
                     "participant": participant, "motion": motion, "repeat": 1, "trial": 3 * place + (sign > 0),
                     "difference_frames": sign * level, "answer": answer,
+                    "correct": None if answer is None else answer == "different",
                 }
             )  # fmt: skip
-        rows.append({**rows[-1], "trial": 1, "difference_frames": 0, "answer": "different"})
+        rows.append({**rows[-1], "trial": 1, "difference_frames": 0, "answer": "different", "correct": False})
     table = pd.DataFrame(rows).sample(frac=1.0, random_state=1)
-    return table.astype({"difference_frames": "Int64"})
+    return table.astype({"difference_frames": "Int64", "correct": "boolean"})
 
 
 @pytest.mark.parametrize("missed", [0.0, 0.1])

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from study.analysis import estimates
 from study.analysis.psychometric.analyse import PsychometricStudy, analyse_psychometric
 from study.analysis.psychometric.model import make_model
+from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.models.oddity import CHANCE, d_prime_of
 
 if TYPE_CHECKING:
@@ -74,12 +75,15 @@ class Oddity:
         By difference, rising.
     functions
         The psychometric function of each side, over the size of the difference.
+    staircases
+        Thresholds as means of reversals, where trials came by staircases.
     """
 
     keys: ClassVar[Mapping[str, str]] = {"oddity": ""}
 
     levels: tuple[OddityLevel, ...]
     functions: Mapping[Side, PsychometricStudy]
+    staircases: Staircases | None = None
 
     @property
     def thresholds(self) -> dict[Side, SideThreshold]:
@@ -96,6 +100,7 @@ class Oddity:
             f"The odd one of three was found in {best.percent:.0f}% of the trials at {best.difference_frames:+d} "
             f"frames, where chance gives {100 * CHANCE:.0f}%."
         ]
+        told += [self.staircases.in_words("right")] if self.staircases else []
         return [*told, *(f"Blends that are {side}: {found.answer}" for side, found in self.functions.items())]
 
 
@@ -120,14 +125,13 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
     name
         Of the study.
     settings
-        The level of confidence counts.
+        The level of confidence counts, and the rule of the study's staircases.
 
     Raises
     ------
     AnalysisError
         When a column is missing.
     """
-    del name
     estimates.check_columns(answers, NEEDED_COLUMNS, "an oddity analysis")
     given = answers[answers["answer"].notna() & answers["correct"].notna() & answers["difference_frames"].notna()]
     estimates.check_participants(given)
@@ -143,7 +147,9 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
         own = trials[trials["difference_frames"].astype(float) * sign > 0]
         if len(own):
             functions[side] = analyse_psychometric(own, model, confidence=settings.confidence)
-    return Oddity(tuple(_levels(trials, settings.confidence)), functions)
+    rule = settings.staircases.get(name)
+    staircases = None if rule is None else staircase_thresholds(answers, rule, settings.confidence)
+    return Oddity(tuple(_levels(trials, settings.confidence)), functions, staircases)
 
 
 def _levels(trials: pd.DataFrame, confidence: float) -> list[OddityLevel]:

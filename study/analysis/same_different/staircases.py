@@ -1,8 +1,8 @@
 """Thresholds of staircases: the mean of the last reversals, without a model (Levitt 1971, section IV).
 
-The answers of a same-different study and the rule of its staircases come in; a threshold a side goes out. Each
-participant has a staircase for each motion and side; the participant's threshold is the mean over these. It is where
-"different" has the probability that the rule aims at, not the level of the just noticeable difference.
+The answers of a study and the rule of its staircases come in; a threshold a side goes out. Each participant has a
+staircase for each motion and side; the participant's threshold is the mean over these. It is where right responses have
+the probability that the rule aims at, not the level of the just noticeable difference.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Staircases:
     Attributes
     ----------
     target
-        The share of "different" at which the rule aims.
+        The share of right responses at which the rule aims.
     averaged
         How many reversals a threshold is the mean of.
     thresholds
@@ -73,8 +73,8 @@ class Staircases:
     spread: dict[Side, float]
     runs: tuple[StaircaseRun, ...]
 
-    def in_words(self) -> str:
-        """Return the thresholds in a sentence."""
+    def in_words(self, counted_as: str = "“different”") -> str:
+        """Return the thresholds in a sentence; `counted_as` is what right responses are called."""
         signs: dict[Side, str] = {"longer": "+", "shorter": "−"}
         parts = []
         for side, found in self.thresholds.items():
@@ -82,7 +82,7 @@ class Staircases:
             place = f"nothing ({found.note})" if found.frames is None else f"k {signs[side]} {found.frames:.1f}{error}"
             parts.append(f"{place} frames" if found.frames is not None else place)
         return (
-            f"By the staircases, {100 * self.target:.1f}% of the responses are “different” at {' and '.join(parts)} "
+            f"By the staircases, {100 * self.target:.1f}% of the responses are {counted_as} at {' and '.join(parts)} "
             f"(mean of the last {self.averaged} reversals)."
         )
 
@@ -93,7 +93,8 @@ def staircase_thresholds(answers: pd.DataFrame, rule: UpDown, confidence: float 
     Parameters
     ----------
     answers
-        Of one study, missed ones among them: `participant`, `trial`, `motion`, `repeat`, `difference_frames`, `answer`.
+        Of one study, missed ones among them: `participant`, `trial`, `motion`, `repeat`, `difference_frames`, `answer`,
+        `correct`.
     rule
         By which the staircases moved.
     confidence
@@ -118,9 +119,10 @@ def _runs(answers: pd.DataFrame, rule: UpDown) -> Iterator[StaircaseRun]:
     keys = [moved_rows["participant"].astype(str), moved_rows["motion"].astype(str), longer, moved_rows["repeat"]]
     for (participant, motion, _, _), part in moved_rows.groupby(keys, sort=False):
         track = Track(rule.start)
-        for level, answer in zip(part["difference_frames"].abs(), part["answer"], strict=True):
+        right = part["correct"].astype(object).where(part["answer"].notna(), None)
+        for level, answer in zip(part["difference_frames"].abs(), right, strict=True):
             # Where answers were excluded, the level that was shown tells where the staircase had come to.
-            track = moved(replace(track, level=int(level)), rule, _right(answer))
+            track = moved(replace(track, level=int(level)), rule, None if answer is None else bool(answer))
         last = track.reversals[-rule.averaged :]
         enough = len(last) == rule.averaged
         yield StaircaseRun(
@@ -133,10 +135,6 @@ def _runs(answers: pd.DataFrame, rule: UpDown) -> Iterator[StaircaseRun]:
             float(np.mean(last)) if enough else None,
             float(np.std(last, ddof=1)) if enough and len(last) > 1 else None,
         )
-
-
-def _right(answer: object) -> bool | None:
-    return answer == "different" if isinstance(answer, str) else None
 
 
 def _threshold(side: Side, runs: list[StaircaseRun], rule: UpDown, confidence: float) -> Threshold:

@@ -17,6 +17,7 @@ from typing import Protocol as Shape
 import numpy as np
 
 from study.models.up_down import UpDown
+from study.tasks import task
 from study.tasks.answer import Answer
 from study.tasks.trial import Pair, Trial
 
@@ -32,20 +33,8 @@ class SettingsError(ValueError):
         super().__init__(words)
 
 
-class Asked(Shape):
-    """What a procedure reads of a study."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def task(self) -> str:
-        """The task's name."""
-
-    @property
-    def order(self) -> str:
-        """How the order within pairs is found."""
+class Asked(task.Asked, Shape):
+    """What a procedure reads of a study: what its task does, and the attention checks."""
 
     @property
     def attention_checks(self) -> int:

@@ -17,7 +17,7 @@ from annotated_types import Ge, Le
 from study.experiment.procedures.procedure import Asked, Course, Draw, Members, Settings, SettingsError
 from study.models.up_down import Track, UpDown, fewest_trials, moved, reachable, stopped, target
 from study.tasks.answer import Answer
-from study.tasks.registry import TASKS, right_answer
+from study.tasks.registry import TASKS, right_answer, task_of
 from study.tasks.trial import Pair, Trial, trial_of
 from study.transitions.methods.method import required, setting
 
@@ -104,6 +104,11 @@ class Staircase(Settings):
         takers = [task.asked_as for task in TASKS.values() if "differences_frames" in task.keys]
         if asked.task not in takers:
             yield "procedure", f"expected a {' or '.join(takers)} task {where}, found {asked.task!r}; change one"
+        elif self.catch_every and any(key == "differences_frames" for key, _ in task_of(asked).problems(asked)):
+            yield (
+                "procedure",
+                f"expected catch_every = 0 {where}: every trial of {asked.task!r} shows a difference; write it",
+            )
         if asked.order not in ("random", "by-group"):
             yield "order", f"expected 'random' or 'by-group' {where}, found {asked.order!r}; change it"
         if asked.attention_checks:

@@ -62,6 +62,14 @@ def test_only_studies_of_differences_have_staircases() -> None:
         parse_protocol(with_staircases() + table)
 
 
+def test_a_task_that_always_shows_a_difference_has_no_trials_without_one() -> None:
+    text = with_staircases().replace('task = "same-different"', 'task = "oddity"', 1)
+    with pytest.raises(ProtocolError, match=r"procedure: expected catch_every = 0 .* of 'oddity' shows"):
+        parse_protocol(text)
+    study = parse_protocol(text.replace("catch_every = 4", "catch_every = 0")).study("jnd")
+    assert 0 not in study.differences_frames
+
+
 def test_texts_and_outlook_say_how_many_trials_there_may_be(toy_library: ToyLibrary) -> None:
     text = with_staircases().replace('welcome = "Welcome."', 'welcome = "You will see {trials} pairs."')
     protocol = parse_protocol(text)

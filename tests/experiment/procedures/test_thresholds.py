@@ -6,6 +6,7 @@ import pytest
 from toys import TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
 
 from study.analysis.analyse import Analysis, analyse_folder, analysis_json
+from study.analysis.oddity.analyse import Oddity
 from study.analysis.same_different.analyse import SameDifferent
 from study.experiment.observers import truth
 from study.experiment.protocol.whole import Protocol, parse_protocol
@@ -79,3 +80,15 @@ def test_json_has_the_staircases_and_constant_stimuli_have_none() -> None:
     assert none is None
     assert {run["side"] for run in own["runs"]} == {"longer", "shorter"}
     assert set(own["thresholds"]) == {"longer", "shorter"}
+
+
+def test_an_oddity_study_has_the_threshold_of_its_staircases() -> None:
+    text = LONGER_RUNS.replace('task = "same-different"', 'task = "oddity"', 1).replace(
+        "catch_every = 4", "catch_every = 0"
+    )
+    found = analysed(parse_protocol(text), 6).of(Oddity)["jnd"]
+    assert found.staircases is not None
+    assert all(one.frames is not None for one in found.staircases.thresholds.values())
+    assert any(
+        said.startswith("By the staircases, 70.7% of the responses are right at k + ") for said in found.sentences(0.05)
+    )

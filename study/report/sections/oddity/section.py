@@ -36,7 +36,10 @@ def oddity_section(result: Oddity, about: About) -> Section | None:
         headlines=(_headline(result, about.fps),),
         drawings=(Drawing(f"{name}_right", oddity_figure(result, f"study-{name}-right", about.mark), caption),),
         tables=(_levels_table(name, result), _threshold_table(name, result, about.fps), *known),
-        notes=tuple(f"Blends that are {side}: {found.answer}" for side, found in result.functions.items()),
+        notes=(
+            *([result.staircases.in_words("right")] if result.staircases else []),
+            *(f"Blends that are {side}: {found.answer}" for side, found in result.functions.items()),
+        ),
         readings=tuple(_readings(result)),
     )
 
