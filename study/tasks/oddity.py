@@ -27,7 +27,10 @@ def _problems(asked: Asked) -> Iterator[Problem]:
     yield from level_problems(asked)
     if 0 in asked.differences_frames:
         who = f"the {asked.task} study {asked.name!r}"
-        yield "differences_frames", f"expected no 0 in {who}, where one of three has to differ; remove it"
+        yield (
+            "differences_frames",
+            f"expected no 0 in {who}, where one of three has to differ; remove it, or write catch_every = 0",
+        )
 
 
 def _no_columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:

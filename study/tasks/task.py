@@ -22,56 +22,30 @@ Kind = Literal["word", "point"]
 """What is answered: a word, each with a button and a key, or a point of a scale."""
 
 
+Order = Literal["both", "random", "balanced", "by-group"]
+Show = Literal["single", "pair"]
+
+
 class Item(Protocol):
-    """One question of a rating."""
+    """One question of a rating: its name in the answers, and words at the middle of the scale."""
 
-    @property
-    def name(self) -> str:
-        """What the answers call it."""
-
-    @property
-    def middle(self) -> str:
-        """Words at the middle of the scale."""
+    name: str
+    middle: str
 
 
 class Asked(Protocol):
-    """What a task reads of a study: its keys in the protocol."""
+    """What tasks and procedures read of a study: its keys in the protocol, by their names there."""
 
-    @property
-    def name(self) -> str:
-        """What plans and answers call it."""
-
-    @property
-    def task(self) -> str:
-        """What the protocol calls the task."""
-
-    @property
-    def show(self) -> str | None:
-        """`single` or `pair`, for ratings."""
-
-    @property
-    def reference(self) -> str:
-        """Method of the reference, method a, or of what is rated."""
-
-    @property
-    def comparison(self) -> str | None:
-        """Method b, or a second one to rate."""
-
-    @property
-    def differences_frames(self) -> Sequence[int]:
-        """Comparison minus reference, a pair each."""
-
-    @property
-    def order(self) -> str:
-        """How the orders within a pair are drawn."""
-
-    @property
-    def repeats(self) -> int:
-        """How often the whole set is shown."""
-
-    @property
-    def scale_points(self) -> int:
-        """Points of the rating scale."""
+    name: str
+    task: str
+    show: Show | None
+    reference: str
+    comparison: str | None
+    differences_frames: tuple[int, ...]
+    order: Order
+    repeats: int
+    attention_checks: int
+    scale_points: int
 
     @property
     def items(self) -> Sequence[Item]:

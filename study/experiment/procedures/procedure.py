@@ -17,8 +17,8 @@ from typing import Protocol as Shape
 import numpy as np
 
 from study.models.up_down import UpDown
-from study.tasks import task
 from study.tasks.answer import Answer
+from study.tasks.task import Asked
 from study.tasks.trial import Pair, Trial
 
 Members = tuple[int, ...]
@@ -31,14 +31,6 @@ class SettingsError(ValueError):
     def __init__(self, key: str, words: str) -> None:
         self.key = key
         super().__init__(words)
-
-
-class Asked(task.Asked, Shape):
-    """What a procedure reads of a study: what its task does, and the attention checks."""
-
-    @property
-    def attention_checks(self) -> int:
-        """Trials that ask for a stated answer."""
 
 
 class Procedure(Shape):

@@ -14,10 +14,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from annotated_types import Ge, Le
 
-from study.experiment.procedures.procedure import Asked, Course, Draw, Members, Settings, SettingsError
+from study.experiment.procedures.procedure import Course, Draw, Members, Settings, SettingsError
 from study.models.up_down import Track, UpDown, fewest_trials, moved, reachable, stopped, target
 from study.tasks.answer import Answer
 from study.tasks.registry import TASKS, right_answer, task_of
+from study.tasks.task import Asked
 from study.tasks.trial import Pair, Trial, trial_of
 from study.transitions.methods.method import required, setting
 

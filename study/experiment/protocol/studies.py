@@ -18,14 +18,13 @@ from study.experiment.protocol.errors import KeyMismatchError
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
 from study.tasks.registry import NAMES, problems_of
+from study.tasks.task import Order, Show
 from study.transitions.methods.registry import METHODS
 
 if TYPE_CHECKING:
     TaskName = str
 else:
     TaskName = Literal[NAMES]
-Order = Literal["both", "random", "balanced", "by-group"]
-Show = Literal["single", "pair"]
 Difference = Annotated[int, Field(ge=-600, le=600)]
 
 
