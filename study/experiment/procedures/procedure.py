@@ -25,14 +25,6 @@ Members = tuple[int, ...]
 """Which of a pair's stimuli each slot of a trial shows."""
 
 
-class SettingsError(ValueError):
-    """What is wrong with a setting, and the key of it; empty where it is all of them."""
-
-    def __init__(self, key: str, words: str) -> None:
-        self.key = key
-        super().__init__(words)
-
-
 class Procedure(Shape):
     """Which trial of a study comes next.
 

@@ -14,13 +14,13 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from annotated_types import Ge, Le
 
-from study.experiment.procedures.procedure import Course, Draw, Members, Settings, SettingsError
+from study.experiment.procedures.procedure import Course, Draw, Members, Settings
 from study.models.up_down import Track, UpDown, fewest_trials, moved, reachable, stopped, target
+from study.settings import SettingsError, required, setting
 from study.tasks.answer import Answer
 from study.tasks.registry import TASKS, right_answer, task_of
 from study.tasks.task import Asked
 from study.tasks.trial import Pair, Trial, trial_of
-from study.transitions.methods.method import required, setting
 
 SIGNS = {"both": (-1, 1), "shorter": (-1,), "longer": (1,)}
 

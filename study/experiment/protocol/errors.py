@@ -83,32 +83,37 @@ _BOUNDS = {
 
 def explain(model: type[BaseModel], detail: Mapping[str, Any]) -> str:
     """One finding as a sentence: key path, expected, found, what to do."""
+    location = full_location(detail)
+    if detail["type"] == "missing" and isinstance(location[-1], int):
+        location = location[:-1]
+    return f"{key_path(location) or 'the protocol'}: {finding(model, detail)}"
+
+
+def finding(model: type[BaseModel], detail: Mapping[str, Any]) -> str:
+    """One finding without its key path: expected, found, what to do."""
     location, kind, found = full_location(detail), detail["type"], detail.get("input")
     context = detail.get("ctx", {})
-    path = key_path(location) or "the protocol"
     if kind == "extra_forbidden":
         return _unknown_key(model, location)
     if kind == "missing" and isinstance(location[-1], int):
-        return f"{key_path(location[:-1])}: expected more than {counted(location[-1], 'entry', 'entries')}; add one."
+        return f"expected more than {counted(location[-1], 'entry', 'entries')}; add one."
     if kind == "missing":
-        return f"{path}: expected this key, found none; add it."
+        return "expected this key, found none; add it."
     if kind == "value_error":
-        return f"{path}: {str(context['error']).removesuffix('?')}{'?' if str(context['error']).endswith('?') else '.'}"
+        return f"{str(context['error']).removesuffix('?')}{'?' if str(context['error']).endswith('?') else '.'}"
     unit = _unit(model, location)
     if kind in _BOUNDS:
         bound, words = _BOUNDS[kind]
-        return f"{path}: expected {words} {context[bound]:g}{unit}, found {short(found)}; change it."
+        return f"expected {words} {context[bound]:g}{unit}, found {short(found)}; change it."
     if kind == "literal_error":
-        hint = _nearest_choice(context["expected"], found)
-        return f"{path}: expected {context['expected']}, found {short(found)}{hint}"
+        return f"expected {context['expected']}, found {short(found)}{_nearest_choice(context['expected'], found)}"
     if kind in ("string_pattern_mismatch", "string_too_short", "string_too_long"):
-        return f"{path}: expected {_text_rule(kind, context)}, found {short(found)}; change it."
+        return f"expected {_text_rule(kind, context)}, found {short(found)}; change it."
     if kind in ("too_short", "too_long"):
         bound, words = ("min_length", "at least") if kind == "too_short" else ("max_length", "at most")
         entries = counted(context[bound], "entry", "entries")
-        return f"{path}: expected {words} {entries}, found {context['actual_length']}; change it."
-    expected = _EXPECTED.get(kind, detail["msg"])
-    return f"{path}: expected {expected}{unit}, found {_shown(found)}; change it."
+        return f"expected {words} {entries}, found {context['actual_length']}; change it."
+    return f"expected {_EXPECTED.get(kind, detail['msg'])}{unit}, found {_shown(found)}; change it."
 
 
 def _shown(value: object) -> str:
@@ -161,7 +166,7 @@ def _unknown_key(model: type[BaseModel], location: Location) -> str:
         hint = f"did you mean {near!r}?"
     else:
         hint = f"valid keys here: {', '.join(keys)}."
-    return f"{key_path(location)}: unknown key; {hint}"
+    return f"unknown key; {hint}"
 
 
 def _near_key(model: type[BaseModel], location: Location) -> str:

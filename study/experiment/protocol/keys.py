@@ -9,15 +9,16 @@ import re
 import types
 import typing
 from collections.abc import Iterator
-from dataclasses import MISSING, fields
-from typing import Any, get_args, get_origin, get_type_hints
+from dataclasses import fields
+from typing import Any, get_args, get_origin
 
 import annotated_types
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from study.experiment.procedures.procedure import Settings
 from study.experiment.procedures.registry import PROCEDURES
-from study.experiment.protocol.errors import model_at, parts
+from study.experiment.protocol.errors import parts
+from study.experiment.protocol.settings import table_of
 from study.experiment.protocol.whole import Protocol
 
 _REPEATED = ("transitions", "studies", "studies.items", "methods", "form")
@@ -26,43 +27,32 @@ _WORDS = {int: "whole number", float: "number", str: "text", bool: "true or fals
 
 def key_tables() -> str:
     """Markdown tables of all keys: key, type, unit, default, meaning."""
-    tables = [_table(path) for path, _ in parts(Protocol) if not path.endswith(".points")]
-    return "\n\n".join([*tables, *(_procedure_table(member) for member in PROCEDURES.values() if fields(member))])
-
-
-def _table(path: str) -> str:
-    model = model_at(Protocol, path.split(".")) if path else Protocol
-    if model is None:
-        raise AssertionError(f"{path} comes from the model itself")
-    title = f"`[[{path}]]`" if path in _REPEATED else f"`[{path}]`"
-    rows = [_row(name, _type(field), _default(field), field.description) for name, field in model.model_fields.items()]
-    return "\n".join([f"### {title if path else 'At the top of the file'}", *_HEAD, *rows])
-
-
-def _procedure_table(member: type[Settings]) -> str:
-    hints = get_type_hints(member, include_extras=True)
-    rows = [
-        _row(
-            one.name,
-            ", ".join([_annotation(hints[one.name]), *_bounds(list(get_args(hints[one.name])[1:]))]),
-            "required" if one.default is MISSING else f"`{_toml(one.default)}`",
-            one.metadata["words"],
-        )
-        for one in fields(member)
+    tables = [_table(_title(path), model) for path, model in parts(Protocol) if not path.endswith(".points")]
+    own = [
+        _table(f'`[studies.procedure]` with `name = "{name}"`', table_of(member))
+        for name, member in PROCEDURES.items()
+        if fields(member)
     ]
-    return "\n".join([f'### `[studies.procedure]` with `name = "{member.name}"`', *_HEAD, *rows])
+    return "\n\n".join([*tables, *own])
+
+
+def _title(path: str) -> str:
+    if not path:
+        return "At the top of the file"
+    return f"`[[{path}]]`" if path in _REPEATED else f"`[{path}]`"
+
+
+def _table(title: str, model: type[BaseModel]) -> str:
+    rows = [_row(name, field) for name, field in model.model_fields.items()]
+    return "\n".join([f"### {title}", *_HEAD, *rows])
 
 
 _HEAD = ("", "| key | type | unit | default | meaning |", "|---|---|---|---|---|")
 
 
-def _row(name: str, kind: str, default: str, description: str | None) -> str:
-    unit, words = _unit_and_words(description or "")
-    return f"| `{name}` | {kind} | {unit} | {default} | {words} |"
-
-
-def _toml(value: object) -> str:
-    return str(list(value)) if isinstance(value, tuple) else str(value)
+def _row(name: str, field: FieldInfo) -> str:
+    unit, words = _unit_and_words(field.description or "")
+    return f"| `{name}` | {_type(field)} | {unit} | {_default(field)} | {words} |"
 
 
 def _unit_and_words(words: str) -> tuple[str, str]:
@@ -77,8 +67,8 @@ def _default(field: FieldInfo) -> str:
     value = field.default
     if value is None or value in ((), ""):
         return "–"
-    if isinstance(value, str):
-        return f"`{value}`"
+    if isinstance(value, (str, tuple)):
+        return f"`{value if isinstance(value, str) else list(value)}`"
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
     return f"`{value:g}`" if isinstance(value, (int, float)) else "its own"

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, PlainValidator, model_validator
 
 from study.experiment.procedures.constant_stimuli import Constant
-from study.experiment.procedures.procedure import Settings, SettingsError
-from study.experiment.procedures.registry import PROCEDURES, settings_of
+from study.experiment.procedures.procedure import Settings
+from study.experiment.procedures.registry import PROCEDURES
 from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.settings import member_of, settings_in
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
 from study.tasks.registry import NAMES, problems_of
@@ -54,16 +55,14 @@ class OneHop(Part):
     conditions: int = Field(default=100, ge=1, le=10000, description="Transitions drawn for the weight of Eq. 5.")
 
 
-def _procedure(table: object) -> Settings:
+def procedure_of(table: object) -> Settings:
     """The settings of a procedure; what is wrong with them is told at their key."""
     if isinstance(table, Settings):
         return table
     if not isinstance(table, Mapping):
         raise KeyMismatchError(f"expected a table of keys, found {table!r}; write [studies.procedure] and its keys")
-    try:
-        return settings_of(table)
-    except SettingsError as error:
-        raise KeyMismatchError(str(error), *([error.key] if error.key else [])) from None
+    own = dict(table)
+    return settings_in(member_of(own.pop("name", Constant.name), PROCEDURES, "name"), own)
 
 
 class StudySpec(Part):
@@ -101,7 +100,7 @@ class StudySpec(Part):
         "which are 10 frames at 30 fps. [frames]",
     )
     one_hop: OneHop = Field(default=OneHop(), description="How the method `one-hop` finds its hops.")
-    procedure: Annotated[Settings, PlainValidator(_procedure)] = Field(
+    procedure: Annotated[Settings, PlainValidator(procedure_of)] = Field(
         default=Constant(),
         description="How the trials are chosen: "
         f"{', '.join(f'`{name}` ({member.title})' for name, member in PROCEDURES.items())}.",
@@ -144,8 +143,8 @@ class StudySpec(Part):
         if not isinstance(table, Mapping) or not isinstance(table.get("procedure"), Mapping):
             return table
         try:
-            settings = settings_of(table["procedure"])
-        except SettingsError:  # told where the key itself is checked
+            settings = procedure_of(table["procedure"])
+        except KeyMismatchError:  # told where the key itself is checked
             return table
         if (own := settings.differences()) is None:
             return table

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 if TYPE_CHECKING:
@@ -38,16 +38,6 @@ WANG_2004 = (
 SHOEMAKE_1985 = "Shoemake, K. (1985). Animating rotation with quaternion curves. SIGGRAPH, 245–254."
 
 Kept = TypeVar("Kept")
-
-
-def setting(default: Any, words: str) -> Any:
-    """A field of a part, with the words that explain it to who writes a protocol; `[unit]` may stand at their end."""
-    return field(default=default, metadata={"words": words})
-
-
-def required(words: str) -> Any:
-    """A setting without a default."""
-    return field(metadata={"words": words})
 
 
 @dataclass(frozen=True, eq=False)

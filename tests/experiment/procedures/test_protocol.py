@@ -36,7 +36,7 @@ def line_of(text: str, beginning: str) -> int:
             "start_frames = 6\n",
             "",
             "[studies.procedure]",
-            "start_frames: expected this key with 'staircase', found",
+            "start_frames: expected this key, found",
         ),
         ("", '"staircase"', '"stairs"', "name = ", "expected 'constant' or 'staircase', found 'stairs'"),
         ("", "averaged = 2", "averaged = 4", "averaged", "expected at most the 3 reversals, found 4; lower it"),

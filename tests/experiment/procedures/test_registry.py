@@ -11,8 +11,10 @@ from toys import STAIRCASE, TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
 
 from study.experiment.observers import person, respond
 from study.experiment.plan import draw_plan, plan_from_json
-from study.experiment.procedures.procedure import Settings, SettingsError
-from study.experiment.procedures.registry import PROCEDURES, settings_of
+from study.experiment.procedures.procedure import Settings
+from study.experiment.procedures.registry import PROCEDURES
+from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.studies import procedure_of
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import open_session, walk
 from study.experiment.simulation import simulate
@@ -47,9 +49,9 @@ def test_a_procedure_runs_a_session(name: str) -> None:
     study = protocol.study("jnd")
     settings = study.procedure
     assert settings.name == name
-    assert settings_of({"name": name, **asdict(settings)}) == settings
-    with pytest.raises(SettingsError, match="unknown key"):
-        settings_of({"name": name, **asdict(settings), "nothing_of_the_kind": 1})
+    assert procedure_of({"name": name, **asdict(settings)}) == settings
+    with pytest.raises(KeyMismatchError, match="unknown key"):
+        procedure_of({"name": name, **asdict(settings), "nothing_of_the_kind": 1})
     pairs = pairs_of(protocol)
     plan = draw_plan(protocol, pairs, "p01")
     assert plan_from_json(plan.to_json()) == plan

@@ -11,9 +11,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from study.experiment.procedures.procedure import Course, Procedure, SettingsError
-from study.experiment.procedures.registry import settings_of
+from study.experiment.procedures.procedure import Course, Procedure
 from study.experiment.procedures.staircase import Staircase
+from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.studies import procedure_of
 from study.tasks.answer import Answer
 from study.tasks.trial import Pair, Trial
 
@@ -193,25 +194,25 @@ def test_thresholds_are_those_of_the_observer(keys: dict[str, int], target: floa
 
 def test_settings_say_what_is_wrong() -> None:
     table = {"name": "staircase", "start_frames": 12, "most_frames": 20}
-    assert settings_of(table) == replace(SETTINGS, steps_frames=(4, 2, 1))
+    assert procedure_of(table) == replace(SETTINGS, steps_frames=(4, 2, 1))
     for bad, key, words in (
         ({"start_frames": 30}, "start_frames", "from least_frames to most_frames, 1 to 20, found 30"),
-        ({"down": 11}, "down", "expected from 1 to 10, found 11"),
-        ({"steps_frames": [4, 0]}, "steps_frames", "expected from 1 to 400, found 0"),
-        ({"start_frames": 1.5}, "start_frames", "expected a whole number, found 1.5"),
-        ({"start_frames": True}, "start_frames", "expected a whole number, found True"),
-        ({"side": "left"}, "side", "'both' or 'shorter' or 'longer', found 'left'"),
+        ({"down": 11}, "down", "expected at most 10, found 11"),
+        ({"steps_frames": [4, 0]}, "steps_frames", "expected at least 1 in frames, found 0"),
+        ({"start_frames": 1.5}, "start_frames", "expected a whole number in frames, found 1.5"),
+        ({"start_frames": True}, "start_frames", "expected a whole number in frames, found True"),
+        ({"side": "left"}, "side", "'both', 'shorter' or 'longer', found 'left'"),
         ({"side": "longest"}, "side", "did you mean 'longer'"),
         ({"name": "staircases"}, "name", "did you mean 'staircase'"),
         ({"revesals": 3}, "revesals", "unknown key; did you mean 'reversals'"),
-        ({"xyz": 3}, "xyz", "unknown key; valid keys here: name, start_frames"),
+        ({"xyz": 3}, "xyz", "unknown key; valid keys here: start_frames"),
         ({"steps_frames": 3}, "steps_frames", "expected a list"),
         ({"steps_frames": []}, "steps_frames", "expected one step or more"),
         ({"averaged": 9}, "averaged", "at most the 8 reversals, found 9"),
         ({"catch_every": 1}, "catch_every", "leaves no other trial"),
     ):
-        with pytest.raises(SettingsError, match=words) as raised:
-            settings_of(table | bad)
-        assert raised.value.key == key
-    with pytest.raises(SettingsError, match="expected this key with 'staircase', found none"):
-        settings_of({"name": "staircase", "start_frames": 3})
+        with pytest.raises(KeyMismatchError, match=words) as raised:
+            procedure_of(table | bad)
+        assert raised.value.location[0] == key
+    with pytest.raises(KeyMismatchError, match="expected this key, found none"):
+        procedure_of({"name": "staircase", "start_frames": 3})

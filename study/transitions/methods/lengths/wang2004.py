@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from annotated_types import Ge, Le
 
 from study.counting import counted
-from study.transitions.methods.method import WANG_2004, Length, Room, setting
+from study.settings import setting
+from study.transitions.methods.method import WANG_2004, Length, Room
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Made, Make, Place, Way, setting
+from study.settings import setting
+from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Made, Make, Place, Way
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from annotated_types import Ge, Le
 
 from study.counting import counted
 from study.errors import TransitionError
-from study.transitions.methods.method import Made, Make, Place, Way, required
+from study.settings import required
+from study.transitions.methods.method import Made, Make, Place, Way
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 from annotated_types import Ge, Le
 
 from study.errors import TransitionError
+from study.settings import setting
 from study.transitions.methods.lengths.wang2004 import Fixed
 from study.transitions.methods.makes.blends import Blended, Blending
-from study.transitions.methods.method import SHOEMAKE_1985, Length, Made, Place, Room, Way, setting
+from study.transitions.methods.method import SHOEMAKE_1985, Length, Made, Place, Room, Way
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip

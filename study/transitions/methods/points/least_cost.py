@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from study.transitions.methods.method import WANG_2003, Points, setting
+from study.settings import setting
+from study.transitions.methods.method import WANG_2003, Points
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
