@@ -1,9 +1,9 @@
-"""Cameras: where the eye stands, and where each point of the world lands in the picture.
+"""Cameras: where the eye is, and where each point of the world appears in the image.
 
-In go positions `(frames, points, 3)` in metres, Y up; out come pixels: x to the right and y *down* from the top left
+Positions `(frames, points, 3)` in metres, Y up, come in; pixels go out: x to the right and y *down* from the top left
 corner of the frame, so that the first row of a picture is the top one. One fixed camera frames a whole group of
 stimuli, so that nothing but the motion differs between two of them (Wang and Bodenheimer 2004, section 4: both
-clips of a pair were seen from one camera); `track` lets the camera travel with the figure.
+clips of a pair were seen from one camera); `track` lets the camera follow the figure.
 
 Everything is computed element by element: a matrix product may sum in another order for another number of frames,
 and the same pose must land on the same pixels whatever batch it stands in.
@@ -34,7 +34,7 @@ class Camera:
     Parameters
     ----------
     eye : (3,)
-        Where it stands, metres.
+        Its position, metres.
     axes : (3, 3)
         Rows: to the right, up, and *towards the eye*, unit vectors of the world.
     focal_pixels
@@ -42,8 +42,8 @@ class Camera:
     size
         Width and height of the frame that it was made for, pixels.
     track_seconds
-        None for a camera that stands still. Else it travels with the figure's centre over the floor, smoothed
-        over about so many seconds.
+        None for a fixed camera. Otherwise it follows the figure's centre over the floor; smoothing window in
+        seconds.
     fill_share
         The share of the frame's width or height, whichever is the larger, that the motion it was made for takes.
     """
@@ -143,8 +143,8 @@ def frame_group(
     heading
         The direction that counts as forwards, radians about Y from +Z; found from the motion where None.
     track_seconds
-        Have the camera travel with the figure, smoothed over so many seconds. The group then is framed as seen
-        by that camera.
+        Let the camera follow the figure; smoothing window in seconds. The group is then framed as seen by that
+        camera.
     fps
         Frames per second of the positions, for `track_seconds`.
 
@@ -195,7 +195,7 @@ def view_yaw(view: str | float) -> float:
 
 
 def view_axes(yaw: float, elevation: float) -> FloatArray:
-    """Axes of a camera that stands at `yaw` about Y (from +Z towards +X) and looks down by `elevation`, radians."""
+    """Axes of a camera at `yaw` about Y (from +Z towards +X) and looks down by `elevation`, radians."""
     sin_y, cos_y, sin_e, cos_e = np.sin(yaw), np.cos(yaw), np.sin(elevation), np.cos(elevation)
     return np.array(
         [
@@ -221,8 +221,8 @@ def find_heading(group: Sequence[FloatArray]) -> float:
 def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray:
     """The figure's centre over the floor, smoothed, relative to the first frame: `(frames, 3)` with y = 0.
 
-    The smoothing is a Gaussian of standard deviation `seconds`; past both of its ends the path goes on as its own
-    mirror image through that end, so that a straight way stays as it is.
+    The smoothing is a Gaussian of standard deviation `seconds`; beyond both ends the path continues as its mirror
+    image, so that a straight path stays straight.
     """
     if not (seconds >= 0 and np.isfinite(seconds)):
         raise RendererError(f"Expected a tracking time of 0 seconds or more, got {seconds}.")
@@ -240,7 +240,7 @@ def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray
 
 
 def camera_path(positions: FloatArray, camera: Camera, fps: float) -> FloatArray:
-    """How far the camera has come at each frame, `(frames, 3)`, metres; nowhere, where it stands still."""
+    """Displacement of the camera at each frame, `(frames, 3)`, metres; zero for a fixed camera."""
     if camera.track_seconds is None:
         return np.zeros((len(positions), 3))
     return smooth_path(positions, camera.track_seconds, fps)

@@ -1,6 +1,6 @@
 """Offscreen OpenGL: finds a context that works on this machine, and says which.
 
-In goes the kind that is wanted (or nothing), out comes a `Context`. Tried in this order:
+The requested kind (or none) comes in; a `Context` goes out. Tried in this order:
 
 1. `egl`: EGL with the system's libGL; a GPU where there is one, llvmpipe elsewhere;
 2. `egl-only`: EGL that also supplies the GL functions, where libGL is missing;

@@ -1,4 +1,4 @@
-"""A hash of raw frames: NV12 frames in, one SHA-256 out, the same whoever encodes them and however.
+"""A hash of raw frames: NV12 frames in, one SHA-256 out, the same for any encoder.
 
 Hashing every byte would cost as much as drawing, and most bytes are background. So the hash covers a shorter form
 that says as much: the frame's size, the ground (the colours of the first frame's top left corner), and for each plane

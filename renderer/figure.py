@@ -1,6 +1,6 @@
 """Figures: what a body looks like, apart from how it moves.
 
-In go bones, sides and the roles of points; out comes a `Figure`, a list of capsules that hang on points. The
+Bones, sides and the roles of points come in; a `Figure` goes out, a list of capsules that hang on points. The
 style matters to a study: what people can tell about a motion depends on how it is drawn (Hodgins, O'Brien and
 Tumblin 1998, taken up in Wang and Bodenheimer 2004), so the manifest of a study names it.
 

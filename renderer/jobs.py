@@ -111,7 +111,7 @@ def render_many(
     workers: int | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> list[VideoInfo]:
-    """Make all videos; the results stand in the order of the jobs.
+    """Make all videos; the results are in the order of the jobs.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[Vi
     order = sorted(range(len(jobs)), key=lambda i: -len(jobs[i].positions))
     finished = False
     # Workers read jobs from files. Sent through the pool's queue a job is larger than its pipe: when workers end early
-    # the thread that feeds the pipe waits for a reader for ever, and so does the interpreter at its exit.
+    # the thread that feeds the pipe would wait for a reader indefinitely, and so would the interpreter at its exit.
     with scratch_folder("segue-jobs") as folder:
         try:
             waiting: dict[Future[VideoInfo], int] = {

@@ -177,7 +177,7 @@ def paste_frames(
 
 
 class _Backdrop:
-    """What stands behind the figure: one colour, or a floor, which moves under a tracking camera."""
+    """The background of the figure: one colour, or a floor, which moves under a tracking camera."""
 
     def __init__(self, figure: Figure, camera: Camera, positions: NDArray[np.float64], fps: float) -> None:
         self._figure, self._camera = figure, camera

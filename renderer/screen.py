@@ -1,6 +1,6 @@
 """A screen: paints pictures and frames of motions into a window's framebuffer. It knows GL, but neither glfw nor time.
 
-In go RGB pictures and motions `(frames, points, 3)` in metres. A frame is painted with the capsules of the offscreen
+RGB images and motions `(frames, points, 3)` in metres come in. A frame is painted with the capsules of the offscreen
 renderer and the same colours, and a floor by a shader of the same arithmetic, so a frame in a window is that of the
 video, as large as the window allows.
 """
@@ -141,7 +141,7 @@ class Screen:
         self.gl.scissor = None
 
     def _floor_picture(self, drawing: Drawing, frame: int) -> Picture:
-        """The floor at one frame; painted anew only where the camera has moved since."""
+        """The floor at one frame; painted again only if the camera has moved."""
         floor, shift = self._loaded_floor(drawing), drawing.path[frame]
         if floor.shift != tuple(shift):
             floor.shift = tuple(shift)

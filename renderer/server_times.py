@@ -38,7 +38,7 @@ class _PropertyEvent(ctypes.Structure):
 def pressed_at(arrived_s: float, server_ms: int) -> float:
     """When a key was pressed, from when its event arrived and the millisecond in which the server took it.
 
-    Both on the same clock; the server's count begins anew after 2^32 milliseconds.
+    Both on the same clock; the server's count wraps after 2^32 milliseconds.
     """
     behind_ms = (arrived_s * 1000.0 - server_ms) % 2.0**32
     if behind_ms >= 2.0**31:  # the server is ahead, by rounding

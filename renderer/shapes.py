@@ -1,6 +1,6 @@
 """Shapes: a figure's capsules on the screen, in the order to paint them.
 
-In go positions `(frames, points, 3)` in metres, a `Figure` and a `Camera`; out come numbers that a shader paints
+Positions `(frames, points, 3)` in metres, a `Figure` and a `Camera` come in; numbers go out that a shader paints
 without knowing anything of bodies: for every capsule two ends in pixels, radii, colour. Capsules are painted
 from the back to the front, each with smooth edges over what is there already, so that crossing limbs have smooth
 edges too (a depth buffer would leave them jagged). Order is decided pair by pair where two limbs cross on the screen,

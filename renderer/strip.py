@@ -1,6 +1,6 @@
 """Time-lapse strips: a motion in one picture, as the figures of the papers show it.
 
-In go positions, a figure and (for a blend) its segments; out comes one PNG: either a row of poses, evenly spaced in
+Positions, a figure and (for a blend) its segments come in; one PNG goes out: either a row of poses, evenly spaced in
 time, or an onion skin, where the poses stand where they were, earlier ones paler. Source, blend and destination have
 their own colours.
 """
@@ -156,7 +156,7 @@ def _cells(
     view: str | float,
     context: Context | None,
 ) -> Iterator[Bytes]:
-    """One picture for each pose, all seen from the same side and at the same size, without the way over the floor."""
+    """One image for each pose, all from the same side and at the same size, without movement over the floor."""
     heading = find_heading([points])
     poses = points[list(shown)]
     middle = 0.5 * (poses.min(axis=1) + poses.max(axis=1))

@@ -131,7 +131,7 @@ def render_video(
     ------
     RendererError
         For input that can't be drawn, a folder that can't be written, a full disk, a missing encoder. Nothing is then
-        left under `path`, but for what was there before.
+        left under `path`, except for what was there before.
     """
     frames = paste_frames(positions, figure, camera, size, batch, context, fps=float(frame_rate(fps)))
     luma, blue, red = (round(value) for value in to_ycbcr(figure.background))

@@ -1,12 +1,12 @@
 """A window: draws figures and pictures live, times every flip, and hands over keys with their times.
 
-In go figures as positions `(frames, points, 3)` in metres and pictures as RGB; out come the times at which each was
+Figures as positions `(frames, points, 3)` in metres and images as RGB come in; the times go out at which each was
 presented, and events (keys, clicks, focus, size, asks to close), each with the time at which it arrived. All times are
 glfw's: seconds of the machine's steady clock since the window was opened.
 
 A flip is timed after the swap, once the pixels are done (`glFinish`). Where swaps wait for the display, they pace the
-window. Virtual displays report a refresh rate of 0 and swaps there wait for nothing; an own frame clock takes their
-place, and `Pacing.measured` is False: what reaches an eye, and when, is not known then.
+window. Virtual displays report a refresh rate of 0 and swaps there wait for nothing; a frame clock of our own takes
+their place, and `Pacing.measured` is False: what reaches an eye, and when, is not known then.
 
 The window is single-sampled: the capsules smooth their own edges, and multisampling costs a software renderer 10 ms a
 frame.

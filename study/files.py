@@ -1,4 +1,4 @@
-"""Files, the one way to write them: whole or not at all, and what the disk refuses said with its path.
+"""Writing files, complete or not at all; errors of the disk are reported with the path.
 
 A file is written under a temporary name beside its own, flushed to the disk and renamed; where anything fails the
 temporary file goes, and what stood under the name before stays.

@@ -1,7 +1,7 @@
 """TOML: the text of a file that a person wrote comes in; its data goes out, or a refusal of what no such file needs.
 
-A text may be as large, as deep and of as large numbers as a person would write it; beyond that, reading could take for
-ever or end in an error of Python's own.
+Limits on size, depth and numbers are beyond what a person would write; without them, reading could take indefinitely
+or end in an error of Python's own.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         raise FileError(f"{where}: expected TOML, found a mistake: {error}. Mend that line.") from error
     except RecursionError:
         raise FileError(too_deep) from None
-    except ValueError as error:  # Python's own limit for whole numbers, or a date that there is not
+    except ValueError as error:  # Python's own limit for whole numbers, or a date that does not exist
         raise FileError(f"{where}: expected TOML, found a number or a date out of range ({error}).") from error
     parts: list[tuple[Any, tuple[int | str, ...]]] = [(data, ())]
     while parts:

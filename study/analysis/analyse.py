@@ -77,7 +77,7 @@ class Analysis(Results):
     Attributes
     ----------
     exclusions, without_exclusions
-        What was left out by which rule, and the same results of all answers; None where none was left out.
+        What each rule excluded, and the same results for all answers; None if nothing was excluded.
     quality
         Of all answers.
     data
@@ -112,12 +112,12 @@ def analyse(
         One row an answer: `participant`, `task`, `study`, `answer`, and the columns that the tasks need (see
         `docs/analysis.md`). Missed answers have no `answer`.
     settings
-        What was decided beforehand; the usual where it is None.
+        The preregistered settings; by default the usual ones.
     family
         Names of the studies whose tests were declared confirmatory before there was data; all preference studies where
         it is None.
     rules, checks
-        What is left out, as stated before there was data, and the answers to attention checks.
+        The preregistered exclusions, and the answers to attention checks.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def analyse_folder(
     resamples
         Bootstrap samples behind standard errors.
     rules
-        What is left out in place of what the protocol states.
+        Exclusions in place of those of the protocol.
     """
     decided = protocol.analysis
     settings = Settings(

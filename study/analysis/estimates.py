@@ -158,7 +158,7 @@ def mean_of(values: ArrayLike, confidence: float = 0.95) -> Mean:
     Parameters
     ----------
     values : array_like, shape (participants,)
-        One number a participant; NaN is left out.
+        One number a participant; NaN is ignored.
     confidence
         Of the interval.
 
@@ -174,7 +174,7 @@ def mean_of(values: ArrayLike, confidence: float = 0.95) -> Mean:
         return Mean(0, None, None, None, None, "no answers")
     mean = float(data.mean())
     if count == 1:
-        return Mean(1, mean, None, None, None, "one participant: no spread to judge by")
+        return Mean(1, mean, None, None, None, "one participant: no spread to estimate")
     spread = float(data.std(ddof=1))
     if spread <= 1e-12:
         people = counted(count, "participant")
@@ -201,7 +201,7 @@ def student_p_values(values: FloatArray, there: NDArray[np.bool_], expected: flo
     Parameters
     ----------
     values, there : ndarray, shape (..., participants)
-        One number a participant, and who is there.
+        One number a participant, and the participants.
     expected
         The mean where there is no effect.
 
@@ -237,18 +237,20 @@ def clustering(successes: ArrayLike, trials: ArrayLike) -> Clustering:
     yes, shown = yes[shown > 0], shown[shown > 0]
     groups, total = len(shown), float(shown.sum())
     if groups < 2 or total <= groups:
-        return Clustering(None, None, None, None, "fewer than two participants, or one answer each: no telling")
+        return Clustering(
+            None, None, None, None, "fewer than two participants, or one answer each: it cannot be estimated"
+        )
     share, pooled = yes / shown, float(yes.sum()) / total
     between = float((shown * (share - pooled) ** 2).sum()) / (groups - 1)
     within = float((shown * share * (1 - share)).sum()) / (total - groups)
     size = (total - float((shown**2).sum()) / total) / (groups - 1)
     spread = between + (size - 1) * within
     if spread <= 1e-12:
-        return Clustering(None, size, None, None, "all answers alike: there is no variance to divide")
+        return Clustering(None, size, None, None, "all answers are the same: there is no variance")
     correlation = (between - within) / spread
     effect = max(1 + (size - 1) * correlation, 0.0)
     if effect <= 0:
-        return Clustering(correlation, size, effect, None, "participants are all alike, more than chance would have it")
+        return Clustering(correlation, size, effect, None, "participants are more similar than expected by chance")
     return Clustering(correlation, size, effect, total / effect)
 
 
@@ -268,7 +270,7 @@ def resampled_weights(participants: int, resamples: int, rng: np.random.Generato
 
 
 def jackknife_error(left_out: FloatArray) -> float | None:
-    """Return the standard error of an estimate from its values with one participant left out at a time.
+    """Return the standard error of an estimate from its values with each participant omitted in turn.
 
     None where one of these values is not finite: the estimate then hangs on single participants.
     """
@@ -295,7 +297,7 @@ def check_columns(table: pd.DataFrame, names: Sequence[str], analysis: str) -> N
 
 
 def check_participants(table: pd.DataFrame) -> None:
-    """Refuse rows that nobody answered.
+    """Refuse rows without a participant.
 
     Raises
     ------
@@ -305,16 +307,16 @@ def check_participants(table: pd.DataFrame) -> None:
     nameless = int(table["participant"].isna().sum())
     if nameless:
         rows = noun(nameless, "row")
-        raise AnalysisError(f"expected a participant in every row, found {nameless} {rows} without; leave them out")
+        raise AnalysisError(f"expected a participant in every row, found {nameless} {rows} without; remove them")
 
 
 def check_share(value: float, name: str) -> None:
-    """Refuse a confidence or a share at threshold that is none.
+    """Refuse a confidence or a threshold proportion that is not between 0 and 1.
 
     Raises
     ------
     AnalysisError
-        Unless it lies between 0 and 1, ends left out.
+        Unless it lies between 0 and 1, ends excluded.
     """
     if not 0 < value < 1:
         raise AnalysisError(f"expected a {name} between 0 and 1 (0.95, not 95), found {value:g}")
@@ -326,7 +328,7 @@ def numbers(values: ArrayLike, name: str) -> FloatArray:
     Raises
     ------
     AnalysisError
-        Naming the first that is none, or too large for any use.
+        Naming the first that is not a number, or too large.
     """
     try:
         found = np.asarray(values, dtype=np.float64)
@@ -342,5 +344,5 @@ def numbers(values: ArrayLike, name: str) -> FloatArray:
         try:
             float(value)
         except (TypeError, ValueError):
-            raise AnalysisError(f"expected numbers in {name}, found {value!r}; recode or leave out that row") from None
+            raise AnalysisError(f"expected numbers in {name}, found {value!r}; recode or remove that row") from None
     raise AnalysisError(f"expected {name} as an array of numbers, found rows of different lengths")

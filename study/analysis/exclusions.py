@@ -1,7 +1,7 @@
-"""Who and what is left out, by rules stated before there was data: answers in, those that are kept and a count out.
+"""Exclusions by rules stated before there was data: answers come in; those that are kept, and counts, go out.
 
-Rules come from the protocol. Each answer or participant left out is counted under the first rule that it breaks, and
-the analysis is given with and without them, so that nobody has to trust the rules.
+Rules come from the protocol. Each excluded answer or participant is counted under the first rule that it breaks, and
+the analysis is given with and without them, so that their effect can be seen.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Rules:
-    """What is left out; None and False leave nothing out.
+    """Rules of exclusion; None and False exclude nothing.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class RuleCount:
-    """A rule in words, and how many participants and answers were left out by it."""
+    """A rule in words, and how many participants and answers it excluded."""
 
     rule: str
     participants: int
@@ -51,7 +51,7 @@ class RuleCount:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A participant who is left out, and why."""
+    """An excluded participant, and why."""
 
     participant: str
     reason: str
@@ -59,7 +59,7 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Exclusions:
-    """What is left out: by which rules, who wholly, and how many answers, those of participants left out included."""
+    """The exclusions: by which rules, which participants entirely, and how many answers, theirs included."""
 
     rules: tuple[RuleCount, ...]
     participants: tuple[LeftOut, ...]
@@ -75,7 +75,7 @@ def rules_of(stated: object) -> Rules:
 
 
 def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = None) -> tuple[pd.DataFrame, Exclusions]:
-    """Apply the rules: the answers that are kept, and what is left out.
+    """Apply the rules: the answers that are kept, and the exclusions.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = N
 
     Notes
     -----
-    Participants are judged by all their answers, before single answers are left out.
+    Participants are judged by all their answers, before single answers are excluded.
     """
     import pandas as pd
 
@@ -121,11 +121,11 @@ def _times(answers: pd.DataFrame) -> pd.Series[float]:
 def _participants_out(
     answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None
 ) -> list[tuple[str, dict[str, str]]]:
-    """For each rule on participants, in words, whom it leaves out and why."""
+    """For each rule on participants, in words, the participants that it excludes and why."""
     found = []
     missed = answers["answer"].isna().groupby(answers["participant"].astype(str)).mean()
     if rules.most_missed is not None:
-        words = f"participants who missed more than {100 * rules.most_missed:g}% of their trials"
+        words = f"participants with no response in more than {100 * rules.most_missed:g}% of their trials"
         found.append((words, {str(n): f"missed {100 * s:.0f}%" for n, s in missed.items() if s > rules.most_missed}))
     if rules.most_failed_checks is not None:
         words = f"participants who failed more than {100 * rules.most_failed_checks:g}% of the attention checks"
@@ -149,7 +149,7 @@ def _participants_out(
 
 
 def _answers_out(answers: pd.DataFrame, rules: Rules) -> list[tuple[str, pd.Series[bool]]]:
-    """For each rule on answers, in words, which it leaves out."""
+    """For each rule on answers, in words, the answers that it excludes."""
     found = []
     if rules.fastest_s is not None:
         found.append((f"answers sooner than {rules.fastest_s:g} s", (_times(answers) < rules.fastest_s).fillna(False)))
@@ -159,5 +159,5 @@ def _answers_out(answers: pd.DataFrame, rules: Rules) -> list[tuple[str, pd.Seri
         badly = pd.Series(False, index=answers.index)
         if "shown_well" in answers.columns:
             badly = answers["answer"].notna() & ~answers["shown_well"].fillna(True).astype(bool)
-        found.append(("answers after a stimulus that stalled or was hidden", badly))
+        found.append(("answers after a display failure", badly))
     return found

@@ -1,6 +1,6 @@
-"""Data quality: a table of answers in, what is missing, too quick or too uniform out. Nothing is left out silently.
+"""Data quality: a table of answers in, what is missing, too quick or too uniform out. Nothing is excluded silently.
 
-The rules are few and said in words; they flag participants, they exclude nobody.
+The rules are few and given in words; they flag participants and exclude no one.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def _longest_run(answers: list[str]) -> int:
 class ParticipantQuality:
     """How complete and plausible the answers of one participant are.
 
-    `shown_badly` counts answers after a stimulus that stalled or was hidden, `longest_run` one and the same answer,
+    `shown_badly` counts answers after a display failure, `longest_run` one and the same answer,
     `false_alarms` "different" at `same_pairs`; `flags` are in words, empty where there is nothing to say.
     """
 
@@ -194,8 +194,8 @@ def _flags(row: ParticipantQuality, given: dict[str, NDArray[Any]], fastest_s: f
 
 def _rules(fastest_s: float) -> tuple[str, ...]:
     return (
-        f"more than {100 * MANY_MISSED:g}% of the trials missed",
+        f"no response in more than {100 * MANY_MISSED:g}% of the trials",
         f"more than {100 * MANY_FAST:g}% of the answers sooner than {fastest_s:g} s",
         f"the same answer {LONG_RUN} times in a row or more",
-        "one and the same answer throughout a task",
+        "the same answer throughout a task",
     )

@@ -59,7 +59,7 @@ def signed_rank(differences: ArrayLike) -> float | None:
     Parameters
     ----------
     differences : array_like, shape (participants,)
-        One a participant. Zeros are left out, as Wilcoxon does.
+        One a participant. Zeros are ignored, as by Wilcoxon.
 
     Notes
     -----

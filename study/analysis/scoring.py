@@ -29,7 +29,7 @@ class Maxima:
     point : ndarray, shape (fits, parameters)
     value : ndarray, shape (fits,)
     held : ndarray of bool, shape (fits, parameters)
-        True where a parameter stands at a bound.
+        True where a parameter is at a bound.
     settled : ndarray of bool, shape (fits,)
     """
 

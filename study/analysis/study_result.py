@@ -31,7 +31,7 @@ class StudyResult(Protocol):
 
 @dataclass(frozen=True)
 class Settings:
-    """What was decided about the analysis before there was data.
+    """Preregistered settings of the analysis.
 
     Attributes
     ----------

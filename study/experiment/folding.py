@@ -89,7 +89,7 @@ def _known(protocol: Protocol, procedure: Procedure, earlier: Earlier) -> tuple[
 
 
 def _unknown(procedure: Procedure, given: Sequence[Answer], ahead: int) -> int:
-    """The trials that may still come, but for so many that are known."""
+    """The trials that may still come, except for so many that are known."""
     done, most = procedure.progress(given)
     return most - done - ahead
 

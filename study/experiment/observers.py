@@ -84,7 +84,7 @@ def shown_well(who: Person, trial: Trial, step: Step) -> bool:
 def respond(who: Person, trial: Trial, step: Step) -> tuple[str | None, float | None]:
     """A participant's answer and response time in seconds; None twice where the answer is missed.
 
-    Chance depends on person, trial, item and attempt alone, so a session that was interrupted goes on as it would
+    Chance depends only on person, trial, item and attempt, so an interrupted session continues as it would
     have gone.
     """
     rng = generator(who.seed, "answer", who.name, trial.trial, step.item, step.attempt)

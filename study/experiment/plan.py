@@ -93,7 +93,7 @@ def plan_from_json(text: str) -> Plan:
         courses = tuple(course_from_json(course) for course in data.get("courses", ()))
         return Plan(**{**data, "trials": trials, "courses": courses})
     except (ValueError, KeyError, TypeError) as error:
-        raise SessionError(f"Expected a stored plan, found JSON that is none: {error}.") from error
+        raise SessionError(f"Expected a stored plan, found JSON that is not one: {error}.") from error
 
 
 def draw_plan(
@@ -189,7 +189,7 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
 
 
 def questions(protocol: Protocol, plan: Plan) -> int:
-    """How many answers a plan asks for at most, repeats of trials that were badly shown apart."""
+    """How many answers a plan asks for at most, without repeats after display failures."""
     items = {study.name: max(1, len(study.items)) for study in protocol.studies}
     known = sum(1 if trial.role == "check" else items[trial.study] for trial in plan.trials)
     return known + sum(course.most * items[course.study] for course in plan.courses)

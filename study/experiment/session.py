@@ -34,7 +34,7 @@ from study.tasks.trial import Trial
 
 @dataclass(frozen=True)
 class Session:
-    """Where a sitting stands. Use `open_session`, `current`, `advanced`, `answered` and `missed`.
+    """The state of a session. Use `open_session`, `current`, `advanced`, `answered` and `missed`.
 
     `steps` are those of all trials that are known; where a procedure waits for an answer (`folding`), the steps of its
     next trial are added after it. `trials_left` has for each step how many trials have steps from there on: an answer
@@ -63,7 +63,7 @@ def open_session(
     passed: Collection[str] = (),
     frames: Mapping[str, int] | None = None,
 ) -> Session:
-    """A sitting at its start, or where its answers left it; a trial half answered is shown again from its start.
+    """A session at its start, or where its answers left it; a partly answered trial is shown again from its start.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def open_session(
 
 
 def current(session: Session) -> Step:
-    """What to do now; `done` at the end, for ever."""
+    """What to do now; `done` from the end on."""
     return session.steps[session.position]
 
 
@@ -159,7 +159,7 @@ def restarted(session: Session) -> Session:
 
 
 def filled(session: Session, values: Mapping[str, str]) -> tuple[Session, dict[str, str]]:
-    """After the form was filled in: the session and what is stored, field by field; empty ones are left out.
+    """After the form was filled in: the session and what is stored, field by field; without empty ones.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def _asked(session: Session) -> Step:
 
 
 def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
-    """Move on; where the trial was shown badly, add it once more to the end of its study. Practice gets feedback."""
+    """Move on; after a display failure, add the trial once more to the end of its study. Practice gets feedback."""
     here, showing = current(session), (answer.trial, answer.attempt)
     badly_shown = session.badly_shown if answer.shown_well else session.badly_shown | {showing}
     session = replace(session, position=session.position + 1, badly_shown=badly_shown)

@@ -1,6 +1,6 @@
 """Simulation: simulated participants in whole sessions, stored like those of people.
 
-A protocol's pairs and a database come in; sessions that are marked as simulated for ever go out. They go through the
+A protocol's pairs and a database come in; sessions that are always marked as simulated go out. They use the
 same `session` as real front ends.
 """
 
@@ -62,7 +62,7 @@ def simulate(
 ) -> SimulationSummary:
     """Run simulated participants `sim-001`, `sim-002`, ... through their whole sessions.
 
-    Run again after an interruption it finishes the work: sessions that are there are taken up where they stopped, and
+    Run again after an interruption, it finishes the work: existing sessions resume where they stopped, and
     the answers are those of an uninterrupted run.
 
     Parameters
@@ -70,11 +70,11 @@ def simulate(
     participants
         How many there should be in the end.
     seed
-        Where chance comes from, besides the protocol's own seed for the plans.
+        Seed of the observers; plans use the protocol's seed.
     progress
         Called with the answers there are and the number of them in all, after each answer.
     settings
-        The observer; that of 2004 section 5 where it is left out.
+        The observer; by default that of 2004 section 5.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def simulate(
 def _open(
     protocol: Protocol, stimuli: StimulusSource, responses: Responses, plan: Plan, known: Mapping[str, Any]
 ) -> SessionRecord:
-    """A simulated participant's session, begun, taken up, or finished already."""
+    """A simulated participant's session: new, resumed, or already finished."""
     stored = find_session(responses, plan.participant)
     if stored is not None and stored.simulated and stored.truth != dict(known):
         # Half a session by one observer and half by another would have no truth.

@@ -86,7 +86,7 @@ class Step:
 
 
 def comes_again(protocol: Protocol, trial: Trial, attempt: int, shown_well: bool) -> bool:
-    """Whether a trial is queued again: badly shown, and not too often yet, so that no slow machine keeps anyone."""
+    """Whether a trial is queued again: after a display failure, up to a limit, so that a slow machine ends too."""
     return not shown_well and attempt <= protocol.timing.show_again and trial.role != "practice"
 
 
@@ -209,7 +209,7 @@ def break_step(protocol: Protocol, trial: Trial) -> Step:
 
 
 def breaks_of(protocol: Protocol, plan: Plan) -> set[int]:
-    """The trials that a break follows: every so many, practice not counted, and never the last one.
+    """The trials that a break follows: every n trials, without practice, and never the last one.
 
     All trials that may come count, whether they do or not.
     """

@@ -49,7 +49,7 @@ NO_FILMS: Films = {}
 
 
 def consent_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
-    """What is agreed to; empty where nobody is asked."""
+    """The consent text; empty if there is none."""
     return _filled(protocol.consent.text, _standard(protocol, "consent"), _slots(protocol, films))
 
 
@@ -113,7 +113,7 @@ def _slots(protocol: Protocol, films: Films) -> dict[str, str]:
 
 
 def duration_s(protocol: Protocol, *, at_most: bool = False, films: Films = NO_FILMS) -> float:
-    """How long a sitting takes, in seconds: films, gaps, answers, pauses, breaks, practice, the form and reading.
+    """How long a session takes, in seconds: films, gaps, answers, pauses, breaks, practice, the form and reading.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _estimated(protocol: Protocol, study: StudySpec) -> FilmTimes:
 
 
 def _besides_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
-    """What a trial takes besides its films."""
+    """What a trial takes in addition to its films."""
     timing = protocol.timing
     answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
     gap_s = timing.gap_s * (task_of(study).slots - 1)
@@ -176,7 +176,7 @@ def minutes(seconds: float) -> int:
 
 
 def all_texts(protocol: Protocol, films: Films = NO_FILMS) -> tuple[Read, ...]:
-    """Every text of a sitting that participants read, in its order, and then the small words of the front ends."""
+    """Every text of a session that participants read, in its order, and then the small words of the front ends."""
     consent = protocol.consent
     found = [Read("consent.text", consent_text(protocol, films))]
     found += [Read(f"consent.{name}", getattr(consent, name)) for name in ("agree", "decline", "declined")]

@@ -163,7 +163,7 @@ def posterior_range(
 def _log_beta_binomial(yes: FloatArray, shown: FloatArray, overdispersion: FloatArray) -> FloatArray:
     """Log likelihood of each level over knots of arcsin sqrt p, shape (levels, knots, overdispersions).
 
-    Constants that do not depend on p or overdispersion are left out.
+    Constants that do not depend on p or overdispersion are omitted.
     """
     from scipy.special import gammaln
 

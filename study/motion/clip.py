@@ -26,7 +26,7 @@ _POSES = 12
 
 MOST_POSES = 20_000_000
 """Frames times joints that a clip may have: half an hour at 120 frames a second of a body with hands, in 640 MB."""
-# A file of few numbers can ask for many joints in many frames; up to so many it may.
+# A file of few numbers can require many joints in many frames; up to this number it may.
 _FEW_POSES, _POSES_A_NUMBER = 1_000_000, 8
 LOWEST_FPS, HIGHEST_FPS = 1 / 3600, 100_000.0
 
@@ -197,7 +197,7 @@ def joint_positions(clip: Clip, *, ends: bool = False) -> FloatArray:
 
 
 def with_roles(clip: Clip, mapping: Mapping[str, str] | None = None) -> Clip:
-    """The clip with its joints' roles found anew, from its poses too; `mapping` as `rigs.find_roles` takes it."""
+    """The clip with its joints' roles found again, also from its poses; `mapping` as `rigs.find_roles` takes it."""
     some = np.unique(np.linspace(0, clip.frames - 1, min(clip.frames, _POSES)).astype(np.int64))
     poses = joint_positions(
         replace(clip, root_positions=clip.root_positions[some], rotations=clip.rotations[some]), ends=True
@@ -220,7 +220,7 @@ def resample(clip: Clip, fps: float) -> Clip:
     if fps == clip.fps:
         return clip
     ratio = clip.fps / fps
-    # The tolerance keeps the last frame where (frames - 1) / ratio is whole but for rounding.
+    # The tolerance keeps the last frame where (frames - 1) / ratio is whole except for rounding.
     count = int(np.floor((clip.frames - 1) / ratio + 1e-6)) + 1
     refuse_large(count, clip.skeleton.joints, f"{clip.name or 'the clip'} at {fps:g} fps")
     times = np.minimum(np.arange(count) * ratio, clip.frames - 1)
@@ -289,7 +289,7 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Clip:
     """The motion on another body of the rig: rotations kept, root path scaled by leg length.
 
     Scaling the root by the ratio of leg lengths keeps the feet from sliding when stature differs. The bodies may differ
-    in leaf joints, such as fingers: those that only the clip has are left out, those that only the skeleton has stay at
+    in leaf joints, such as fingers: those that only the clip has are removed, those that only the skeleton has stay at
     rest.
 
     Raises
@@ -307,7 +307,7 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Clip:
     if left_out or not np.array_equal(taken, np.arange(skeleton.joints)):
         rotations = np.tile(quat.IDENTITY, (clip.frames, skeleton.joints, 1))
         rotations[:, has] = clip.rotations[:, taken[has]]
-        notes += [f"left out joints {_some([clip.skeleton.names[j] for j in left_out])}"] if left_out else []
+        notes += [f"removed joints {_some([clip.skeleton.names[j] for j in left_out])}"] if left_out else []
         added = [name for name, there in zip(skeleton.names, has, strict=True) if not there]
         notes += [f"joints at rest {_some(added)}"] if added else []
     same = all(np.array_equal(a, b) for a, b in zip(_lengths_of(clip.skeleton), _lengths_of(skeleton), strict=True))

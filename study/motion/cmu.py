@@ -1,6 +1,6 @@
 """The index of CMU trials: which trial of the CMU Graphics Lab database shows which motion.
 
-In: `cmu_index.toml`, which stands beside this module (our annotation, not their data). Out: `IndexedMotion` by name.
+In: `cmu_index.toml`, beside this module (our annotation, not their data). Out: `IndexedMotion` by name.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ _SETTLE_S = 0.2
 _STRAIGHT_KNEE = 0.035
 # A foot that is in the air for less than this is taken to stay on the floor.
 _SHORTEST_SWING_S = 0.1
-# The path is summed in so many steps a frame.
+# Steps a frame in which the path is summed.
 _FINE = 8
 # Standing: the drawn-out part is gone through once in no less than this, and the last velocity dies away over this.
 _SLOWEST_SWAY_S, _COME_TO_REST_S = 1.2, 0.7

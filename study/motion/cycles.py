@@ -39,7 +39,7 @@ _MEMORY_S, _MEMORY_RUNNING_S = 0.15, 0.06
 _OVERLAP_S = 0.05
 # A cycle differs from twice a step by no more than this share.
 _LIMP = 0.15
-# A reflected step stands for the whole cycle where it fits so much better, ...
+# A reflected step represents the whole cycle if it fits better by this factor, ...
 _BETTER = 0.1
 # ... or where the cycle turns by more than the first of these, and it is no steady bend: a bend turns by no more than
 # the second, and by as much in the cycle before.
@@ -145,7 +145,7 @@ def extend(clip: Clip, *, frames_before: int = 0, frames_after: int = 0) -> Exte
     if frames_before < 0 or frames_after < 0:
         raise MotionError(f"Expected numbers of frames from 0 to add, got {frames_before} and {frames_after}.")
     result, notes, cycles = clip, [], {"start": 0.0, "end": 0.0}
-    # The end first: what is added there is not looked at for the start.
+    # The end first: what is added there is not used for the start.
     wanted: tuple[tuple[End, int], ...] = (("end", frames_after), ("start", frames_before))
     for at, frames in wanted:
         if frames == 0:
@@ -220,7 +220,7 @@ def _gait(clip: Clip, at: End) -> Cycle | None:
 
 
 def _longest_step_s(speed: float) -> float:
-    """The longest that one step takes at a speed in m/s: nobody runs with a step of a second."""
+    """The longest duration of a step at a speed in m/s, in seconds."""
     return float(np.clip(1.25 - 0.3 * speed, 0.45, _LONGEST_STEP_S))
 
 

@@ -30,7 +30,7 @@ def download_trial(trial: str, folder: Path | str, *, site: str = CMU_SITE, time
     trial
         Subject and number, as in `16_35`, or a name of the CMU index, whose first take is fetched.
     folder
-        Where `subjects/` stands or is to stand.
+        Where `subjects/` is or will be.
     site
         Address of the site.
     timeout_s
@@ -86,7 +86,7 @@ def _receive_or_say_why(address: str, target: Path, partial: Path, timeout_s: fl
         reason = getattr(error, "reason", error)
         raise MotionError(
             f"Could not download {address}: {reason}. Check the network and run it again (it "
-            f"goes on where it stopped), or put the file at {target} yourself."
+            f"resumes where it stopped), or put the file at {target} yourself."
         ) from error
 
 

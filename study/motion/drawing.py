@@ -77,7 +77,7 @@ def draw_clip(
     poses
         How many poses a strip shows.
     track_seconds
-        Let the camera travel with the figure, smoothed over so many seconds.
+        Let the camera follow the figure; smoothing window in seconds.
     floor
         Draw the ground, at height 0, with contact shadows.
     blended

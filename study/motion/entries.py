@@ -236,7 +236,7 @@ def own_names(files: Sequence[Path], folder: Path, given: Mapping[Path, str], ta
     """A name for each file: the one given, or the shortest of these that no other file has.
 
     The name without its suffix (`walk`), the place in the folder without suffix (`outdoors/walk`), the place
-    (`outdoors/walk.bvh`), the place with accents as the disk has them. `taken` are names that stand for something else.
+    (`outdoors/walk.bvh`), the place with accents as the disk has them. `taken` are names with another meaning.
     """
     ways: tuple[Callable[[Path], str], ...] = (
         lambda file: composed(file.stem),

@@ -114,20 +114,3 @@ def faced(clip: Clip) -> Clip:
     return replace(turned, root_positions=turned.root_positions - start).noting(
         f"turned by {np.degrees(-direction):.0f} degrees to set out towards +Z, start put over the origin"
     )
-
-
-def foot_drift(clip: Clip, *, floor: float | None = None, shortest_s: float = 0.08) -> FloatArray:
-    """How far each planted foot moves over the floor, one number a stance, metres `(stances,)`.
-
-    The greatest distance of the foot's slowest point from where it was, over a run of stance frames.
-    """
-    planted = stance(clip, floor=floor)
-    drifts = []
-    for side, points in enumerate(foot_points(clip)):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], planted[:, side].astype(np.int8), [0]])))
-        for start, stop in edges.reshape(-1, 2):
-            if stop - start >= max(2, round(shortest_s * clip.fps)):
-                path = points[start:stop][..., [0, 2]]
-                spans = np.linalg.norm(path - path[:1], axis=-1).max(axis=0)
-                drifts.append(float(spans.min()))
-    return np.array(drifts)

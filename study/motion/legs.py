@@ -31,7 +31,7 @@ _PASSES = 3
 def reach(clip: Clip, shifts: FloatArray, first: int = 0) -> Clip:
     """Move the feet by `shifts (frames, 2, 3)`, metres, left then right.
 
-    Where a leg is too short the pelvis comes down, by at most 3 cm. Frames without a shift stay as they are, but for
+    Where a leg is too short the pelvis comes down, by at most 3 cm. Frames without a shift stay as they are, except for
     the pelvis easing down and up around frames that need it, and frames before `first` stay in any case.
     """
     ankles = [clip.skeleton.role(f"ankle.{side}") for side in "LR"]

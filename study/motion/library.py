@@ -69,7 +69,7 @@ class Library(ABC):
     def where(self, entry: Entry) -> str:
         """The file of a motion as seen from the library's own folder, with `/`; empty where no file is behind it.
 
-        What is written into records: it holds on every machine, and tells of nobody's disk.
+        What is written into records: it is valid on every machine, and reveals no local paths.
         """
         return "" if entry.file is None else entry.file.name
 
@@ -109,7 +109,7 @@ class Library(ABC):
         fps
             Frames per second; by default those of the file (30 for synthetic motions).
         min_seconds
-            At least so long: synthetic motions are made so long; captured ones are continued at their end, so that
+            Least duration: synthetic motions are made this long; captured ones are continued at their end, so that
             their frames keep their numbers, where they end in cycles or standing still, and stay as long as they are
             where they don't. Use `cycles.extend` to continue a clip at its start, too.
         as_is
@@ -132,7 +132,7 @@ class Library(ABC):
 
 
 def _from_file(entry: Entry, fps: float | None, min_seconds: float | None, as_is: bool) -> Clip:
-    """A captured motion; the one way in which a file becomes a clip."""
+    """A captured motion from its file."""
     clip = prepared(entry, as_is=as_is)
     if min_seconds is not None and clip.seconds < min_seconds and entry.cyclic_end:
         from study.motion.cycles import extend
@@ -152,7 +152,7 @@ def open_library(spec: str | Path) -> Library:
     Raises
     ------
     MotionError
-        Where there is no such folder, it holds no motion files, or two of its files can't be told apart.
+        Where there is no such folder, it holds no motion files, or two of its files can't be distinguished.
     """
     if str(spec) == SYNTHETIC:
         return SyntheticLibrary()
@@ -178,7 +178,7 @@ class SyntheticLibrary(Library):
 
     name = SYNTHETIC
     synthetic = True
-    acknowledgement = "The motions are synthetic: Segue's own program made them, nobody moved."
+    acknowledgement = "The motions are synthetic: a program generated them, nobody was captured."
 
     def names(self) -> tuple[str, ...]:
         from study.motion import synthetic
@@ -315,7 +315,7 @@ class FolderLibrary(Library):
 
 
 def _by_name(entries: Iterable[Entry], folder: Path, described: dict[Path, Path]) -> dict[str, Entry]:
-    """Entries by name; names that several `library.toml`s give stand behind the folders of these."""
+    """Entries by name; names that several `library.toml`s give follow the names of their folders."""
     listed = list(entries)
     times = Counter(entry.name for entry in listed)
     named: dict[str, Entry] = {}

@@ -100,7 +100,7 @@ def read_library_file(path: Path) -> LibraryFile:
     FileError
         For what can't be read, or is no TOML.
     MotionFileError
-        For keys that there are not (with the nearest one), and values that can't be meant.
+        For unknown keys (with the nearest one), and values that can't be meant.
     """
     content = parse_toml(read_text(path, "a library.toml", LARGEST_TEXT + 1), str(path))
     _only(content, ("clips", "defaults"), "", path)
@@ -246,7 +246,7 @@ _KEYS: Mapping[str, tuple[Callable[[object], dict[str, Any]], str]] = {
 
 
 _FIRST_LINES = """# What Segue is told of the motion files in this folder and below; see docs/libraries.md.
-# A clip needs its file alone; every other key may be left out.
+# A clip needs its file alone; every other key is optional.
 #
 #   file = "..."           the motion file, as seen from here; several clips may come from one file
 #   first_frame, last_frame  the part that is the clip; both included, counted from 0 at the file's rate

@@ -23,7 +23,7 @@ LEG, ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 # Natural logarithm of thigh to shank, upper arm to forearm (Winter 2009, Figure 4.1: 0.245 to 0.246, 0.186 to 0.146).
 _RATIO = {LEG: 0.0, ARM: 0.2}
 
-# Chains shorter than this share of the longest are fingers and faces; longer ones than so many joints are no limbs.
+# Chains shorter than this share of the longest are fingers and faces; those with more joints than this are no limbs.
 _SHORTEST_SHARE = 0.2
 _LONGEST_CHAIN = 14
 _MOST_BRANCHES = 12

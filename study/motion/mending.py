@@ -34,7 +34,7 @@ def mend(clip: Clip, defects: Sequence[Defect] | None = None, *, policy: Policy 
     clip
         The clip.
     defects
-        What `find_defects` found; found anew by default. Only those given are dealt with.
+        The defects to deal with; by default all that `find_defects` finds.
     policy
         `"mend"`: cut off frames at the ends, turn flipped legs back, bridge short jumps by slerp, put the floor at
         height 0. `"drop"`: keep the longest run of frames without a major defect. `"refuse"`: refuse a clip with major

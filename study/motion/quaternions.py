@@ -250,9 +250,3 @@ def slerp(a: ArrayLike, b: ArrayLike, weight: ArrayLike) -> FloatArray:
 def yaw(angle: ArrayLike) -> FloatArray:
     """Rotation about the vertical (Y) axis by `angle (...)` radians; `(..., 4)`."""
     return from_axis_angle(np.array([0.0, 1.0, 0.0]), angle)
-
-
-def heading_twist(q: ArrayLike) -> FloatArray:
-    """The angle `(...)`, radians, of the part of a rotation about the vertical axis (swing-twist)."""
-    q = positive(q)
-    return np.asarray(2.0 * np.arctan2(q[..., 2], q[..., 0]))

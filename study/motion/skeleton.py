@@ -71,7 +71,7 @@ class Skeleton:
         if joints == 0 or self.parents[0] != -1 or np.any(self.parents[1:] < 0):
             raise MotionError("Expected joint 0 to be the only root (parent -1).")
         if np.any(self.parents >= np.arange(joints)):
-            raise MotionError("Expected every parent to stand before its children.")
+            raise MotionError("Expected every parent before its children.")
         if np.any(self.end_parents < 0) or np.any(self.end_parents >= joints):
             raise MotionError("Expected every end site to hang on a joint of this skeleton.")
 

@@ -50,7 +50,7 @@ class Tempo(NamedTuple):
     reason: str
 
     def message(self, fps: float) -> str:
-        """The same in words, for a clip that claims so many frames a second."""
+        """The same in words, for a clip with a stated frame rate."""
         size = max(self.times, 1.0 / self.times)
         factor = min(_FACTORS, key=lambda one: abs(np.log(one / size)))
         likely = fps * factor if self.times > 1.0 else fps / factor
@@ -62,7 +62,7 @@ class Tempo(NamedTuple):
 
 
 def wrong_tempo(clip: Clip) -> Tempo | None:
-    """Whether the motion is too slow or too quick for a body on earth; None where it is not, or can't be told."""
+    """Whether the motion is too slow or too quick for a body on earth; None where it is not, or can't be determined."""
     needed = {"pelvis", *(f"{part}.{side}" for part in ("hip", "ankle") for side in "LR")}
     if clip.frames < 5 or not needed | {"knee.L", "knee.R"} <= set(clip.skeleton.roles):
         return None

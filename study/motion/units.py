@@ -83,7 +83,7 @@ def find_scale(skeleton: Skeleton) -> Scale:
 
 
 def _extent(skeleton: Skeleton) -> float:
-    """The longest way from the root along bones, twice where it stands in the body's middle: near the stature."""
+    """The longest way from the root along bones, twice if it is in the middle of the body: near the stature."""
     reach = np.zeros(skeleton.joints)
     for joint in range(1, skeleton.joints):
         reach[joint] = reach[skeleton.parents[joint]] + np.linalg.norm(skeleton.offsets[joint])

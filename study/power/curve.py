@@ -46,7 +46,7 @@ class Power:
     target
         The power asked for.
     needed
-        Participants from which on the power is reached, along straight lines between the points, made to rise; None
+        Participants from which on the power is reached, by linear interpolation between the points, made monotone; None
         where no number tried was enough.
     note
         Where the number lies outside those tried.

@@ -37,13 +37,13 @@ class Design:
     Attributes
     ----------
     protocol, study
-        Of the sitting, and which of its studies.
+        Of the session, and which of its studies.
     plans
         Real plans, one a participant, at least as many as the largest study has.
     settings
         The observer that the stated effects amount to.
     rules
-        What the protocol leaves out.
+        The protocol's exclusions.
     """
 
     protocol: Protocol
@@ -108,7 +108,7 @@ def times(design: Design, rng: np.random.Generator, ease: FloatArray) -> tuple[F
 
 
 def kept_of(design: Design, rng: np.random.Generator, response_s: FloatArray, given: BoolArray) -> BoolArray:
-    """Return which answers the analysis counts: those given, and not left out by the protocol's rules."""
+    """Return which answers the analysis counts: those given, and not excluded by the protocol's rules."""
     if design.rules == Rules():
         return given
     import pandas as pd

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from study.analysis.quality import Quality
 
 LONGEST_GAP_FRAMES = 1.5
-"""A longer time between two frames makes a presentation faulty. [frames]"""
+"""A longer time between two frames is a display failure. [frames]"""
 
 
 def presentation_table(presentations: pd.DataFrame) -> tables.Table:
@@ -43,10 +43,10 @@ def presentation_table(presentations: pd.DataFrame) -> tables.Table:
         )
     return tables.make(
         "presentation",
-        "How stimuli were shown. Presentations by what timed them; how many were faulty (a gap of more than "
+        "How stimuli were shown. Presentations by what timed them; how many were display failures (a gap of more than "
         f"{LONGEST_GAP_FRAMES:g} frames, a frame missing, or hidden) and how many showed a trial again; frames that "
-        "were "
-        "not seen; and the longest time between two frames, in frames (1 is perfect).",
+        "were not shown; and the longest "
+        "time between two frames, in frames (1 is perfect).",
         "timed_by shown badly again frames_lost frames_lost_percent median_gap longest_gap",
         rows,
     )
@@ -99,7 +99,7 @@ def checks_sentence(checks: pd.DataFrame) -> str:
 def quality_sentence(quality: Quality) -> str:
     """Return how complete and how quick the answers are, and who is flagged."""
     text = (
-        f"{quality.missed:,} of {counted(quality.trials, 'question')} were missed ({quality.missed_percent:.1f}%), "
+        f"{quality.missed:,} of {counted(quality.trials, 'question')} had no response ({quality.missed_percent:.1f}%), "
         f"{quality.too_fast:,} answered sooner than {quality.fastest_s:g} s."
     )
     if times := quality.response_s:
@@ -110,36 +110,38 @@ def quality_sentence(quality: Quality) -> str:
     if quality.shown_badly:
         text += f" {counted(quality.shown_badly, 'answer')} followed a stimulus that stalled or was hidden."
     return text + (
-        f" {counted(quality.flagged, 'participant')} {noun(quality.flagged, 'is', 'are')} flagged, which alone leaves "
-        f"nobody out, for one of these: {'; '.join(quality.rules)}."
+        f" {counted(quality.flagged, 'participant')} {noun(quality.flagged, 'is', 'are')} flagged, which excludes no "
+        "one, for one of these reasons:  "
+        f"{'; '.join(quality.rules)}."
     )
 
 
 def exclusion_sentence(analysis: Analysis) -> str:
-    """Return what was left out, in words."""
+    """Return what was excluded, in words."""
     found = analysis.exclusions
     if not found.rules:
-        return "The protocol states no rules of exclusion; nobody and nothing was left out."
+        return "The protocol states no rules of exclusion; no participant and no response was excluded."
     if not found.answers_left_out:
         return (
-            f"By the {counted(len(found.rules), 'rule')} of exclusion that the protocol stated before there was data, "
-            "nobody and nothing was left out."
+            f"By the {counted(len(found.rules), 'rule')} of exclusion that the protocol preregistered, no "
+            "participant and no response was excluded."
         )
     return (
-        f"By rules that the protocol stated before there was data, {counted(found.answers_left_out, 'answer')} of "
-        f"{analysis.quality.trials:,} are left out of all results above; "
-        f"{counted(len(found.participants), 'participant')} wholly. Results with and without stand side by side below."
+        f"By rules preregistered in the protocol, {counted(found.answers_left_out, 'answer')} of "
+        f"{analysis.quality.trials:,} are excluded from all results above; "
+        f"{counted(len(found.participants), 'participant')} entirely. Results with and without are given side by side "
+        "below."
     )
 
 
 def exclusion_tables(analysis: Analysis) -> tuple[tables.Table, ...]:
-    """Return the rules with what each left out, and where anything was, results with and without side by side."""
+    """Return the rules with what each excluded and, if anything was excluded, results with and without side by side."""
     found, everything = analysis.exclusions, analysis.without_exclusions
     if not found.rules:
         return ()
     rules = tables.make(
         "exclusion_rules",
-        "Rules of exclusion, as the protocol stated them before there was data, and what each left out. What breaks "
+        "Rules of exclusion, as preregistered in the protocol, and what each excluded. What breaks "
         "several rules counts under the first.",
         "rule participants answers",
         [vars(rule) for rule in found.rules],
@@ -153,7 +155,7 @@ def exclusion_tables(analysis: Analysis) -> tuple[tables.Table, ...]:
     ]
     return rules, tables.make(
         "exclusions",
-        "Main results by the rules of exclusion, and of all answers, with 95% intervals over participants.",
+        "Main results after exclusions, and for all responses, with 95% intervals over participants.",
         "result value low high p_value all_value all_low all_high all_p_value",
         rows,
         headings={"value": "by the rules"},
@@ -188,8 +190,8 @@ def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Tabl
     }
     return tables.make(
         "participants",
-        "Participants. Flags follow the rules above and leave nobody out."
-        + (" Who was left out, and why, stands in the last column." if left_out else ""),
+        "Participants. Flags follow the rules above and exclude no one."
+        + (" The last column says who was excluded, and why." if left_out else ""),
         "participant kind started trials answered missed median_response_s too_fast shown_badly false_alarms "
         "same_pairs "
         "flags left_out",
@@ -199,7 +201,7 @@ def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Tabl
 
 
 def known_truth(sessions: pd.DataFrame) -> dict[str, Any]:
-    """Return what is known of the simulated observers by study; empty where sessions disagree or people took part."""
+    """Return the true values of the simulated observers by study; empty where sessions disagree or people took part."""
     if not len(sessions) or "truth_json" not in sessions or not sessions["simulated"].astype(bool).all():
         return {}
     texts = set(sessions["truth_json"].dropna())

@@ -1,6 +1,6 @@
 """The report: a results folder in; one self-contained page, and every table and figure as files, out.
 
-The page needs no network: styles, figures, strips and videos stand in it. It is the same, byte for byte, for the same
+The page needs no network: styles, figures, strips and videos are embedded. It is the same, byte for byte, for the same
 folder and version of Segue. What participants or protocols wrote is escaped by the template.
 """
 

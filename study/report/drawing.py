@@ -1,6 +1,6 @@
 """Matplotlib figures to inline SVG: the same bytes every time, names for screen readers, the page's own typeface.
 
-`draw` gives an empty figure with the report's quiet style, `to_svg` the text that stands in the page.
+`draw` gives an empty figure with the report's quiet style, `to_svg` the text for the page.
 """
 
 from __future__ import annotations

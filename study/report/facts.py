@@ -43,7 +43,7 @@ def sessions_sentence(material: Material) -> str:
     parts = []
     empty = len(material.sessions) - material.answers["participant"].nunique()
     if empty > 0:
-        parts.append(f"{counted(empty, 'session')} begun without an answer that counts")
+        parts.append(f"{counted(empty, 'session')} without an analysed response")
     if material.withdrawn:
         parts.append(f"{counted(material.withdrawn, 'participant')} withdrew, and their answers are deleted")
     return f"Beside these: {words.joined(parts)}." if parts else ""
@@ -62,11 +62,11 @@ def shown_sentence(material: Material) -> str:
         f"{manifest.size[1]} pixels at {manifest.fps:g} frames per second."
     )
     if not manifest.videos:
-        text += " There is no video of them in this folder: nobody can have seen them."
+        text += " There is no video of them in this folder, so nobody can have seen them."
     if extended:
         text += (
-            f" In {'all' if extended == len(manifest.records) else extended} of them a motion was too short for what "
-            "is shown before or after the blend and was extended; the table says by how much."
+            f" In {'all' if extended == len(manifest.records) else extended} of them a motion was too short before or "
+            "after the blend and was extended; the table says by how much."
         )
     return text
 

@@ -1,4 +1,4 @@
-"""What participants saw, small enough to stand in the page: videos as data URIs, and strips of their frames.
+"""What participants saw, small enough for the page: videos as data URIs, and strips of their frames.
 
 Strips are cut from the rendered videos themselves, so that they show what was shown.
 """
@@ -55,13 +55,13 @@ class Pictures:
 
 
 def embed(manifest: Manifest) -> Pictures:
-    """Return everything that stands in the page to show what participants saw."""
+    """Return the part of the page that shows what participants saw."""
     return Pictures(tuple(embed_strips(manifest)), tuple(tuple(pair) for pair in embed_videos(manifest)))
 
 
 @contextmanager
 def embedding(manifest: Manifest) -> Iterator[Callable[[], Pictures]]:
-    """Make the pictures in a process of its own, from here on; what is given waits for them.
+    """Start making the images in a separate process; the result waits for them.
 
     They take as long as a third of all else in a report, and a thread would take turns with the analysis. The process
     is a plain one: those of `multiprocessing` would run a script again that has no guard. Where it can't run, or fails,

@@ -26,7 +26,7 @@ ORDERS = {
     "both": "Each pair was shown in both orders",
     "random": "The order within each pair was drawn at random",
     "balanced": "Half of the pairs were shown in each order",
-    "by-group": "The order followed from the participant’s group",
+    "by-group": "The participant’s group determined the order",
 }
 
 
@@ -34,11 +34,11 @@ ORDERS_OF_SEVERAL = {
     "both": "Each set was shown in every order",
     "random": "The order within each set was drawn at random",
     "balanced": "Each order was used for an equal share of the sets",
-    "by-group": "The order followed from the participant’s group",
+    "by-group": "The participant’s group determined the order",
 }
 SINGLE_ORDERS = {
     **dict.fromkeys(("both", "random", "balanced"), "Transitions were shown one at a time, in random order"),
-    "by-group": "Transitions were shown one at a time; which method came first followed from the participant’s group",
+    "by-group": "Transitions were shown one at a time; the participant’s group determined which method came first",
 }
 
 
@@ -87,9 +87,10 @@ def _design(protocol: Protocol, analysis: Analysis, who: str) -> str:
     studies = counted(len(protocol.studies), "study", "studies")
     each = analysis.quality.trials / max(analysis.quality.participants, 1)
     return (
-        f"{words.sentence(who)} took part in one sitting of {studies}. "
-        f"{' '.join(_study(protocol, study) for study in protocol.studies)} Trials came in an order drawn anew for "
-        f"every participant (seed {protocol.seed}); a participant was asked {counted(round(each), 'question')} "
+        f"{words.sentence(who)} took part in one session of {studies}. "
+        f"{' '.join(_study(protocol, study) for study in protocol.studies)} The order of trials was drawn separately "
+        "for every participant (seed "
+        f"{protocol.seed}); a participant was asked {counted(round(each), 'question')} "
         "on average."
     )
 
@@ -115,7 +116,7 @@ def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:
 def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
     shown = protocol.stimuli
     motions = "synthetic motions" if manifest.synthetic else f"motions of the library {words.library(manifest.library)}"
-    camera = f"a camera travelling with it (smoothed over {shown.track_s:g} s)" if shown.track_s else "a fixed camera"
+    camera = f"a camera following it (smoothed over {shown.track_s:g} s)" if shown.track_s else "a fixed camera"
     ground = "above a ground plane" if shown.floor else "without a ground plane"
     how, joint = _made(protocol, manifest)
     return (
@@ -143,7 +144,7 @@ def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:
         f"in the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}."
     )
     if True in feet:
-        where = ", where the method is said to do so" if False in feet else ""
+        where = ", if the method includes this" if False in feet else ""
         how += f" Sliding of planted feet was removed after blending{where}."
     return how + "".join(others), "blend or the cut" if cuts else "blend"
 
@@ -155,7 +156,7 @@ def _procedure(protocol: Protocol, analysis: Analysis, presentations: pd.DataFra
     pair = f"The {those} followed each other after {timing.gap_s:g} s. " if most > 1 else ""
     rest = f" A break was offered after every {counted(timing.break_after, 'trial')}." if timing.break_after else ""
     limit = (
-        f"Participants had {timing.answer_s:g} s to answer; an answer not given in time was recorded as missed. "
+        f"Participants had {timing.answer_s:g} s to answer; a later answer was recorded as no response. "
         if any(task_of(study).timed for study in protocol.studies)
         else ""
     )
@@ -168,8 +169,8 @@ def _shown(analysis: Analysis, presentations: pd.DataFrame) -> str:
         nobody = "No stimulus was shown: observers were simulated." if analysis.data == "simulated" else ""
         return nobody or "How stimuli were shown was not recorded."
     timers = {
-        "requestVideoFrameCallback": "a web browser, every presented frame logged",
-        "swap": "a window, every buffer swap timed",
+        "requestVideoFrameCallback": "a web browser, with with with with with every presented frame logged",
+        "swap": "a window, with with with with with every buffer swap timed",
     }
     parts = [
         f"{counted(len(part), 'presentation')} in {timers.get(str(method), f'a way timed by {method} only')}"
@@ -183,13 +184,15 @@ def _shown(analysis: Analysis, presentations: pd.DataFrame) -> str:
 
 
 def _analysis(analysis: Analysis) -> str:
-    parts = ["The participant was the unit of analysis; published statistics, which pool all answers, stand beside."]
+    parts = [
+        "The participant was the unit of analysis; published statistics, which pool all responses, are given alongside."
+    ]
     for kind, shown in SECTIONS.items():
         if found := analysis.of(kind):
             parts.append(shown.methods(found.values(), analysis))
     parts.append(
-        f"Intervals are of {100 * analysis.confidence:g}%, the level of significance is {analysis.alpha:g}. "
-        "Missed answers were left out and counted."
+        f"Confidence intervals are {100 * analysis.confidence:g}%, the significance level is {analysis.alpha:g}. "
+        "Trials without a response were excluded and counted."
     )
     return " ".join(parts)
 
@@ -197,13 +200,13 @@ def _analysis(analysis: Analysis) -> str:
 def _excluded(analysis: Analysis) -> str:
     found = analysis.exclusions
     if not found.rules:
-        return "No rule of exclusion was stated beforehand; no participant and no answer was left out."
+        return "No rule of exclusion was preregistered; no participant and no response was excluded."
     rules = words.joined([rule.rule for rule in found.rules])
     wholly = counted(len(found.participants), "participant")
     return (
-        f"By rules stated before there was data, these were left out: {rules}; "
+        f"By preregistered rules, these were excluded: {rules}; "
         f"{counted(found.answers_left_out, 'answer')} of {analysis.quality.trials:,} in all, among them "
-        f"those of {wholly} left out wholly. Results of all answers are given beside."
+        f"those of {wholly} excluded entirely. Results for all responses are given alongside."
     )
 
 

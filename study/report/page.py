@@ -133,14 +133,14 @@ def _without_answers(material: Material, about: About) -> Section:
     asked = material.answers[material.answers["study"] == about.name]
     missed = int(asked["answer"].isna().sum())
     if asked.empty:
-        why = "nobody has come to it yet"
+        why = "no participant has reached that study"
     elif missed == len(asked):
-        why = f"all {counted(missed, 'question')} were missed"
+        why = f"all {counted(missed, 'question')} had no response"
     elif not missed:
-        why = f"all {counted(len(asked), 'answer')} are left out by the rules of exclusion"
+        why = f"all {counted(len(asked), 'answer')} are excluded by the rules of exclusion"
     else:
         rest = counted(len(asked) - missed, "answer")
-        why = f"{missed:,} of {counted(len(asked), 'question')} were missed and {rest} left out by rules"
+        why = f"{missed:,} of {counted(len(asked), 'question')} had no response and {rest} were excluded by rules"
     return Section(
         f"study-{about.name}", about.title, (Headline(f"{about.title}: there is no result, for {why}.", ""),)
     )
@@ -167,7 +167,7 @@ def _conduct(material: Material, analysis: Analysis, mark: str) -> Part:
          "Response times: all answers with the median, and the median and middle half over the session."),
         ("learning", course.learning_figure(learned, "learning", mark), learned.caption),
         ("presentation", conduct.presentation_figure(presented, "presentation", mark),
-         "The longest time between two frames of every presentation; 1 is perfect, faulty ones are orange."),
+         "The longest time between two frames of every presentation; 1 is perfect, display failures are orange."),
     ]  # fmt: skip
     sentences = (conduct.quality_sentence(analysis.quality), facts.sessions_sentence(material),
                  conduct.checks_sentence(material.checks), conduct.exclusion_sentence(analysis))  # fmt: skip

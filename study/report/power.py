@@ -54,7 +54,7 @@ def read_power(folder: Path) -> list[FoundPower]:
         except (OSError, ValueError, TypeError, KeyError) as error:
             what = f"no {error}" if isinstance(error, KeyError) else error
             raise AnalysisError(
-                f"{path}: expected what `segue power --json` prints, found {what}; make it anew, or name the file "
+                f"{path}: expected what `segue power --json` prints, found {what}; make it again, or name the file "
                 "otherwise"
             ) from error
     return found
@@ -84,7 +84,7 @@ def power_sentence(found: FoundPower) -> str:
     who = (
         f"{counted(found.needed, 'participant')} are needed"
         if found.needed
-        else "no number of participants that was tried is enough"
+        else "none of the numbers of participants tried is enough"
     )
     note = f" ({found.note})" if found.note else ""
     return (
@@ -99,8 +99,8 @@ def power_table(found: Sequence[FoundPower]) -> tables.Table:
     rows = [vars(point) | {"study": words.readable(entry.study)} for entry in found for point in entry.points]
     return tables.make(
         "power",
-        "Power. The share of simulated studies, through the real plan and the real analysis, that found what is there, "
-        "with Wilson’s 95% interval.",
+        "Power. The proportion of simulated studies, with the real plan and analysis, that found the effect, with "
+        "Wilson’s 95% interval.",
         "study participants studies power low high",
         rows,
     )

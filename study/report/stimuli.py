@@ -67,8 +67,8 @@ def motion_table(manifest: Manifest) -> Table:
             }
     return tables.make(
         "motions",
-        "Every motion, in frames of the study. Its file, the frame at which the blend starts or ends, its length, and "
-        "the frames that were added before and after it where it was too short.",
+        "Every motion, in frames of the study: its file, the frame at which the blend starts or ends, its length, and "
+        "the frames that were added before and after it.",
         "transition role motion file frame frames:count added_before added_after changes notes",
         list(rows.values()),
         headings={"frames": "of", "notes": "all notes"},

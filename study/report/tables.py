@@ -16,7 +16,7 @@ LONGEST_SHORT = 30
 """Longer text may break into lines. [characters]"""
 
 WIDTH_OF_TEXT = 88
-"""Characters that a table may take in a row before it stands out into the margins."""
+"""Characters that a table may take in a row before it extends into the margins."""
 
 Kind = Literal["text", "count", "one", "two", "three", "percent", "p", "short"]
 """How a value is written: as it is, as a whole number, with one to three places, ..., or with three digits."""
@@ -136,11 +136,11 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "answered": ("answered", "count"),
     "median_response_s": ("median time, s", "two"),
     "too_fast": ("too fast", "count"),
-    "shown_badly": ("badly shown", "count"),
+    "shown_badly": ("display failures", "count"),
     "false_alarms": ("false alarms", "count"),
     "same_pairs": ("of same pairs", "count"),
     "flags": ("flags", "text"),
-    "left_out": ("left out", "text"),
+    "left_out": ("excluded", "text"),
     # Planning.
     "studies": ("simulated studies", "count"),
     "power": ("power", "two"),
@@ -174,12 +174,12 @@ class Table:
 
     @property
     def title(self) -> str:
-        """The caption's first sentence, which stands above the table."""
+        """The caption's first sentence, shown above the table."""
         return self.caption.partition(". ")[0].removesuffix(".")
 
     @property
     def note(self) -> str:
-        """The rest of the caption, which stands below."""
+        """The rest of the caption, shown below."""
         return self.caption.partition(". ")[2]
 
     @property
@@ -284,7 +284,7 @@ def make(
     headings
         In place of those in `COLUMNS`.
     files_only
-        Keys of the columns that the page leaves out, parted by blanks.
+        Keys of the columns that the page omits, separated by blanks.
     """
     hidden = files_only.split()
     made = []

@@ -38,7 +38,7 @@ def unbroken(text: str) -> str:
 
 
 def mark_of(data: str, synthetic: bool) -> str:
-    """Return what stands at the foot of every figure whose data are not people's answers to captured motion."""
+    """Return the note below every figure whose data are not people's answers to captured motion."""
     parts = []
     if data == "simulated":
         parts.append("simulated answers, no people")
@@ -50,12 +50,12 @@ def mark_of(data: str, synthetic: bool) -> str:
 
 
 def warnings_of(data: str, synthetic: bool, simulated: int, participants: int) -> list[str]:
-    """Return the sentences that stand at the top of the page, before any result."""
+    """Return the sentences at the top of the page, before any result."""
     found = []
     if data == "simulated":
         found.append(
-            "These answers are simulated. They were drawn by a program from observers with known sensitivity; nobody "
-            "was asked, and nothing here says how people see motion."
+            "These answers are simulated. A program drew them from observers with known sensitivity; nobody was "
+            "asked, and the results say nothing about human perception."
         )
     elif data == "mixed":
         found.append(
@@ -65,8 +65,7 @@ def warnings_of(data: str, synthetic: bool, simulated: int, participants: int) -
         )
     if synthetic:
         found.append(
-            "The motions are synthetic: a program made them up from published kinematics. None of them was captured "
-            "from a person."
+            "The motions are synthetic: a program generated them from published kinematics, without motion capture."
         )
     return found
 
@@ -83,7 +82,7 @@ def interval(low: float | None, high: float | None, places: int = 1, unit: str =
 
 
 def bare_interval(low: float | None, high: float | None, places: int = 1) -> str:
-    """Return an interval as it stands in brackets: "6.3, 7.7", an open end as a dash."""
+    """Return an interval as printed in brackets: "6.3, 7.7", an open end as a dash."""
     return f"{decimals(low, places)}, {decimals(high, places)}"
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Answer:
     """What a participant did at one question.
 
-    `value` is None where the answer window closed first. `item` is empty but for ratings. `response_s` runs from the
+    `value` is None where the answer window closed first. `item` is empty except for ratings. `response_s` runs from the
     end of the last stimulus. `shown_well` is False where the presentation was faulty, so that the trial is repeated.
     """
 

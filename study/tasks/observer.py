@@ -20,9 +20,9 @@ class ObserverSettings:
     """All that a simulated participant is: how they judge, how fast, and how often they miss an answer.
 
     Response times are log-normal: median and standard deviation of the logarithm; those beyond the answer window are
-    missed, besides a proportion `missed` of inattention. Of all showings a proportion `badly_shown` stalls, so that the
-    trial comes again, and a proportion `careless` of the participants looks at nothing: they answer at random and fast,
-    attention checks too. `observers.truth` is of those who look.
+    missed, besides a proportion `missed` of inattention. Of all presentations a proportion `badly_shown` stalls, so
+    that the trial comes again, and a proportion `careless` of the participants looks at nothing: they answer at random
+    and fast, attention checks too. `observers.truth` is of those who look.
     """
 
     same_different: SameDifferentObserver

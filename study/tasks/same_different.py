@@ -31,7 +31,7 @@ def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Gener
 
 
 def _truth(settings: ObserverSettings, asked: Asked, level: float) -> dict[str, Any]:
-    """Where the population says "different" this often, and what joining the study's levels by straight lines gives."""
+    """Where the population says "different" this often, and what linear interpolation between the levels gives."""
     observer = settings.same_different
     return {
         "level": level,

@@ -108,7 +108,7 @@ class Task:
     right
         The right answer to a trial; None where none is right.
     columns
-        Columns of the table of answers that it gives a meaning; empty ones are left out.
+        Columns of the table of answers that it gives a meaning; without empty ones.
     problems
         What does not fit between the task and the other keys of a study.
     conditions

@@ -40,7 +40,7 @@ _SEEN_S = 1.0
 _FREEDOM_S = 1.0 / 3.0
 # Frames of a clip that its spread is found from.
 _SPREAD_FRAMES = 200
-# Points that are tried for one pair of clips; of longer clips, every so many frames.
+# Points that are tried for one pair of clips; evenly spaced in longer clips.
 _TRIED = 250_000
 
 

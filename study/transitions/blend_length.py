@@ -44,7 +44,7 @@ class BlendLength:
     cost
         2004 Eq. 1 at this length; NaN where the clips don't supply the frames to know it.
     lengths, costs
-        The candidate lengths in frames and the cost of each (Figure 3); None but for the geodesic method.
+        The candidate lengths in frames and the cost of each (Figure 3); None except for the geodesic method.
     joint
         The role with the largest joint difference, by which the velocity method goes.
     differences
@@ -54,7 +54,7 @@ class BlendLength:
     unclipped_s
         What Eq. 4 gave, before it was held to the shortest and longest length.
     note
-        What a reader should know: that the length was clipped, or candidates left out.
+        What a reader should know: that the length was clipped, or candidates were excluded.
     """
 
     method: str
@@ -276,7 +276,7 @@ def _velocity(source: Clip, destination: Clip, frames: tuple[int, int], low: int
     role = max(differences, key=differences.__getitem__)
     joint = source.skeleton.role(role)
     speed = 0.5 * (joint_speed(source, frames[0], joint) + joint_speed(destination, frames[1], joint))
-    # A joint that differs but doesn't move would take for ever; poses that are equal need no time.
+    # A joint that differs but doesn't move would need infinite time; equal poses need none.
     seconds = differences[role] / speed if speed > 0 else (np.inf if differences[role] > 0 else 0.0)
     length = round(min(max(seconds * source.fps, low), high))
     note = ""

@@ -209,7 +209,7 @@ def cut(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Tr
 class Stretch:
     """The poses of one clip that go into a blend, with one before and one after them, and whether these exist.
 
-    Where they don't, the nearest pose stands in and its step is not used.
+    Where they don't, the nearest pose is used without its step.
     """
 
     clip: Clip
@@ -275,7 +275,7 @@ def join(
 def slerp_one_way(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray:
     """Slerp of two stretches of motion `(frames, joints, 4)` under shares `(frames, joints)`, each joint one way round.
 
-    Each joint takes the way that is shorter over the whole stretch. Choosing anew at each frame, two rotations
+    Each joint takes the way that is shorter over the whole stretch. If chosen again at each frame, two rotations
     about half a turn apart would swap sides from one frame to the next, and the limb would jump. Both stretches have
     signs continuous over the frames, as `Clip` stores them.
     """

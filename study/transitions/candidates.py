@@ -18,7 +18,7 @@ from study.transitions.point_cloud import point_cloud, window_distances
 
 METRICS = ("lee2002", "wang2003", "pointcloud")
 
-# Candidates of one kind and metric are at least so far apart, and so are frames of one clip that a cut joins; seconds.
+# Least distance between candidates of one kind and metric, and between frames of one clip that a cut joins; seconds.
 APART_S = 0.4
 
 

@@ -1,7 +1,7 @@
 """What a transition from any frame of one clip to any frame of another costs: Lee et al. 2002, as studied in 2003.
 
 In: two clips of one rig at one frame rate, weights, and nu. Out: the cost of every pair of frames, whole or in blocks
-of rows, and where it is least. Wang & Bodenheimer 2003, section 2.1, Eqs. 1 and 2:
+of rows, and its minimum. Wang & Bodenheimer 2003, section 2.1, Eqs. 1 and 2:
 
     D(i, j) = d(p_i, p_j) + nu d(v_i, v_j)
     d(p_i, p_j) = |root_i - root_j|^2 + sum over joints of weight |log(q_j^-1 q_i)|^2

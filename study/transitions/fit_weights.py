@@ -1,7 +1,7 @@
 """Joint weights from transitions that people called good or bad.
 
 In: labelled cuts between frames of clips. Out: symmetric weights of zero or more, the largest one, and how far the best
-transitions move when a label is left out. Wang & Bodenheimer 2003, section 3, Eq. 3, and section 4.1.
+transitions move in leave-one-out cross-validation. Wang & Bodenheimer 2003, section 3, Eq. 3, and section 4.1.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class FittedWeights:
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """How far the best transitions move when one label is left out (2003 section 4.1).
+    """How far the best transitions move in leave-one-out cross-validation (2003 section 4.1).
 
     Parameters
     ----------
@@ -86,7 +86,8 @@ class CrossValidation:
     mean_frames, median_frames
         Of these.
     transfer
-        The same for each cut left out and a pair of clips that no label is about; empty where there is no such pair.
+        The same for each cut that is held out and a pair of clips that no label is about; empty where there is no such
+        pair.
     transfer_same
         How many of those agree exactly.
     """
@@ -222,7 +223,7 @@ def cross_validate(
     cuts
         As `fit_weights` takes them, at least two good and two bad.
     nu
-        Weight of the velocities.
+        Weight of velocities.
     transfer
         Source and destination of a motion that no label is about, for the second of the paper's tests.
     progress

@@ -128,7 +128,8 @@ def plant_feet(transition: Transition, source: Clip, destination: Clip) -> tuple
     """A transition whose feet stand still in its blend while they are planted, and what that took.
 
     `remove_foot_slide` with `transition_contacts` over the blended frames. Frames before the blend are unchanged, and
-    so are those after it but for a foot that stays planted from early in the blend until it lifts, and the easing out.
+    so are those after it except for a foot that stays planted from early in the blend until it lifts, and the easing
+    out.
     """
     if transition.blend_frames == 0:
         raise TransitionError("Expected a blended transition to plant the feet in; a cut has no blended frames.")
@@ -176,7 +177,7 @@ def remove_foot_slide(
     ease in and out over 0.2 s beside a contact, so the lock releases without a pop. A leg is never stretched beyond
     its length nor beyond where it was already; where the place is out of reach, the pelvis comes down, at most 3 cm.
     Where that is not enough, as when someone who stood is under way before the blend is over, the foot takes a step:
-    it is let go where it travels fastest, and lifted on its way to where it stands next.
+    it is released where it moves fastest, and lifted on its way to its next stance.
     """
     contacts = find_contacts(clip) if contacts is None else np.asarray(contacts, dtype=bool)
     if contacts.shape != (clip.frames, 2):

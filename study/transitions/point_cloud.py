@@ -267,7 +267,7 @@ def _tiles(
 
     The next tile overwrites the last. The factor 2 of the two cross terms and the unit go into the factors: powers
     of two, which cost no digit. Each tile is worked on as flat memory, a window's overhang at the end of each row
-    included; what comes out in the overhang means nothing and is left out.
+    included; results in the overhang have no meaning and are omitted.
     """
     if not len(rows) or not len(columns):
         return

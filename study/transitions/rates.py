@@ -1,4 +1,4 @@
-"""A transition at another frame rate: made anew from its clips at that rate, from the same moment to the same moment.
+"""A transition at another frame rate: made again from its clips at that rate, from the same moment to the same moment.
 
 Blend lengths are chosen at the rate of a study; a file is best written at the rate that its motion was captured at.
 Resampling the transition instead would leave only the poses of the lower rate.

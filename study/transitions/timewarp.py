@@ -35,7 +35,7 @@ class WarpLength:
     source_frames, destination_frames
         Frames of each clip in the blend (2004: b_from and b_to).
     blend_frames, blend_s
-        How long the blend takes: the longer of the two, in frames and in seconds.
+        Blend length: the longer of the two, in frames and in seconds.
     cost
         Its cost.
     costs : (lengths, lengths)
@@ -43,7 +43,7 @@ class WarpLength:
     shortest
         The length of the first row and column, frames.
     note
-        What a reader should know: that candidates were left out.
+        What a reader should know: that candidates were excluded.
     """
 
     source_frames: int
@@ -197,7 +197,7 @@ class _Arcs:
         across = (dots_after - np.cos(self.angles)[:, None] * dots) / np.where(sine < 1e-9, 1.0, sine)[:, None]
         self.dots, self.across = (np.ascontiguousarray(x).reshape(-1, moving.shape[1]) for x in (dots, across))
         self.weights = weights
-        # Arrays of this size are given back to the system and asked for again each time, which costs more than
+        # Arrays of this size are returned to the system and allocated again each time, which costs more than
         # the sums do.
         self.work = np.empty((3, len(fixed) ** 2, moving.shape[1]))
 

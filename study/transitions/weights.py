@@ -49,7 +49,7 @@ def joint_weights(
         `"wang2003"`, `"lee2002"`, or a mapping from role to a weight of zero or more.
     with_root
         Whether the root joint may carry weight. On most rigs the root plays the pelvis; its rotation holds the
-        facing of the whole figure, a global degree of freedom, which 2004 Eq. 2 leaves out. With it, a cost is
+        facing of the whole figure, a global degree of freedom, which 2004 Eq. 2 omits. With it, a cost is
         the same under turns on the floor only if the caller takes the facing away first.
 
     Returns

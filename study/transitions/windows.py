@@ -83,7 +83,7 @@ def shortfall(source: Clip, destination: Clip, frames: Window) -> str:
 
 
 def held(available: int, shortest: int, longest: int) -> tuple[int, str]:
-    """The longest length to consider where the clips supply `available` frames, and what to say of those left out.
+    """The longest length to consider where the clips supply `available` frames, and a note on those that were excluded.
 
     The one rule for candidate lengths, whichever method chooses among them: what the clips don't supply is not
     considered. Where they don't supply the shortest either, that is the one to refuse, with `shortfall`.

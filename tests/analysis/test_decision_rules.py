@@ -42,7 +42,7 @@ def test_the_rule_that_made_the_answers_is_found_again() -> None:
     assert found.criterion == pytest.approx(1.8, abs=0.01)
     assert found.slopes["shorter"] == pytest.approx(0.20, abs=0.003)
     assert found.slopes["longer"] == pytest.approx(0.25, abs=0.003)
-    assert "speak for independent observations" in compare_rules(found, differencing_log_likelihood(counts)).answer
+    assert "support independent observations" in compare_rules(found, differencing_log_likelihood(counts)).answer
 
 
 def test_differencing_answers_speak_for_differencing(same_different_study: Callable[..., pd.DataFrame]) -> None:
@@ -50,7 +50,7 @@ def test_differencing_answers_speak_for_differencing(same_different_study: Calla
     share = norm.sf((2.2 - 0.35 * frames) / 2**0.5) + norm.cdf((-2.2 - 0.35 * frames) / 2**0.5)
     counts = Counts(("a",), LEVELS, (share * 3000)[None], np.full((1, 7), 3000.0))
     answer = compare_rules(fit_independent(counts), differencing_log_likelihood(counts)).answer
-    assert "speak for differencing" in answer
+    assert "support differencing" in answer
     few = count_answers(same_different_study(np.random.default_rng(3), participants=2))
     assert compare_rules(fit_independent(few), None).log_likelihood_gain is None
 

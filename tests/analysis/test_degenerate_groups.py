@@ -153,8 +153,8 @@ def test_a_perfect_preference_is_no_certainty() -> None:
     assert people.p_value == pytest.approx(2 * 0.5**6)
     assert result.published.interval.low < 1
     assert result.models.mixed.p_value is None
-    assert "all answers alike" in result.models.mixed.note
-    assert "all answers alike" in result.motions_as_sample.note
+    assert "all answers are the same" in result.models.mixed.note
+    assert "all answers are the same" in result.motions_as_sample.note
     assert result.no_preference.equivalence_p_value is None
 
 

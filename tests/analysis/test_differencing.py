@@ -212,7 +212,7 @@ def test_no_pairs_without_a_difference() -> None:
     kept = LEVELS != 0
     answer = fit_model(Counts(counts.participants, LEVELS[kept], counts.different[:, kept], counts.shown[:, kept]))
     assert isinstance(answer, str)
-    assert "criterion can't be told" in answer
+    assert "criterion and sensitivity cannot be separated" in answer
 
 
 def test_perfect_observers_have_no_threshold_to_estimate() -> None:
@@ -236,7 +236,7 @@ def test_one_participant_gets_an_interval_that_says_what_it_rests_on() -> None:
     fit = fitted(draw(np.random.default_rng(5), shares_of_group(8, 7), 1, answers=30))
     for threshold in fit.jnd.values():
         assert threshold.frames is not None
-        assert "one participant, answers as independent" in threshold.method
+        assert "one participant, answers treated as independent" in threshold.method
 
 
 def test_the_same_answers_give_the_same_numbers() -> None:

@@ -46,7 +46,7 @@ def test_each_is_counted_under_the_first_rule_it_breaks(answers: pd.DataFrame) -
     assert kept.answers_left_out == 18
     assert [row.participant for row in kept.participants] == ["p00", "p01"]
     assert "missed 50%" in kept.participants[0].reason
-    assert "missed more than 25%" in kept.rules[0].rule
+    assert "no response in more than 25%" in kept.rules[0].rule
 
 
 def test_failed_attention_checks(answers: pd.DataFrame) -> None:

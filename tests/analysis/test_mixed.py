@@ -101,7 +101,7 @@ def test_marginal_share_is_an_average_over_participants() -> None:
 
 @pytest.mark.parametrize(
     ("yes", "people", "says"),
-    [([8, 8, 8], 3, "all answers alike"), ([0, 0], 2, "all answers alike"), ([4], 1, "one participant")],
+    [([8, 8, 8], 3, "all answers are the same"), ([0, 0], 2, "all answers are the same"), ([4], 1, "one participant")],
 )
 def test_degenerate_groups_are_said(yes: list[int], people: int, says: str) -> None:
     found = fit_mixed(np.ones((people, 1)), np.ones((people, 1)), yes, np.full(people, 8.0), range(people))
@@ -111,7 +111,7 @@ def test_degenerate_groups_are_said(yes: list[int], people: int, says: str) -> N
 
 def test_missing_cells_and_empty_data() -> None:
     design = np.column_stack([np.ones(4), np.zeros(4)])
-    assert "can't be told" in str(fit_mixed(design, np.ones((4, 1)), [1, 2, 3, 2], [4] * 4, range(4)))
+    assert "can't be separated" in str(fit_mixed(design, np.ones((4, 1)), [1, 2, 3, 2], [4] * 4, range(4)))
     assert "no answers" in str(fit_mixed(design, np.ones((4, 1)), [0] * 4, [0] * 4, range(4)))
     everyone_the_same = fit_mixed(np.ones((6, 1)), np.ones((6, 1)), [4] * 6, [8] * 6, range(6))
     assert isinstance(everyone_the_same, MixedFit)

@@ -109,9 +109,9 @@ def test_an_order_that_can_not_be_told_is_left_out() -> None:
     never = fit_bradley_terry(list("ab"), list("bc"), [6, 7], [10] * 2)
     assert isinstance(never, BradleyTerry)
     assert never.order is None
-    assert "the orders shown do not tell" in never.note
+    assert "the orders shown cannot separate" in never.note
     decided = fit_bradley_terry(list("abacbc"), list("bacacb"), [10] * 6, [10] * 6)
-    assert "every answer went to the same place in the order of presentation" in str(decided)
+    assert "every answer went to the same position" in str(decided)
 
 
 def test_unlinked_methods_are_said() -> None:

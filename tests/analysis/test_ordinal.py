@@ -86,7 +86,7 @@ def test_separated_ratings_have_no_standard_error() -> None:
         ([], [], "no answers"),
         ([1, 2, 3], [0, 0, 0], "one participant"),
         ([2, 2, 2], [0, 1, 2], "all ratings alike"),
-        ([1, 2, 3], [0, 1, 2], "can't be told from each other"),
+        ([1, 2, 3], [0, 1, 2], "can't be separated"),
     ],
 )
 def test_hopeless_ratings_are_said(ratings: list[int], who: list[int], says: str) -> None:

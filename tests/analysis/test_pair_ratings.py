@@ -108,7 +108,7 @@ def test_other_scales_have_their_own_middle(points: int) -> None:
 @pytest.mark.parametrize(
     ("scores", "why", "order"),
     [
-        ([[3]], "one participant: no spread to judge by", "one order of presentation"),
+        ([[3]], "one participant: no spread to estimate", "one order of presentation"),
         ([[3], [3], [3], [3]], "all 4 participants gave the same value", "all participants of an order gave the same"),
         ([[3], [1]], "", "one participant in each order"),
     ],

@@ -195,7 +195,7 @@ def test_utf16_and_files_joined_with_their_headings(fitted: Callable[..., dict[s
         ("level,answer,answer\n1,1,0\n", (), "expected one column 'answer', found 2"),
         ("level;answer\n1.234,5;1\n", ("--decimal", "comma"), "row 2, column 'level': expected a number"),
         ("level,answer\ninf,1\n", (), "row 2, column 'level': expected a number"),
-        ("level,answer,who\n1,1,a\n2,0,\n", ("--participant", "who"), "row 3, column 'who': expected who answered"),
+        ("level,answer,who\n1,1,a\n2,0,\n", ("--participant", "who"), "row 3, column 'who': expected a participant"),
         ('level,answer\n1,1\n2,"a\n', (), "row 3: expected a table"),
         (b"level,answer\n1,\xff\n", (), "expected a table of UTF-8 text"),
         ("level,answer\n1,1\n", ("--method", "answer"), "expected no --method with --task 2afc"),

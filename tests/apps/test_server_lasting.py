@@ -95,7 +95,7 @@ def test_a_clock_that_is_set_frees_no_place_and_holds_none(serve, monkeypatch, h
     serving.client.portal.call(serving.host.note_who_is_here)
     assert serving.person().begin() == {"kind": "full"}
     listed = serving.ask("overview").json()
-    assert (listed["counts"]["at it"], listed["groups"]) == (1, [1, 0])
+    assert (listed["counts"]["in progress"], listed["groups"]) == (1, [1, 0])
     first.answer(view)
     # What is recorded has the time that the machine shows; who is gone is told by the time that passed.
     steady = serving.host.clock
@@ -133,7 +133,7 @@ def test_work_in_the_background_that_fails_says_so_and_goes_on(serve, monkeypatc
     while len(happened) < 3:
         assert time.monotonic() < end
         time.sleep(0.01)
-    assert "Noting who is here failed" in caplog.text
+    assert "Recording who is active failed" in caplog.text
     assert "disk on fire" in caplog.text
     failing[0] = False
     so_far = len(happened)

@@ -122,7 +122,7 @@ def test_half_sent_bodies_are_let_go_the_oldest_first(connect, monkeypatch):
     assert ended == sorted(ended, reverse=True)
     assert 18 <= sum(ended) <= 22
     assert sum(connections._bodies.values()) <= 1_000_000
-    # Who is at it is not kept from it.
+    # Those in progress are not affected.
     first.sendall(head("/api/alive", 2, known) + b"{}")
     assert reply(first)[0] == 200
     for client in halves:

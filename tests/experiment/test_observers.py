@@ -75,7 +75,7 @@ def test_the_default_observer_has_the_threshold_of_the_paper(jnd_protocol):
     for frames in (-8.0, 7.0):
         assert float(population_different(settings.same_different, frames)) == pytest.approx(0.75, abs=1e-6)
     assert 0.05 < known["false_alarms"] < 0.2
-    # What the paper's straight lines between the levels would give lies near, but not on it.
+    # The paper's linear interpolation between the levels gives a value near it, but not equal.
     assert known["interpolated_shorter_frames"] == pytest.approx(-8.0, abs=1.0)
     assert known["interpolated_longer_frames"] == pytest.approx(7.0, abs=1.0)
 

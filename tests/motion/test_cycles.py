@@ -12,12 +12,29 @@ from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, resample, trim
 from study.motion.continuing import smooth_sample
 from study.motion.cycles import Extension, extend, find_cycle, reversed_in_time
-from study.motion.feet import floor_height, foot_drift, foot_points, heading
+from study.motion.feet import floor_height, foot_points, heading, stance
 from study.motion.library import Library, open_library
 from study.motion.mirror import mirror
 from study.motion.synthetic import synthesize
 
 FPS = 120.0
+
+
+def foot_drift(clip: Clip, *, floor: float) -> np.ndarray:
+    """How far each planted foot moves over the floor, one number a stance, metres `(stances,)`.
+
+    The greatest distance of the foot's slowest point from where it was, over a run of stance frames.
+    """
+    planted = stance(clip, floor=floor)
+    drifts = []
+    for side, points in enumerate(foot_points(clip)):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], planted[:, side].astype(np.int8), [0]])))
+        for start, stop in edges.reshape(-1, 2):
+            if stop - start >= max(2, round(0.08 * clip.fps)):
+                path = points[start:stop][..., [0, 2]]
+                spans = np.linalg.norm(path - path[:1], axis=-1).max(axis=0)
+                drifts.append(float(spans.min()))
+    return np.array(drifts)
 
 
 @pytest.fixture(scope="module")

@@ -69,7 +69,7 @@ def test_a_left_turn_becomes_a_right_turn() -> None:
     rotations = np.tile(quat.IDENTITY, (20, skeleton.joints, 1))
     rotations[:, 0] = quat.yaw(turn)
     clip = Clip(skeleton, np.zeros((20, 3)), rotations, 30.0)
-    np.testing.assert_allclose(quat.heading_twist(mirror(clip).rotations[:, 0]), -turn, atol=1e-12)
+    np.testing.assert_allclose(mirror(clip).rotations[:, 0], quat.yaw(-turn), atol=1e-12)
 
 
 def test_axes_that_follow_the_bones() -> None:

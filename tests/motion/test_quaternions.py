@@ -72,11 +72,6 @@ def test_continuous_signs_never_jump() -> None:
     assert np.max(np.abs(np.diff(quat.continuous(shuffled), axis=0))) < 0.05
 
 
-def test_heading_twist_recovers_the_yaw() -> None:
-    lean = quat.from_axis_angle([1.0, 0.0, 0.0], 0.3)
-    assert quat.heading_twist(quat.multiply(quat.yaw(0.7), lean)) == pytest.approx(0.7)
-
-
 def test_wrong_shapes_and_orders_are_refused() -> None:
     with pytest.raises(ValueError, match=r"Expected angles of shape \(\.\.\., 3\) for order 'ZXY', got \(2,\)"):
         quat.from_euler("ZXY", [0.0, 1.0])

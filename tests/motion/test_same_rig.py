@@ -59,7 +59,7 @@ def test_fingers_that_only_one_rig_has_are_left_out_or_stay_at_rest(walk: Clip) 
     )
     back = retarget(there, BODY)
     np.testing.assert_allclose(back.rotations, walk.rotations, atol=1e-12)
-    assert "left out joints LeftIndex1, LeftIndex2, RightIndex1 and 1 more" in back.history[-1]
+    assert "removed joints LeftIndex1, LeftIndex2, RightIndex1 and 1 more" in back.history[-1]
 
 
 def test_a_larger_body_takes_longer_steps_and_its_feet_stand(walk: Clip) -> None:

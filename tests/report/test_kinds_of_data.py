@@ -53,17 +53,17 @@ def rows(folder: Path, name: str) -> list[dict[str, str]]:
 @pytest.mark.parametrize(
     ("behave", "people", "expected"),
     [
-        (attentive, 1, ["of 1 person is estimated at", "with one participant nothing can be said about others"]),
+        (attentive, 1, ["of 1 person is estimated at", "one participant says nothing about others"]),
         (
             perfect, 5,
             ["is estimated at less than 5 frames longer and less than 5 frames shorter", "100.0% of 10 answers",
-             "were rated alike on average"],
+             "had equal mean ratings"],
         ),
         (stubborn, 4, ["is estimated at more than 20 frames longer and more than 15 frames shorter"]),
         (
             missing, 2,
-            ["No just noticeable difference can be given: all 56 questions were missed",
-             "there is no result, for all 4 questions were missed"],
+            ["No just noticeable difference can be given: all 56 questions had no response",
+             "there is no result, for all 4 questions had no response"],
         ),
     ],
 )  # fmt: skip
@@ -84,8 +84,8 @@ def test_a_few_answers_and_an_empty_session_make_no_claim(results_folder: MakeFo
     sit(folder, "p2", attentive, most_answers=0)
     text = words_of(folder)
     assert "No just noticeable difference can be given from the answers of 1 person." in headlines(text)
-    assert "there is no result, for nobody has come to it yet" in headlines(text)
-    assert "1 session begun without an answer that counts" in text
+    assert "there is no result, for no participant has reached that study" in headlines(text)
+    assert "1 session without an analysed response" in text
 
 
 def test_people_and_simulated_observers_together_are_marked_everywhere(results_folder: MakeFolder) -> None:
@@ -107,11 +107,11 @@ def test_who_and_what_is_left_out_stands_with_counts_and_both_results(results_fo
         sit(folder, f"p{number}", behave, group=number)
     text = words_of(folder)
     counted = {row["rule"]: (int(row["participants"]), int(row["answers"])) for row in rows(folder, "exclusion_rules")}
-    assert counted["participants who missed more than 30% of their trials"] == (1, 34)
+    assert counted["participants with no response in more than 30% of their trials"] == (1, 34)
     assert counted["participants who failed more than 50% of the attention checks"] == (1, 34)
-    badly = counted["answers after a stimulus that stalled or was hidden"][1]
+    badly = counted["answers after a display failure"][1]
     assert badly > 0
-    assert f"{68 + badly} answers of 170 are left out of all results above; 2 participants wholly" in text
+    assert f"{68 + badly} answers of 170 are excluded from all results above; 2 participants entirely" in text
     assert "6 of 10 attention checks by 5 participants were passed" in text
     left_out = {row["participant"]: row["left_out"] for row in rows(folder, "participants")}
     assert (left_out["p0"], left_out["p3"]) == ("", "missed 100%")
@@ -131,7 +131,7 @@ def test_all_answers_left_out_is_said(results_folder: MakeFolder) -> None:
     folder = results_folder(0, synthetic=False, videos=0, edit=with_rules)
     sit(folder, "p0", stubborn)
     said = headlines(words_of(folder))
-    assert "Just noticeable difference: there is no result, for all 28 answers are left out by the rules" in said
+    assert "Just noticeable difference: there is no result, for all 28 answers are excluded by the rules" in said
 
 
 def test_those_who_withdrew_are_counted_and_gone(results_folder: MakeFolder) -> None:

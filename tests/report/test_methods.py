@@ -31,18 +31,16 @@ def test_methods_follow_from_the_protocol(results_folder: MakeFolder) -> None:
 
     material = gather(results_folder(2, videos=0, edit=edit))
     told, cited = paragraphs(material)
-    assert told["Participants and design"].startswith("Two observers took part in one sitting of 3 studies.")
+    assert told["Participants and design"].startswith("Two observers took part in one session of 3 studies.")
     assert (
         "longer by −15, −10, −5, 0, +5, +10, +20 frames. Each pair was shown in both orders."
         in told["Participants and design"]
     )
     assert "blends of 10 frames" in told["Participants and design"]
-    assert (
-        "a camera travelling with it (smoothed over 0.5 s) above a ground plane, with 1.5 s before" in told["Stimuli"]
-    )
+    assert "a camera following it (smoothed over 0.5 s) above a ground plane, with 1.5 s before" in told["Stimuli"]
     assert "No stimulus was shown: observers were simulated." in told["Apparatus and procedure"]
     assert "profile-likelihood intervals are given beside them" in told["Analysis"]
-    assert told["Exclusions"].startswith("No rule of exclusion was stated beforehand")
+    assert told["Exclusions"].startswith("No rule of exclusion was preregistered")
     assert material.protocol.sha256[:12] in told["Software"]
     assert any(work.startswith("Macmillan") for work in cited)
     assert cited == sorted(cited)
@@ -82,7 +80,7 @@ def test_own_methods_are_described_by_their_parts_and_settings(results_folder: M
     words = "“eased in” (blends of 7 frames; sigmoid weight, sliding of planted feet left in)"
     assert f"blends as long as the geodesic distance gives (2004) and {words}" in told["Participants and design"]
     assert "under a linear or sigmoid weight" in told["Stimuli"]
-    assert "removed after blending, where the method is said to do so." in told["Stimuli"]
+    assert "removed after blending, if the method includes this." in told["Stimuli"]
     assert any(work.startswith("Shoemake") for work in cited)
 
 

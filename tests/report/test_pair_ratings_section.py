@@ -63,7 +63,7 @@ def test_what_is_worse_is_called_worse_and_one_question_is_told_by_its_mean() ->
     (headline,) = section_of({"better": [0, 1, 1, 0, 1, 2]}).headlines
     assert headline.statement == (
         "Compared with old cut, new cut was rated 0.83 on average, on a scale of 0 to 4, where 2 means no difference; "
-        "across participants this is not chance (p = .013)."
+        "across participants this is significant (p = .013)."
     )
     (both,) = section_of({"better": [0, 1, 1, 0], "natural": [1, 1, 0, 1]}).headlines
     assert "was rated below the middle of the scale in 2 of 2 questions" in both.statement
@@ -89,7 +89,7 @@ def test_what_can_not_be_told_is_said() -> None:
     section = section_of({"better": [3]})
     assert section.headlines[0].statement.endswith("where 2 means no difference.")
     assert "no test can be made" in section.headlines[0].detail
-    assert any(note.startswith("One participant: no spread to judge by;") for note in section.notes)
+    assert any(note.startswith("One participant: no spread to estimate;") for note in section.notes)
     assert any(note.startswith("One order of presentation") for note in section.notes)
     section = section_of({"better": [2, 2, 2, 2], "natural": [2, 2, 2, 2]})
     assert section.headlines[0].statement == "New cut was rated the same as old cut on average."

@@ -109,7 +109,7 @@ def test_one_answer_is_no_evidence_for_a_bound() -> None:
     said = headline(result, 30.0, "collected").statement
     assert said == "No just noticeable difference can be given from the answers of 1 person."
     missed = replace(result, answers=0, participants=0, missed=42)
-    assert "all 42 questions were missed" in headline(missed, 30.0, "collected").statement
+    assert "all 42 questions had no response" in headline(missed, 30.0, "collected").statement
 
 
 def test_intervals_with_open_ends_are_said_to_be_open() -> None:

@@ -223,7 +223,7 @@ def test_rigs_that_differ_in_leaf_joints_alone_are_blended(make_walk):
     assert "joints at rest LeftToe, RightToe" in " ".join(result.history)
     back = blend(destination, source, 40, 60, 10).clip
     assert back.skeleton is destination.skeleton
-    assert "left out joints LeftToe, RightToe" in " ".join(back.history)
+    assert "removed joints LeftToe, RightToe" in " ".join(back.history)
 
 
 def test_what_was_done_is_on_record(make_walk):

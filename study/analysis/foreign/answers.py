@@ -226,7 +226,7 @@ def _common(table: pd.DataFrame, columns: AnswerColumns, task: str, answer: pd.S
     nobody = found["participant"][(found["participant"] == "") & (answer != "")]
     if len(nobody):
         raise AnalysisError(
-            f"row {row_of(nobody)}, column {columns.participant!r}: expected who answered, found nothing"
+            f"row {row_of(nobody)}, column {columns.participant!r}: expected a participant, found nothing"
         )
     found["trial"] = np.arange(1, len(found) + 1)
     found["answer"] = answer.astype(object).where(answer != "", None)

@@ -1,7 +1,7 @@
 """Trials as jsPsych and lab.js write them in JSON: text in, a table of texts out.
 
 A file holds one list of trials, or several one after the other, as JATOS puts the results of participants into one
-file, or one trial a line. Lists may stand in objects under a name such as `trials` or `data`.
+file, or one trial a line. Lists may be in objects under a name such as `trials` or `data`.
 """
 
 from __future__ import annotations

@@ -64,13 +64,13 @@ def parse_table(text: str, needed: Sequence[str], delimiter: str | None = None) 
     -------
     DataFrame
         Indexed by line of the file less two, so that row 0 follows a heading in line 1. Columns without a heading and
-        without anything in them are left out.
+        without any content are skipped.
 
     Raises
     ------
     AnalysisError
-        When there is no heading or row, the delimiter can't be told, a row has more cells than the heading, or a needed
-        column stands there twice.
+        When there is no heading or row, the delimiter can't be determined, a row has more cells than the heading, or a
+        needed column occurs twice.
     """
     import pandas as pd
 

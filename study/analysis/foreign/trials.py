@@ -112,7 +112,7 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Trials:
         who = column(table, columns.participant, "participant")[given]
         if (who == "").any():
             raise AnalysisError(
-                f"row {row_of(who[who == ''])}, column {columns.participant!r}: expected who answered, found nothing"
+                f"row {row_of(who[who == ''])}, column {columns.participant!r}: expected a participant, found nothing"
             )
     result = pd.DataFrame({"participant": who, "level": level[given], "yes": yes, "shown": shown})
     if columns.order:

@@ -121,7 +121,7 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
     Parameters
     ----------
     answers
-        Columns `participant`, `difference_frames`, `correct`, `answer`; missed answers have no `answer`.
+        Columns `participant`, `difference_frames`, `correct`, `answer`; trials without a response have no `answer`.
     name
         Of the study.
     settings

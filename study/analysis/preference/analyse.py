@@ -121,7 +121,7 @@ def compare(
 
 
 def analyse_preference(answers: pd.DataFrame, name: str, settings: Settings) -> Preference:
-    """Analyse one preference study as was decided beforehand."""
+    """Analyse one preference study by the preregistered settings."""
     del name
     compared = compare(answers, settings.confidence, settings.alpha, margin=settings.margin)
     return Preference(compared, strengths(answers, settings.confidence))
@@ -154,7 +154,7 @@ def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> BradleyTerry |
 
 
 def strengths_in_words(found: BradleyTerry | NotFitted) -> str:
-    """Return the strengths of the methods in a sentence, and what can't be told of them."""
+    """Return the strengths of the methods in a sentence, and what can't be estimated."""
     if isinstance(found, NotFitted):
         return f"Strengths of the methods: {found.note}."
     parts = [
@@ -176,7 +176,8 @@ def _order_in_words(method_a: str, method_b: str, order: OrderEffect, alpha: flo
     place = "first" if order.first_percent else "second"
     return (
         f"Each of {counted(order.answers, 'answer')} favoured the one shown {place}: the order of presentation "
-        f"decided, and nothing can be said about {method_a} and {method_b}."
+        "decided, which says nothing about  "
+        f"{method_a} and {method_b}."
     )
 
 
@@ -194,11 +195,11 @@ def _in_words(
     p_value = participants.p_value
     share = f"{published.percent:.1f}% of {counted(published.answers, 'answer')} favoured {method_a} over {method_b}"
     if p_value is None:
-        said = f"{share}; with one participant nothing can be said about others."
+        said = f"{share}; one participant says nothing about others."
     elif p_value < alpha:
-        said = f"{share}; across participants this is not chance (p {_p_in_words(p_value)})."
+        said = f"{share}; across participants this is significant (p {_p_in_words(p_value)})."
     else:
-        said = f"{share}; across participants this can't be told from chance (p {_p_in_words(p_value)})."
+        said = f"{share}; across participants this is not significant (p {_p_in_words(p_value)})."
     if ONE_ORDER in order.note:
         return f"{said} {ONE_ORDER[0].upper()}{ONE_ORDER[1:]}."
     if order.p_value is not None and order.p_value < alpha:

@@ -15,7 +15,7 @@ NEEDED_COLUMNS = ("participant", "chose_a", "method_a", "method_b")
 
 
 def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers given in preference tasks, missed ones left out, `chose_a` as 0, 1, or one half for a tie.
+    """Return the answers of preference tasks, without missing ones, `chose_a` as 0, 1, or one half for a tie.
 
     Raises
     ------

@@ -28,7 +28,7 @@ WIDEST = 15.0
 
 @dataclass(frozen=True)
 class Strength:
-    """A method's strength beside the reference, on the logit scale; None where it can't be told."""
+    """A method's strength beside the reference, on the logit scale; None where it can't be determined."""
 
     method: str
     value: float | None
@@ -45,13 +45,13 @@ class BradleyTerry:
     strengths
         Of every method, strongest first; the reference's is 0.
     reference
-        The method that the others stand beside.
+        The reference method.
     order
         What coming first (or playing at home) adds, on the logit scale; None where the order is not known.
     log_likelihood, deviance, degrees_of_freedom, p_value
         Goodness of fit against free shares of every pair and order.
     participants
-        Whose answers stand behind the standard errors; None where every answer counts as independent.
+        Participants behind the standard errors; None where every answer counts as independent.
     note
         What can't be estimated, and why.
     """
@@ -92,7 +92,7 @@ def fit_bradley_terry(
         The method whose strength is 0; unless given, the first by name of those that most others are finitely apart
         from.
     participants : sequence of str, shape (rows,)
-        Who answered; every answer counts as independent where left out.
+        Who answered; if omitted, every answer counts as independent.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def fit_bradley_terry(
         for method, sign in zip(names, (1.0, -1.0), strict=True):
             design[row, methods.index(method)] += sign
     if np.linalg.matrix_rank(design[total > 0]) < len(methods) - 1:
-        return "the methods are not linked by comparisons: strengths can't be told"
+        return "the methods are not linked by comparisons: strengths cannot be estimated"
     note = ""
     if with_order:
         every = np.column_stack([design, np.ones(len(yes))])
@@ -127,17 +127,17 @@ def fit_bradley_terry(
     return _fitted(columns, yes, total, others, methods[place], groups, confidence, told, note)
 
 
-DECIDED = "every answer went to the same place in the order of presentation: nothing can be said about the methods"
+DECIDED = "every answer went to the same position: this says nothing about the methods"
 
 
 def _why_no_order(design: FloatArray, yes: FloatArray, total: FloatArray) -> str:
     """Why the effect of the order, the last column, can't be estimated beside strengths; empty where it can."""
     if np.linalg.matrix_rank(design[total > 0]) < design.shape[1] - 1:
-        return "the orders shown do not tell an effect of the order from the strengths: it is left out"
+        return "the orders shown cannot separate an effect of order from the strengths: it is omitted"
     if yes.sum() in (0.0, total.sum()):
         return DECIDED
     if not _finite(design, yes, total, np.eye(design.shape[1])[-1:])[0]:
-        return "the effect of the order can't be told from the strengths by these answers, and is left out"
+        return "these answers cannot separate the effect of order from the strengths: it is omitted"
     return ""
 
 
@@ -218,7 +218,7 @@ def _fitted(
         one_way = f"the answers for or against it all go one way, so its distance from {held} has no finite estimate"
         notes.append(f"{', '.join(endless)}: {one_way}")
     if any(row.value is not None and row.standard_error is None for row in every):
-        notes.append(f"{counted(people or 0, 'participant')}: too few, or too much alike, for standard errors")
+        notes.append(f"{counted(people or 0, 'participant')}: too few, or too similar, for standard errors")
     # Rows may hold single answers: the saturated model is one share for every pair and order.
     cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
     favoured, seen = np.bincount(cells, yes), np.bincount(cells, total)

@@ -135,7 +135,7 @@ def _gee(design: FloatArray, chosen: FloatArray, who: NDArray[Any], confidence: 
         few = counted(people, "participant is", "participants are")
         return GroupModel(note=f"{few} too few for estimating equations")
     if chosen.min() == chosen.max():
-        return GroupModel(note="all answers alike: effects can't be estimated")
+        return GroupModel(note="all answers are the same: effects cannot be estimated")
     too_alike = GroupModel(note="the answers vary too little between participants for estimating equations")
     try:
         found = estimating_equations(design, chosen, who)

@@ -75,7 +75,7 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> MotionsAs
     test errs too seldom rather than too often where neither participants nor motions differ.
     """
     if "motion" not in part.columns or part["motion"].nunique() < 2:
-        return MotionsAsSample(None, None, "fewer than two motions: they can't stand for others")
+        return MotionsAsSample(None, None, "fewer than two motions: they can't represent other motions")
     shares = part.groupby(part["motion"].astype(str))["chose_a"].mean().to_numpy(dtype=np.float64)
     test = estimates.mean_test(100 * shares, 50.0, confidence)
     by_motion = ByMotion(
@@ -97,7 +97,7 @@ def _both_vary(part: pd.DataFrame, confidence: float) -> tuple[BothVary | None, 
     groups = [np.unique(name, return_inverse=True)[1] for name in names]
     fewest = min(int(group.max()) + 1 for group in groups)
     if fewest < 2:
-        return None, "one participant: nothing can be said about others"
+        return None, "one participant: results do not generalise to others"
     cells = np.unique(np.column_stack(groups), axis=0, return_inverse=True)[1].ravel()
     apart = chosen - chosen.mean()
     variances = [_variance_of_sums(apart, group) for group in groups]
@@ -106,7 +106,7 @@ def _both_vary(part: pd.DataFrame, confidence: float) -> tuple[BothVary | None, 
     single = float((np.bincount(cells, apart) ** 2).sum()) / len(chosen) ** 2
     variance = max(sum(variances) - single, single)
     if variance <= 1e-12:
-        return None, "all answers alike: there is no spread to judge by"
+        return None, "all answers are the same: there is no spread to estimate"
     error, mean = math.sqrt(variance), float(chosen.mean())
     half = estimates.t_quantile(confidence, fewest - 1) * error
     found = BothVary(

@@ -10,7 +10,7 @@ from study.analysis.preference.participants import participant_tests
 if TYPE_CHECKING:
     import pandas as pd
 
-ONE_ORDER = "the two were always shown in the same order: a preference can't be told from an effect of the order"
+ONE_ORDER = "the two were always shown in the same order: a preference cannot be separated from an effect of order"
 
 
 @dataclass(frozen=True)

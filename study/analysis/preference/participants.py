@@ -1,4 +1,4 @@
-"""Tests of a preference with one share a participant against one half: counts in, p-values and intervals out."""
+"""Tests of a preference by each participant's percentage against 50%: counts in, p-values and intervals out."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def default_p_values(chosen: ArrayLike, shown: ArrayLike) -> FloatArray:
     Parameters
     ----------
     chosen, shown : array_like, shape (..., participants)
-        How often each participant favoured the first method, of how many answers; nobody where `shown` is 0.
+        How often each participant favoured the first method, of how many answers; ignored where `shown` is 0.
 
     Returns
     -------

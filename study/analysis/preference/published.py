@@ -99,7 +99,7 @@ def published_test(favouring: int, answers: int, confidence: float = 0.95) -> Pu
 
 
 def without_ties(part: pd.DataFrame, confidence: float) -> Published:
-    """Return the pooled test of the answers that chose; like a sign test, it leaves out those that did not."""
+    """Return the pooled test of the answers that chose; like a sign test, it excludes those that did not."""
     clear = part["chose_a"] != 0.5
     return published_test(int(part.loc[clear, "chose_a"].sum()), int(clear.sum()), confidence)
 
@@ -107,7 +107,7 @@ def without_ties(part: pd.DataFrame, confidence: float) -> Published:
 def by_motion(part: pd.DataFrame, confidence: float = 0.95) -> tuple[MotionPreference, ...]:
     """Return the pooled test for every motion.
 
-    Where every participant saw a motion pair once, its answers are independent and these tests hold as they stand.
+    Where every participant saw a motion pair once, its answers are independent and these tests are valid.
     """
     column = "motion" if "motion" in part.columns else "pair" if "pair" in part.columns else None
     groups = part.groupby(part[column].astype(str) if column else np.full(len(part), "all"), sort=False)

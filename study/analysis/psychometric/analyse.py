@@ -155,7 +155,7 @@ def _typical(
     if isinstance(best, str):
         return best
     if trials["participant"].nunique() < 2:
-        return "one participant: nothing can be said about others"
+        return "one participant: results do not generalise to others"
     if model.sigmoid.name not in LINKS_OF:
         return f"mixed models are fitted with the sigmoids {' and '.join(LINKS_OF)} only"
     link = LINKS_OF[model.sigmoid.name]

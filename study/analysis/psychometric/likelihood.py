@@ -40,7 +40,7 @@ class LikelihoodFit:
     Attributes
     ----------
     threshold
-        Where the sigmoid reaches one half; None where it lies outside the levels or can't be told.
+        Where the sigmoid reaches one half; None where it lies outside the levels or can't be determined.
     interval
         By profile likelihood; an end that the levels leave open is None.
     width, lapse, guess
@@ -53,7 +53,7 @@ class LikelihoodFit:
     dispersion
         Deviance over degrees of freedom; much above 1 where performance varied more than the binomial has it.
     at_bound
-        Parameters that stand at the bound of their range.
+        Parameters that are at the bound of their range.
     note
         What can't be estimated, and why.
     """
@@ -201,7 +201,11 @@ def fit_likelihood(
         p_value=p_value,
         dispersion=deviance / freedom if freedom > 0 else None,
         at_bound=bounds,
-        note="; ".join(filter(None, (note, "" if freedom > 0 else "no more levels than parameters: no dispersion"))),
+        note="; ".join(
+            filter(
+                None, (note, "" if freedom > 0 else "no more levels than parameters: dispersion cannot be estimated")
+            )
+        ),
     )
 
 
@@ -233,7 +237,11 @@ def _threshold(
     interval = estimates.Interval(ends[0], ends[1], confidence)
     place = float(best.point[0, 0])
     if (data.yes == data.shown).all() or (data.yes == 0).all():
-        return None, estimates.Interval(None, None, confidence), "all answers alike: the threshold can't be told"
+        return (
+            None,
+            estimates.Interval(None, None, confidence),
+            "all answers are the same: the threshold cannot be estimated",
+        )
     if not first <= place <= last:
         return None, interval, f"outside the levels shown ({data.levels[0]:g} to {data.levels[-1]:g})"
     return float(model.sigmoid.levels(np.array(place))), interval, ""

@@ -87,7 +87,7 @@ def make_model(
 
 
 def tidy(levels: ArrayLike, yes: ArrayLike, shown: ArrayLike) -> Data:
-    """Return counts by level, rising, equal levels put together, levels without answers left out.
+    """Return counts by level, rising, equal levels put together, without levels that have no answers.
 
     Parameters
     ----------
@@ -121,5 +121,5 @@ def why_no_fit(data: Data) -> str:
     if not len(data.levels):
         return "no answers"
     if len(data.levels) == 1:
-        return f"one level only ({data.levels[0]:g}): threshold and width can't be told from each other"
+        return f"one level only ({data.levels[0]:g}): threshold and width cannot be separated"
     return ""

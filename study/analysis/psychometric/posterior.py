@@ -149,7 +149,7 @@ def _caution(data: Data) -> str:
     weight = data.shown / data.shown.sum()
     centred = data.levels - (weight * data.levels).sum()
     if float((weight * centred * share).sum()) <= 0:
-        return "the share does not rise with the level; if it should fall, turn the sign of the levels"
+        return "the proportion does not rise with the level; if it should fall, reverse the sign of the levels"
     return ""
 
 

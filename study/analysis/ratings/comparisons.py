@@ -1,9 +1,8 @@
 """Ratings of several methods compared: answers of a rating task in, tests of every question out.
 
 As published (2003 section 4.2): a 2 x 2 analysis of variance between subjects, method by order of presentation. It
-takes the ratings of one participant for independent. Beside it stand tests that do not: the difference over
-participants, the mixed design with participants as random, ranks, and an ordinal model that takes the points of a scale
-for no more than ordered.
+treats the ratings of one participant as independent. Beside it are tests that do not: the difference over
+participants, the mixed design with participants as random, ranks, and an ordinal model of the points of a scale.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class MethodDifference(estimates.MeanTest):
 
 @dataclass(frozen=True)
 class MixedDesign(Likeness):
-    """Participants as random; those who did not rate every combination of `factors` are left out."""
+    """Participants as random; those who did not rate every combination of `factors` are excluded."""
 
     effects: tuple[WithinEffect, ...]
     factors: tuple[str, ...]
@@ -175,7 +174,7 @@ def _as_published(part: pd.DataFrame, alpha: float) -> tuple[TwoWay | tuple[()],
         table = two_way(*factors, alpha=alpha)
     except AnalysisError as error:
         return (), None, f"no analysis of variance: {error}"
-    note = "the ratings of each combination are all alike: no F" if table[0].f is None else ""
+    note = "the ratings of each combination are all the same: no F" if table[0].f is None else ""
     uneven = part.groupby(["method_a", "order"]).size().nunique() > 1
     return table, two_way(*factors, squares="II", alpha=alpha) if uneven else None, note
 
@@ -198,9 +197,9 @@ def _difference(one: pd.Series[float], other: pd.Series[float], confidence: floa
     apart = (other - one).dropna().to_numpy(dtype=np.float64)
     test = estimates.mean_test(apart, 0.0, confidence)
     p_value = signed_rank(apart) if test.p_value is None else test.p_value
-    note = "the two were rated alike by everybody" if len(apart) > 1 and not apart.any() else test.note
+    note = "everybody rated the two equally" if len(apart) > 1 and not apart.any() else test.note
     return MethodDifference(
-        **vars(test) | {"p_value": p_value, "note": note if len(apart) else "nobody rated both"},
+        **vars(test) | {"p_value": p_value, "note": note if len(apart) else "no participant rated both"},
         of=f"{other.name} minus {one.name}",
         test="none" if p_value is None else "exact sign test" if test.p_value is None else "Student's t",
     )

@@ -209,7 +209,7 @@ def _between(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
     """Participants' means by order, between subjects as in 2003."""
     left = len(first) + len(second) - 2
     if left < 1:
-        return OrderTest(note="one participant in each order: no spread to judge the effect of order by")
+        return OrderTest(note="one participant in each order: the effect of order cannot be estimated")
     squares = sum(float(((group - group.mean()) ** 2).sum()) for group in (first, second))
     if squares <= 1e-12:
         return OrderTest(note="all participants of an order gave the same scores: the effect of order can't be tested")
@@ -218,7 +218,7 @@ def _between(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
 
 
 def _within(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
-    """Each participant's own difference between the orders; those who saw one order alone are left out."""
+    """Each participant's own difference between the orders; those who saw only one order are excluded."""
     test = mean_test(first - second, 0.0)
     if test.t is None or test.degrees_of_freedom is None:
         return OrderTest(note=f"effect of order: {test.note}")

@@ -103,7 +103,7 @@ def _mean(values: FloatArray, rows: FloatArray) -> FloatArray:
 
 
 def _independent(rows: FloatArray, answers: FloatArray) -> FloatArray:
-    """Where to start: a logistic regression that takes all answers for independent."""
+    """Where to start: a logistic regression that treats all answers as independent."""
     values = np.zeros(rows.shape[1])
     for _ in range(25):
         mean = _mean(values, rows)

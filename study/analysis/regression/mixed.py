@@ -108,7 +108,7 @@ def fit_mixed(
     fixed : array_like, shape (rows, effects)
         The design; bring columns to about unit size.
     random : array_like, shape (rows, 1 or 2)
-        What each participant has an own coefficient of: ones, or ones and a level.
+        Columns for which each participant has a coefficient: ones, or ones and a level.
     yes, shown : array_like, shape (rows,)
         Counts.
     participants : sequence, shape (rows,)
@@ -203,10 +203,10 @@ def _why_no_fit(problem: _Problem, people: int) -> str:
         return "one participant: the spread between participants can't be estimated"
     total = problem.yes.sum()
     if total in (0, problem.shown.sum()):
-        return "all answers alike: effects can't be estimated"
+        return "all answers are the same: effects cannot be estimated"
     rows = problem.fixed[problem.shown > 0]
     if np.linalg.matrix_rank(rows) < rows.shape[1]:
-        return "the effects can't be told from each other in these answers (cells are missing)"
+        return "the effects can't be separated in these answers (cells are missing)"
     return ""
 
 

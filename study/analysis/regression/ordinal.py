@@ -92,7 +92,7 @@ def fit_ordinal(
     design : array_like, shape (answers, effects)
         Without a constant, which the thresholds hold; no columns for the model without effects.
     ratings : array_like, shape (answers,)
-        Points of the scale. Points that nobody chose have no threshold.
+        Points of the scale. Unused points have no threshold.
     participants : sequence, shape (answers,)
         Who answered.
     names
@@ -136,7 +136,7 @@ def _why_no_fit(design: FloatArray, points: int, people: int) -> str:
         return "all ratings alike: effects can't be estimated"
     full = np.column_stack([np.ones(len(design)), design])
     if np.linalg.matrix_rank(full) < full.shape[1]:
-        return "the effects can't be told from each other in these ratings (cells are missing)"
+        return "the effects can't be separated in these ratings (cells are missing)"
     return ""
 
 

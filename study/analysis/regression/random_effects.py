@@ -1,6 +1,7 @@
 """What models with random effects share: quadrature, and fixed effects with their standard errors and tests.
 
-Points and weights, a loss and its gradient come in; effects with intervals go out, and words on what can't be told.
+Points and weights, a loss and its gradient come in; effects with intervals go out, and notes on what cannot be
+estimated.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def quadrature(nodes: int, size: int) -> tuple[FloatArray, FloatArray]:
 
 
 def covariance_of(point: FloatArray, loss: Any, effects: int) -> FloatArray:
-    """Covariance of the fixed effects: inverse of the differences of the gradient, spread that is at zero left out."""
+    """Covariance of the fixed effects: inverse of the differences of the gradient, without a spread that is zero."""
     step = 1e-4
     rows = []
     for place in range(len(point)):
@@ -68,7 +69,7 @@ def effects_of(
     for place, value in enumerate(values):
         name = names[place] if place < len(names) else f"effect {place + 1}"
         variance = covariance[place, place]
-        # An error as large as that says nothing: the answers nearly separate, or the spread can't be told.
+        # An error as large as that says nothing: the answers nearly separate, or the spread can't be determined.
         if not np.isfinite(variance) or not 0 < variance < LARGEST_ERROR**2 or abs(value) >= LARGEST_EFFECT - 1e-6:
             found.append(Effect(name, float(value), None, Interval(None, None, confidence), None))
             continue
@@ -86,9 +87,9 @@ def caution(values: FloatArray, covariance: FloatArray, spread: FloatArray, sett
     elif not np.isfinite(covariance).all() or (np.diag(covariance) <= 0).any():
         notes.append("the likelihood is flat: standard errors can't be given")
     elif (np.diag(covariance) > LARGEST_ERROR**2).any():
-        notes.append("the answers nearly separate: an effect is large, and how large can't be told")
+        notes.append("the answers nearly separate: an effect is large, and its size can't be estimated")
     if (spread < NO_SPREAD).any():
         notes.append("a spread between participants is estimated as none; it may only not have been seen")
     if not settled:
-        notes.append("the search for the maximum did not come to rest")
+        notes.append("the search for the maximum did not converge")
     return "; ".join(notes)

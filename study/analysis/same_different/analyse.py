@@ -69,7 +69,7 @@ class SameDifferent(Thresholds):
     level
         Share of "different" at threshold.
     percent_different, published
-        The points of Figure 6, and where straight lines between them cross, by side.
+        The points of Figure 6, and where linear interpolation between them crosses, by side.
     model, mixed
         The differencing model of the group's curve, and that of participants who differ; their notes say what to be
         careful about, or why there is none.
@@ -171,7 +171,7 @@ def _thresholds(
 
 
 def analyse_same_different(answers: pd.DataFrame, name: str, settings: Settings) -> SameDifferent:
-    """Analyse one same-different study as was decided beforehand."""
+    """Analyse one same-different study by the preregistered settings."""
     found = analyse_jnd(
         answers,
         level=settings.threshold,
@@ -187,7 +187,7 @@ def analyse_same_different(answers: pd.DataFrame, name: str, settings: Settings)
 
 def in_words(found: Thresholds, mixed: MixedThresholds | str, level: float) -> str:
     """Return the thresholds in sentences: as published, corrected, and those of the median observer."""
-    first = f"Read off straight lines, as published, {100 * level:.0f}% of the answers are “different” at "
+    first = f"By linear interpolation, as published, {100 * level:.0f}% of the answers are “different” at "
     first += _sides_in_words(found.published)
     if found.model is None:
         return f"{first}. No model was fitted: {found.model_note}."
@@ -195,7 +195,7 @@ def in_words(found: Thresholds, mixed: MixedThresholds | str, level: float) -> s
     text = f"{first}. By the differencing model the just noticeable difference is {jnd}."
     if isinstance(mixed, str):
         return text
-    return f"{text} That is the group's; the median observer's is {_sides_in_words(mixed.typical)}."
+    return f"{text} This is the group's; the median observer's is {_sides_in_words(mixed.typical)}."
 
 
 def _sides_in_words(thresholds: Mapping[Side, Threshold]) -> str:

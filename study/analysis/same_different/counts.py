@@ -33,7 +33,7 @@ class Counts:
     differences : ndarray, shape (levels,)
         Signed difference in blend length, frames, rising: comparison minus reference.
     different, shown : ndarray, shape (participants, levels)
-        Answers "different", and all answers given; missed answers are in neither.
+        Answers "different", and all answers given; trials without a response are in neither.
     """
 
     participants: tuple[str, ...]
@@ -62,7 +62,7 @@ class PercentDifferent:
 
 
 def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers given in same-different tasks, missed ones left out.
+    """Return the answers given in same-different tasks, without trials that have no response.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def count_answers(answers: pd.DataFrame) -> Counts:
     yes = (given["answer"] == "different").astype(float)
     differences = estimates.numbers(given["difference_frames"], "difference_frames")
     if not np.isfinite(differences).all():
-        raise AnalysisError("expected finite numbers in difference_frames, found an infinite one; leave out that row")
+        raise AnalysisError("expected finite numbers in difference_frames, found an infinite one; remove that row")
     groups = yes.groupby([given["participant"].astype(str), pd.Series(differences, index=given.index)])
     shown, different = groups.size().unstack(fill_value=0), groups.sum().unstack(fill_value=0)
     return Counts(
@@ -138,7 +138,7 @@ def percent_different(counts: Counts, confidence: float = 0.95) -> tuple[Percent
                 standard_error=100 * float(share.std(ddof=1)) / math.sqrt(len(share)) if len(share) > 1 else None,
                 low=None if interval.low is None else 100 * interval.low,
                 high=None if interval.high is None else 100 * interval.high,
-                note="" if len(share) > 1 else "one participant: no spread to judge by",
+                note="" if len(share) > 1 else "one participant: no spread to estimate",
             )
         )
     return tuple(rows)

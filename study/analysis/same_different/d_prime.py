@@ -30,7 +30,7 @@ class DPrime:
 
 @dataclass(frozen=True)
 class LevelDPrime(DPrime):
-    """Sensitivity at one difference in blend length, against the pairs with none; `note` says what can't be told."""
+    """Sensitivity at one difference in blend length, against the pairs with none; a `note` on what can't be."""
 
     difference_frames: float
     note: str
@@ -89,7 +89,7 @@ def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: floa
     return DPrime(value, criterion, error, low, high)
 
 
-OPEN = "no more “different” than without a difference, or no end above: what is missing can't be told"
+OPEN = "no more “different” than without a difference, or no upper end: the rest cannot be estimated"
 
 
 def d_prime_table(counts: Counts, confidence: float = 0.95) -> tuple[LevelDPrime, ...]:

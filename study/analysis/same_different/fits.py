@@ -33,7 +33,7 @@ class Fits:
     Attributes
     ----------
     criterion : ndarray, shape (fits,)
-        Size of the felt difference above which the answer is "different", in standard deviations of one impression.
+        Size of the felt difference above which the answer is "different", in standard deviations of an impression.
     lapse : ndarray, shape (fits,)
         Share of answers given blindly, half of them "different".
     slopes : ndarray, shape (fits, slopes)
@@ -41,7 +41,7 @@ class Fits:
     log_likelihood : ndarray, shape (fits,)
         Without the binomial coefficients.
     held : ndarray of bool, shape (fits, 2 + slopes)
-        True where a parameter (criterion, lapse, slopes) stands at the bound of its range.
+        True where a parameter (criterion, lapse, slopes) is at the bound of its range.
     settled : ndarray of bool, shape (fits,)
         Whether the search came to rest.
     """

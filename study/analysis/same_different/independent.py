@@ -126,16 +126,16 @@ def fit_independent(counts: Counts, level: float = 0.75) -> Independent | None:
 
 
 def compare_rules(independent: Independent | None, differencing_log_likelihood: float | None) -> Rules:
-    """Return which rule the answers speak for; both have as many parameters, so the likelihoods stand as they are."""
+    """Return which rule the answers support; both have as many parameters, so the likelihoods are comparable."""
     if independent is None or differencing_log_likelihood is None:
         text = "No rule can be fitted."
         return Rules(None, None, text, text)
     gain = differencing_log_likelihood - independent.log_likelihood
     if abs(gain) < DECIDED:
-        text = "The answers do not tell the two rules apart"
+        text = "The answers do not distinguish the two rules"
     else:
         better = "differencing" if gain > 0 else "independent observations"
-        text = f"The answers speak for {better}"
+        text = f"The answers support {better}"
     text += f" (log likelihood of differencing less that of independent observations: {gain:+.1f})."
     unreached = [side for side, frames in independent.thresholds.items() if frames is None]
     note = f"not reached within the levels by that of independent observations: {', '.join(unreached)}"

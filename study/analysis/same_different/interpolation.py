@@ -1,10 +1,10 @@
 """The just noticeable difference as published: counts of a same-different task in, thresholds out.
 
-2004 section 5.1, Figure 6: where straight lines between percentages "different" cross 75%, shorter and longer. The
-differencing model (`model`) stands beside it, since straight lines cut the corners of a bent curve, and their crossing
-moves with the rate of false alarms.
+2004 section 5.1, Figure 6: where linear interpolation between percentages "different" crosses 75%, shorter and longer.
+The differencing model (`model`) is given alongside, since linear interpolation is biased for a curved function, and its
+crossing moves with the false-alarm rate.
 
-Intervals take the participant as the unit. A threshold outside the levels shown is said to be outside, never computed.
+Intervals take the participant as the unit. A threshold outside the levels shown is reported as outside, never computed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 
 def crossing_of_lines(sizes: FloatArray, shares: FloatArray, level: float = 0.75) -> FloatArray:
-    """Return where straight lines between points first reach `level`, going away from no difference.
+    """Return where linear interpolation between points first reaches `level`, going away from no difference.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def _levels_of(counts: Counts, side: Side) -> NDArray[np.intp]:
 
 
 def _weighted_means(shares: FloatArray, weights: FloatArray) -> FloatArray:
-    """Means over participants of shares (participants, levels), weights (samples, participants); NaN left out."""
+    """Means over participants of shares (participants, levels), weights (samples, participants); NaN ignored."""
     known = np.isfinite(shares)
     total = weights @ known.astype(np.float64)
     return np.asarray((weights @ np.where(known, shares, 0.0)) / np.where(total > 0, total, np.nan), dtype=np.float64)
@@ -69,7 +69,7 @@ def crossings(
     resamples: int = 2000,
     rng: np.random.Generator | None = None,
 ) -> dict[Side, Threshold]:
-    """Return the 75% crossings of straight lines on both sides (2004 Figure 6).
+    """Return the 75% crossings by linear interpolation on both sides (2004 Figure 6).
 
     Parameters
     ----------
@@ -84,9 +84,9 @@ def crossings(
 
     Notes
     -----
-    The interval holds every difference whose interpolated percentage can't be told from `level` (Student's t over
-    participants; Fieller's method); the standard error is the bootstrap's. Both describe the crossing of straight lines
-    through the true percentages, which is not quite where a smooth curve crosses.
+    The interval holds every difference whose interpolated percentage does not differ significantly from `level`
+    (Student's t over participants; Fieller's method); the standard error is the bootstrap's. Both describe the crossing
+    by linear interpolation through the true percentages, which is not quite where a smooth curve crosses.
     """
     rng = rng or np.random.default_rng(0)
     count = len(counts.participants)
@@ -95,7 +95,7 @@ def crossings(
 
 
 def _line_threshold(counts: Counts, side: Side, level: float, confidence: float, weights: FloatArray) -> Threshold:
-    method = "straight lines between levels; interval over participants (Fieller)"
+    method = "linear interpolation between levels; interval over participants (Fieller)"
     unknown = estimates.Interval(None, None, confidence)
     wanted = _levels_of(counts, side)
     sizes = np.abs(counts.differences[wanted])
@@ -117,7 +117,7 @@ def _line_threshold(counts: Counts, side: Side, level: float, confidence: float,
         error = bootstrap_error(resampled)
     if len(shares) >= FEWEST_FOR_INTERVAL and None in (interval.low, interval.high):
         ends = [word for word, end in (("below", interval.low), ("above", interval.high)) if end is None]
-        open_end = f"open {' and '.join(ends)}: no level shown there can be told from {100 * level:g}%"
+        open_end = f"open {' and '.join(ends)}: no level shown there differs significantly from {100 * level:g}%"
         caution = "; ".join(filter(None, [caution, f"the interval is {open_end}"]))
     if (np.diff(means) < 0).any():
         caution = "; ".join(filter(None, [caution, "percentages do not rise throughout: the first crossing is given"]))
@@ -133,7 +133,7 @@ def bootstrap_error(resampled: FloatArray) -> float | None:
 
 
 def _fieller(sizes: FloatArray, shares: FloatArray, level: float, confidence: float) -> tuple[estimates.Interval, str]:
-    """Differences at which the interpolated mean can't be told from `level`, and a caution.
+    """Differences at which the interpolated mean does not differ significantly from `level`, and a caution.
 
     Where all participants agree the spread can't be seen; it is then taken from two answers more, one of each kind.
     """

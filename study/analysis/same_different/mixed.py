@@ -1,6 +1,6 @@
 """Observers who differ, in a same-different study: counts by participant in, the typical observer's thresholds out.
 
-Every participant has an own sensitivity and an own criterion under the differencing rule (`fits`): both are
+Every participant has their own sensitivity and criterion under the differencing rule (`fits`): both are
 log-normal over people, so that "typical" is the median observer. The mean curve of people who differ is flatter than
 anybody's, and crosses 75% further out than the typical observer does; one curve fitted to all answers follows neither
 quite. This model says both: the typical observer's threshold, and where the mean of all people's curves crosses.
@@ -51,7 +51,7 @@ class MixedThresholds:
     criterion, lapse
         The typical observer's criterion, and everybody's lapse rate.
     log_likelihood, alike_log_likelihood
-        Of this model, and with nobody differing.
+        Of this model, and of one without individual differences.
     alike_p_value
         Likelihood-ratio test that people are alike. A spread of none is the least there can be, so the ratio is half of
         the time 0; the mixture of chi-square distributions takes that into account.
@@ -95,7 +95,7 @@ class _Doubt:
 def fit_mixed_thresholds(
     counts: Counts, *, level: float = 0.75, confidence: float = 0.95, largest_lapse: float = fits.LARGEST_LAPSE
 ) -> MixedThresholds | str:
-    """Fit the differencing model with an own sensitivity and criterion a participant.
+    """Fit the differencing model with a sensitivity and a criterion for each participant.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def fit_mixed_thresholds(
     reason = why_no_fit(counts)
     if not reason and answered.sum() < FEWEST_PEOPLE:
         few = counted(int(answered.sum()), "participant is", "participants are")
-        reason = f"{few} too few to tell how people differ; it takes {FEWEST_PEOPLE}"
+        reason = f"{few} too few to estimate individual differences; at least {FEWEST_PEOPLE}"
     if reason:
         return reason
     people = _people(counts, answered)
@@ -133,7 +133,7 @@ def fit_mixed_thresholds(
         people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None], largest_lapse=largest_lapse
     )
     if start.held[0, 2:].any() or start.held[0, 0]:
-        return "sensitivity or criterion of the group stands at the bound of its range: people can't be told apart"
+        return "the group's sensitivity or criterion is at its bound: individual differences cannot be estimated"
     slopes = np.log(start.slopes[0])
     begin = np.concatenate([np.log(start.criterion), start.lapse, slopes, [0.2, 0.2]])
     bounds = [(math.log(1e-3), math.log(9.0)), (0.0, largest_lapse), *((slope - 3, slope + 3) for slope in slopes)]
@@ -154,7 +154,7 @@ def fit_mixed_thresholds(
         log_likelihood=value,
         alike_log_likelihood=alike,
         alike_p_value=_alike_probability(max(2 * (value - alike), 0.0)),
-        note="" if settled else "the search for the maximum did not come to rest",
+        note="" if settled else "the search for the maximum did not converge",
     )
 
 
@@ -295,7 +295,7 @@ def _thresholds(
             continue
         found, (variance, freedom) = math.exp(log_found), _variance(doubt, gradient)
         if not variance > 0:
-            note = "the answers do not tell how sure this is"
+            note = "its uncertainty cannot be estimated"
             result[side] = Threshold(side, found, None, nothing, "reached", METHOD, note)
             continue
         error, times = math.sqrt(variance), estimates.t_quantile(confidence, freedom)

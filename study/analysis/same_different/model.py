@@ -1,4 +1,4 @@
-"""The differencing model fitted to a group's answers: thresholds that false alarms and straight lines do not bend.
+"""The differencing model fitted to a group's answers: thresholds free of the bias of interpolation.
 
 Counts of a same-different task (`counts`) come in; criterion, sensitivities, thresholds with intervals
 and tests go out (2004 section 5.1, corrected). What the model says stands in `fits`.
@@ -161,7 +161,7 @@ ONE_SIDE = "differences on one side only: its slope can't be compared with anoth
 
 @dataclass(frozen=True, eq=False)
 class _Spread:
-    """How far a fit scatters: fits with one participant left out at a time, or the covariance for one participant."""
+    """How far a fit scatters: fits with each participant omitted in turn, or the covariance for one participant."""
 
     participants: int
     level: float
@@ -169,7 +169,7 @@ class _Spread:
     covariance: FloatArray
 
     def log_threshold_error(self, best: fits.Fits, kind: Kind, place: int) -> float | None:
-        """Standard error of the log threshold of one slope; None where it can't be told."""
+        """Standard error of the log threshold of one slope; None where it can't be determined."""
         if self.left_out is not None:
             others = fits.threshold_frames(self.left_out, kind, self.level)[:, place]
             return estimates.jackknife_error(np.log(others)) if (others > 0).all() else None
@@ -201,7 +201,7 @@ def why_no_fit(counts: Counts) -> str:
     if not shown.any():
         return "no answers"
     if not shown[counts.differences == 0].any():
-        return "no pairs without a difference were answered, so the criterion can't be told from the sensitivity"
+        return "no pairs without a difference were answered, so criterion and sensitivity cannot be separated"
     if not shown[counts.differences != 0].any():
         return "no pairs with a difference were answered"
     if different.sum() in (0, shown.sum()):
@@ -213,13 +213,11 @@ def why_no_fit(counts: Counts) -> str:
 def _caution(best: fits.Fits) -> str:
     notes = []
     if best.held[0, 0]:
-        notes.append("the criterion stands at the bound of its range")
+        notes.append("the criterion is at the bound of its range")
     if best.held[0, 2:].any():
-        notes.append(
-            "a slope stands at the bound of its range: the answers show no effect of the difference, or no error"
-        )
+        notes.append("a slope is at the bound of its range: the answers show no effect of the difference, or no error")
     if not best.settled[0]:
-        notes.append("the search for the maximum did not come to rest")
+        notes.append("the search for the maximum did not converge")
     return "; ".join(notes)
 
 
@@ -245,15 +243,15 @@ def _threshold(
 ) -> Threshold:
     """One threshold, with Student's interval of its logarithm."""
     side, clustered = SIDES[index], spread.left_out is not None
-    who = "jackknife over participants" if clustered else "one participant, answers as independent"
+    who = "jackknife over participants" if clustered else "one participant, answers treated as independent"
     method = f"differencing model; Student interval of the logarithm, {who}"
     found = float(fits.threshold_frames(best, kind, spread.level)[0, place])
     interval = estimates.Interval(None, None, confidence)
     if best.held[0, 2 + place]:
-        note = "the slope stands at the bound of its range"
+        note = "the slope is at the bound of its range"
         return Threshold(side, None, None, interval, "not estimable", method, note)
     if found <= 0:
-        note = f"above {100 * spread.level:g}% already where there is no difference"
+        note = f"above {100 * spread.level:g}% even without a difference"
         return Threshold(side, None, None, interval, "above", method, note)
     error = spread.log_threshold_error(best, kind, place) if math.isfinite(found) else None
     if error is not None:
@@ -298,5 +296,5 @@ def _equal_slopes(
         t=statistic,
         t_degrees_of_freedom=freedom if told else None,
         p_value_participants_independent=estimates.t_probability(statistic, freedom) if statistic is not None else None,
-        note="" if told else "participants' slopes don't spread so that they could be judged by",
+        note="" if told else "participants' slopes vary too little for a test",
     )

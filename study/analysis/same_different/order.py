@@ -72,7 +72,7 @@ def order_test(given: pd.DataFrame) -> OrderTest:
     different = (known["answer"] == "different").astype(float)
     first = known["reference_first"].astype(bool)
     if first.all() or not first.any():
-        return OrderTest(note="every pair came in one and the same order")
+        return OrderTest(note="every pair was shown in the same order")
     keys = [known["participant"].astype(str), known["difference_frames"], first]
     shares = different.groupby(keys).mean().unstack().dropna()
     gaps = (shares[True] - shares[False]).groupby(level=0).mean().to_numpy(dtype=np.float64)

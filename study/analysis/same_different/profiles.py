@@ -22,7 +22,7 @@ WIDEST_PROFILE = 4.0
 def profile_intervals(counts: Counts, level: float = 0.75, confidence: float = 0.95) -> dict[Side, Interval]:
     """Return intervals of the just noticeable difference by profile likelihood, by side; all answers as independent.
 
-    Where participants differ these are too narrow: the jackknife's stand beside them. An end beyond the levels shown
+    Where participants differ these are too narrow: the jackknife's are given alongside. An end beyond the levels shown
     is open.
     """
     present = counts.shown.sum(axis=0) > 0

@@ -26,7 +26,7 @@ class Threshold:
     standard_error
         Frames.
     interval
-        Frames; an open end lies outside the levels shown, or can't be told.
+        Frames; an open end lies outside the levels shown, or can't be determined.
     status
         "reached"; "not reached" within the levels shown; "above": the curve is above the level at the smallest
         difference shown; "not estimable".

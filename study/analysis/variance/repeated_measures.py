@@ -51,7 +51,7 @@ class WithinEffect(Sizes):
 
 @dataclass(frozen=True, kw_only=True)
 class Likeness:
-    """How alike the values of one participant are, and what that does to tests that take them for independent.
+    """How similar the values of one participant are, and what that does to tests that treat them as independent.
 
     The correlation is of consistency, groups and columns taken out, and below zero where people are more alike than
     chance would have it; the effects are by how much the error variance of a comparison between groups is larger, and
@@ -107,7 +107,7 @@ def mixed_design(
     count = int(code.max()) + 1 if people else 0
     left = people - count
     if left < 1:
-        return f"{counted(people, 'participant')} in {counted(count, 'group')}: too few to see how participants differ"
+        return f"{counted(people, 'participant')} in {counted(count, 'group')}: too few to estimate differences"
     if min(levels) < 2:
         return "a factor with one level: nothing to compare"
     design = np.column_stack([np.ones(people), sum_to_zero(code, count)])
@@ -121,7 +121,7 @@ def mixed_design(
 
 
 def likeness(values: ArrayLike, groups: Sequence[Any] | NDArray[Any]) -> Likeness:
-    """Return how alike the values of one participant are, and what that does to tests that take them for independent.
+    """Return how similar the values of one participant are, and what that does to tests that treat them as independent.
 
     Parameters
     ----------

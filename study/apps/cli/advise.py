@@ -27,21 +27,21 @@ POINT = (("_frame", "d"), ("_s", ".2f"), ("_file_frame", ".5g"))
 @click.command()
 @click.argument("motions", nargs=-1, metavar="CLIPS...")
 @clips_options
-@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate.")
+@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at.")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for advice.csv, advice.json, and a strip of each transition.",
 )
-@click.option("--no-strips", is_flag=True, help="Write the tables alone.")
+@click.option("--no-strips", is_flag=True, help="Write only the tables.")
 @json_option
 def advise(
     motions: tuple[str, ...], library: str | None, fps: float, out: Path | None, no_strips: bool, as_json: bool
 ) -> None:
-    """For each pair of CLIPS, both ways: a transition point, a blend length, and how far that is from ten frames.
+    """A transition point and a blend length for each ordered pair of CLIPS, and its difference from ten frames.
 
-    CLIPS are motion files, or names of motions in --library; all of the library where none is named. The method is the
-    one that suits the motion (Wang & Bodenheimer 2004): geodesic where one of the two is cyclic, else velocity.
+    CLIPS are motion files, or names of motions in --library; the whole library if none is named. The method suits
+    the motion (Wang & Bodenheimer 2004): geodesic if one of the two is cyclic, else velocity.
     """
     from study.errors import SegueError
     from study.files import check_place

@@ -27,7 +27,7 @@ def as_is_option(command: Command) -> Command:
         is_flag=True,
         expose_value=False,
         callback=keep,
-        help="Keep the defects of motion files, such as an added T-pose, and their floor and place.",
+        help="Use motion files as they are, with their defects (such as an added T-pose), floor and position.",
     )(command)
 
 

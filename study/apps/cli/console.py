@@ -37,8 +37,8 @@ def database_option(command: Command) -> Command:
         metavar="FILE|URL",
         envvar="SEGUE_DATABASE",
         show_envvar=True,
-        help="Where answers are: a file, or postgresql+psycopg://USER@HOST/NAME; responses.sqlite in the results "
-        "folder unless given.",
+        help="Database of responses: a file, or postgresql+psycopg://USER@HOST/NAME (default: responses.sqlite in the "
+        "results folder).",
     )(command)
 
 

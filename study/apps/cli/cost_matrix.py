@@ -23,19 +23,21 @@ LABELS = {"joint": "cost, squared half angles and metres", "pointcloud": "mean s
 @click.argument("source", metavar="SRC")
 @click.argument("destination", metavar="DST")
 @clips_options
-@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate.")
+@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at.")
 @click.option("--metric", type=click.Choice(list(LABELS)), default="joint", show_default=True)
 @click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)
-@click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of the velocities.")
+@click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of velocities.")
 @click.option(
     "--root",
     type=click.Choice(["matched", "world", "none"]),
     default="matched",
     show_default=True,
-    help="What of the root counts: its height, since a transition matches place and facing; all of it; nothing.",
+    help="Which part of the root counts: its height, since a transition aligns position and facing; all of it; none.",
 )
-@click.option("--window", type=click.IntRange(min=1), help="Frames of a point cloud; a third of a second unless given.")
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="X.npy, or X.png: darker is cheaper.")
+@click.option("--window", type=click.IntRange(min=1), help="Frames of a point cloud (default: a third of a second).")
+@click.option(
+    "--out", type=click.Path(dir_okay=False, path_type=Path), help="X.npy, or X.png (darker is a lower cost)."
+)
 @json_option
 def cost_matrix(
     source: str,
@@ -50,7 +52,7 @@ def cost_matrix(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """The cost of a transition between all frames of SRC and DST (Wang & Bodenheimer 2003), and where it is least."""
+    """The cost of a transition between all frames of SRC and DST (Wang & Bodenheimer 2003), and its minimum."""
     from study.transitions.cost_matrix import extremes, joint_blocks, pointcloud_blocks
 
     if out is not None and out.suffix.lower() not in (".npy", ".png"):

@@ -11,7 +11,7 @@ from study.apps.cli.console import emit, json_option
 @click.option("--quiet", is_flag=True, help="Print nothing; the exit status says whether stimuli can be rendered.")
 @json_option
 def doctor(quiet: bool, as_json: bool) -> None:
-    """What is here to render stimuli with, and what to install for better. Exit status 2 where something is missing."""
+    """What this machine has for rendering stimuli, and what to install. Exit status 2 if something is missing."""
     from renderer.context import describe
 
     found = describe()

@@ -18,17 +18,17 @@ from study.counting import counted
     type=click.Choice(["csv", "psych-ds", "bids"]),
     default="csv",
     show_default=True,
-    help="One table; or a folder in the form of Psych-DS or BIDS, described column by column.",
+    help="One table, or a folder in the format of Psych-DS or BIDS, with a description of each column.",
 )
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="File (csv) or folder; RESULTS/answers.csv, RESULTS/psych-ds or RESULTS/bids unless given.",
+    help="File (csv) or folder (default: RESULTS/answers.csv, RESULTS/psych-ds or RESULTS/bids).",
 )
 @database_option
 @json_option
 def export(results: Path, kind: str, out: Path | None, database: str | None, as_json: bool) -> None:
-    """All answers for other programs and for archives."""
+    """Export all responses for other programs and for archives."""
     from study.experiment.folder import PROTOCOL
     from study.experiment.protocol.whole import load_protocol
     from study.experiment.store.export import export as export_folder

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Read = tuple["Trials | ForeignAnswers", Callable[[], object]]
 """What was read, and its analysis: what JSON can be made of, with `answer` in words."""
 
-# What each task takes besides the columns that all have; any other of these options is refused with it.
+# The options of each task, in addition to the common ones; others are refused.
 OWN = {
     "2afc": ("level", "shown", "yes", "sigmoid", "choices", "lapse"),
     "yes-no": ("level", "shown", "yes", "sigmoid", "guess", "lapse"),
@@ -162,37 +162,37 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 @click.command()
 @click.argument("data", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--task", type=click.Choice(list(FITS)), required=True)
-@click.option("--answer", required=True, help="Column of the answer: right or wrong, yes or no, same or different, "
+@click.option("--answer", required=True, help="Column of the response: right or wrong, yes or no, same or different, "
               "first or second (or the method chosen), a rating.")  # fmt: skip
 @click.option("--level", help="Column of the stimulus level (same-different: the signed difference).")
-@click.option("--participant", help="Column that says who answered; one participant unless given.")
-@click.option("--shown", help="Column with the number of answers a row stands for; then --answer counts them.")
+@click.option("--participant", help="Column of the participant (default: one participant).")
+@click.option("--shown", help="Column with the number of responses that a row stands for; --answer then counts them.")
 @click.option("--yes", multiple=True, help="What counts as right, yes, different or first; may be repeated.")
 @click.option("--tie", multiple=True, help="Preference: what counts as neither; may be repeated.")
-@click.option("--where", multiple=True, help="COLUMN=VALUE: take only these rows; may be repeated.")
+@click.option("--where", multiple=True, help="COLUMN=VALUE: use only these rows; may be repeated.")
 @click.option("--order", help="Same-different: column that says which of a pair came first.")
-@click.option("--reference-first", help="Same-different: what it holds where the reference came first.")
+@click.option("--reference-first", help="Same-different: its value if the reference came first.")
 @click.option("--first", help="Preference: column of the method shown first.")
 @click.option("--second", help="Preference: column of the method shown second.")
 @click.option("--method", help="Rating: column of the method.")
 @click.option("--motion", help="Preference, rating: column of the motion.")
 @click.option("--item", help="Rating: column of the question.")
-@click.option("--scale", multiple=True, help="Rating: WORD=POINT, where words stand for points; once for each word.")
+@click.option("--scale", multiple=True, help="Rating: WORD=POINT, if the scale has words; once for each word.")
 @click.option("--ends", type=(float, float), help="Rating: lowest and highest point of the scale.")
 @click.option("--sigmoid", type=click.Choice(["normal", "logistic", "gumbel", "weibull"]), help="[default: normal]")
-@click.option("--choices", type=click.IntRange(min=2), help="2afc: of how many.  [default: 2]")
-@click.option("--guess", type=click.FloatRange(0, 1, max_open=True), help="Hold the guess rate (yes-no).")
-@click.option("--lapse", type=click.FloatRange(0, 1, max_open=True), help="Hold the lapse rate.")
+@click.option("--choices", type=click.IntRange(min=2), help="2afc: number of alternatives.  [default: 2]")
+@click.option("--guess", type=click.FloatRange(0, 1, max_open=True), help="Fix the guess rate (yes-no).")
+@click.option("--lapse", type=click.FloatRange(0, 1, max_open=True), help="Fix the lapse rate.")
 @click.option("--threshold", type=click.FloatRange(0.5, 1, True, True), help="Same-different.  [default: 0.75]")
 @click.option("--alpha", type=click.FloatRange(0, 1, True, True), help="Preference, rating.  [default: 0.05]")
 @click.option("--confidence", type=click.FloatRange(0.5, 1, True, True), default=0.95, show_default=True)
 @click.option(
-    "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "pipe", "space"]), help="Found out unless given."
+    "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "pipe", "space"]), help="Detected by default."
 )
-@click.option("--decimal", type=click.Choice(["point", "comma"]), help="Found out unless given.")
+@click.option("--decimal", type=click.Choice(["point", "comma"]), help="Detected by default.")
 @json_option
 def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
-    """Analyse data that another program wrote (PsychoPy, jsPsych, Gorilla): CSV or JSON, with its columns named here.
+    """Analyse data from another program (PsychoPy, jsPsych, Gorilla): CSV or JSON, with its columns named here.
 
     Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
     """

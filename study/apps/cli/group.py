@@ -114,7 +114,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except (SegueError, RendererError) as refusal:
         return _refuse(str(refusal))
     except (KeyboardInterrupt, click.Abort):
-        say("segue: interrupted; what was finished is kept, and the same command goes on from there.")
+        say("segue: interrupted; finished work is kept, and the same command resumes.")
         return 130
     except SystemExit:
         # The reader of our output went away (`segue ... | head`), at which click wraps the streams and exits: no fault.

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 @click.group()
 def motions() -> None:
-    """List motions, inspect a file for what is wrong with it, download CMU trials."""
+    """List motions, inspect a file for defects, download CMU trials."""
 
 
 @motions.command("list")
 @library_option
-@click.option("--write", is_flag=True, help="Write a first library.toml into the folder, to be completed by hand.")
+@click.option("--write", is_flag=True, help="Write a first library.toml into the folder, for you to complete.")
 @json_option
 def list_motions(library: str | None, write: bool, as_json: bool) -> None:
-    """The motions that a library offers, by name."""
+    """The motions of a library, by name."""
     from study.motion.library import FolderLibrary, open_library
     from study.motion.library_file import NAME, write_library_file
 
@@ -91,12 +91,12 @@ def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
 @click.option(
     "--metres-per-unit", type=click.FloatRange(min=0, min_open=True), help="The file's length unit, in metres."
 )
-@click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, where the file does not say it.")
+@click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, if the file does not say it.")
 @json_option
 def inspect(file: str, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
-    """What a motion file holds, and what is wrong with it.
+    """The content of a motion file, and its defects.
 
-    The options, else the file's library.toml, say what the file itself leaves open.
+    The options, or the file's library.toml, supply what the file does not say.
     """
     from study.motion.defects import find_defects
     from study.motion.entries import entry_of_file, read_entry
@@ -150,7 +150,7 @@ def _nothing_found(skeleton: Skeleton) -> str:
 
 @motions.command()
 @click.argument("trials", nargs=-1, required=True, metavar="TRIAL...")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder to fill.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder to download into.")
 @json_option
 def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
     """Download trials such as 16_35, or motions such as run, from the CMU Graphics Lab's official site."""
@@ -169,7 +169,7 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 @click.argument("clip", metavar="FILE|NAME")
 @clips_options
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.mp4, or X.png: a strip.")
-@click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video; the clip's own unless given.")
+@click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video (default: that of the clip).")
 @click.option(
     "--view", type=click.Choice(["front", "side", "three-quarter"]), default="three-quarter", show_default=True
 )
@@ -177,7 +177,7 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 @click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Of the video, in pixels.")
 @click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Of the strip.")
 @click.option("--floor", is_flag=True, help="Draw the ground, with contact shadows.")
-@click.option("--track", is_flag=True, help="Let the camera travel with the figure.")
+@click.option("--track", is_flag=True, help="Let the camera follow the figure.")
 @json_option
 def preview(
     clip: str,
@@ -192,7 +192,7 @@ def preview(
     track: bool,
     as_json: bool,
 ) -> None:
-    """One clip as a video, or as a strip of poses in one picture."""
+    """One clip as a video, or as a strip of poses in one image."""
     from study.motion.drawing import draw_clip
 
     width, _, height = size.partition("x")

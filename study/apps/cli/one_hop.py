@@ -21,7 +21,7 @@ TABLE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 @click.group("one-hop")
 def one_hop() -> None:
-    """Transitions by an intermediate clip, the best for every triggered frame (Koyama & Goto 2019)."""
+    """The best transitions through an intermediate clip, for every triggered frame (Koyama & Goto 2019)."""
 
 
 def load_clips(specs: tuple[str, ...], library: str | None, fps: float) -> tuple[Clip, ...]:
@@ -55,37 +55,43 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.npz, or X.bin and X.json."
 )
-@click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Work at this rate.")
+@click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frame rate to work at.")
 @click.option(
-    "--pair", "pairs", type=(str, str), multiple=True, metavar="SRC DST", help="A transition; all unless given."
+    "--pair", "pairs", type=(str, str), multiple=True, metavar="SRC DST", help="A transition to build (default: all)."
 )
 @click.option(
-    "--offset", type=int, help="Frame of SRC at which DST stands with its first frame (music); 0 unless given."
+    "--offset",
+    type=int,
+    help="Frame of SRC with which DST's frame 0 always aligns, as in dancing to music (default: 0).",
 )
 @click.option(
-    "--start", type=click.IntRange(min=0), help="Instead: the frame of DST that belongs to the triggered frame."
+    "--start",
+    type=click.IntRange(min=0),
+    help="Instead: the frame at which DST enters whenever triggered, as in a jump.",
 )
-@click.option("--blend", type=click.IntRange(min=1), help="Frames of each blend; 0.5 s unless given.")
-@click.option("--stay", type=click.IntRange(min=0), help="Longest stay in source and hop, frames; 1 s unless given.")
+@click.option("--blend", type=click.IntRange(min=1), help="Frames of each blend (default: 0.5 s).")
+@click.option("--stay", type=click.IntRange(min=0), help="Longest stay in source and hop, frames (default: 1 s).")
 @click.option("--longest", type=click.IntRange(min=1), help="Longest transition, frames, both blends included.")
-@click.option("--weight", type=click.FloatRange(min=0), help="Cost a frame of stay; found as in Eq. 5 unless given.")
+@click.option("--weight", type=click.FloatRange(min=0), help="Cost of a frame of stay (default: Eq. 5).")
 @click.option("--times", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Multiply that weight.")
 @click.option("--seed", type=int, default=0, show_default=True, help="For the weight of Eq. 5.")
 @click.option("--distance", type=click.Choice(["pointcloud", "joint"]), default="pointcloud", show_default=True)
 @click.option("--adaptive", is_flag=True, help="Blend lengths by the geodesic method of 2004; needs --weight.")
-@click.option("--on-beat", is_flag=True, help="Keep beats on beats; they are found in the motions, or see --beats.")
+@click.option("--on-beat", is_flag=True, help="Align beats with beats, estimated from the motions or given by --beats.")
 @click.option(
     "--beats", type=(str, TABLE), multiple=True, metavar="CLIP FILE", help="Times of a clip's beats, seconds."
 )
-@click.option("--near-direct", type=click.IntRange(min=0), help="The hop is DST, at most so many frames out of place.")
-@click.option("--workers", type=click.IntRange(min=1), help="Threads; one a core unless given.")
-@click.option("--memory-gb", type=click.FloatRange(min=0.05), default=2.0, show_default=True, help="Work in so much.")
+@click.option(
+    "--near-direct", type=click.IntRange(min=0), help="The hop is DST itself, shifted by at most this many frames."
+)
+@click.option("--workers", type=click.IntRange(min=1), help="Threads (default: one a core).")
+@click.option("--memory-gb", type=click.FloatRange(min=0.05), default=2.0, show_default=True, help="Memory limit.")
 @json_option
 def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as_json: bool, **options: Any) -> None:
-    """Find the best transition between CLIPs for every triggered frame, and keep them in a table.
+    """Find the best transition between CLIPs for every triggered frame, and write a table of them.
 
-    Clips are motion files, or names of motions in --library. All of them may be hops. Interrupted work goes on from
-    where it was with the same command.
+    Clips are motion files, or names of motions in --library. All of them may be hops. The same command
+    resumes an interrupted build.
     """
     import numpy as np
 
@@ -232,7 +238,7 @@ def beat_offsets(
 @click.option("--at", "places", type=(str, str, int), multiple=True, metavar="SRC DST FRAME", help="Show this entry.")
 @json_option
 def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -> None:
-    """What a table holds, and single entries of it."""
+    """The content of a table, and single entries of it."""
     from study.transitions.one_hop.table import header, read_table
 
     held = read_table(table)
@@ -269,8 +275,10 @@ def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -
 @click.argument("table", type=TABLE)
 @click.argument("clips", metavar="[CLIP...]", nargs=-1)
 @clips_options
-@click.option("--first", metavar="CLIP", help="The state to start in; the first clip unless given.")
-@click.option("--trigger", "triggers", type=(int, str), multiple=True, metavar="FRAME DST", help="Go to DST then.")
+@click.option("--first", metavar="CLIP", help="The state to start in (default: the first clip).")
+@click.option(
+    "--trigger", "triggers", type=(int, str), multiple=True, metavar="FRAME DST", help="At this frame, change to DST."
+)
 @click.option("--method", type=click.Choice(["one-hop", "direct"]), default="one-hop", show_default=True)
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png.")
 @json_option
@@ -284,9 +292,9 @@ def play(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Play clips as the states of a machine, with transitions from a table, and write the motion.
+    """Play clips as the states of a state machine, with transitions from a table, and write the motion.
 
-    CLIPs are the table's, in its order; where none are given, motions of --library by the table's names.
+    CLIPs are those of the table, in its order (default: the motions of --library with the table's names).
     """
     from study.motion.drawing import draw_clip
     from study.motion.readers.bvh_writing import write_bvh

@@ -29,17 +29,17 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("protocol")
-@click.option("--participant", required=True, metavar="ID", help="Who takes part, such as p01; the same ID goes on.")
-@click.option("--group", type=click.IntRange(min=0), default=0, show_default=True, help="For orders by group.")
-@click.option("--seed", type=click.IntRange(min=0), help="Of the trials' order, instead of the protocol's own.")
+@click.option("--participant", required=True, metavar="ID", help="Participant, such as p01; the same ID resumes.")
+@click.option("--group", type=click.IntRange(min=0), default=0, show_default=True, help="Group, for orders by group.")
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of the order of trials (default: the protocol's).")
 @library_option
 @OUT
 @database_option
-@click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Whose full screen it takes.")
-@click.option("--windowed", is_flag=True, help="In a window, not on the full screen.")
+@click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Monitor to use.")
+@click.option("--windowed", is_flag=True, help="Use a window instead of the full screen.")
 @click.option("--size", default="1280x800", show_default=True, metavar="WIDTHxHEIGHT", help="Of the window.")
-@click.option("--actual-size", is_flag=True, help="Show stimuli in the protocol's pixels, not as large as fits.")
-@click.option("--font", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="For other scripts.")
+@click.option("--actual-size", is_flag=True, help="Show stimuli in the protocol's pixels instead of as large as fits.")
+@click.option("--font", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Font for other scripts.")
 @json_option
 def play(
     protocol: str,
@@ -56,9 +56,9 @@ def play(
     font: Path | None,
     as_json: bool,
 ) -> None:
-    """A session in a window: stimuli drawn live, every flip timed, every answer stored before the next trial.
+    """A session in a window: stimuli drawn live, every flip timed, every response stored before the next trial.
 
-    Stopped or killed, the same command goes on where it was. Escape asks whether to stop.
+    If it was stopped or killed, the same command resumes it. Escape asks whether to stop.
     """
     from renderer.window import check_display
     from study.experiment.stimuli.manifest import record
@@ -94,7 +94,7 @@ def _size(text: str) -> tuple[int, int]:
 def the_plan(
     responses: Responses, protocol: Protocol, stimuli: StimulusSet, participant: str, seed: int | None, group: int
 ) -> Plan:
-    """The stored plan of a participant who was here before, else a new one: the same as `simulate` draws."""
+    """The stored plan of a returning participant, else a new one: the same as `simulate` draws."""
     from study.experiment.plan import draw_plan
     from study.experiment.store.sessions import find_session
 
@@ -131,13 +131,13 @@ def _sit(
     store = ResponsesStore(responses, protocol, plan, stimuli.library, stimuli.synthetic)
     answers, passed, finished = store.before()
     if finished:
-        say(f"{plan.participant} has finished before; there is nothing left to do.")
+        say(f"{plan.participant} has already finished; there is nothing left to do.")
         return Outcome("finished", 0, 0, 0), {}
     session = open_session(
         protocol, plan, answers, passed=passed, frames={record.id: record.frames for record in stimuli.records}
     )
     if answers:
-        say(f"{plan.participant} goes on after {counted(len(answers), 'answer')}.")
+        say(f"{plan.participant} resumes after {counted(len(answers), 'answer')}.")
     look, size = page_look(stimuli, session, place.font), place.window_size
     take_precedence()
     with open_window(
@@ -152,7 +152,7 @@ def _leave_a_lost_display(store: Store) -> None:
     """Nothing can be shown or asked any more: say so, and end at once."""
     with suppress(Exception):  # what can be written down is
         store.event("display lost")
-    say("segue: The display is gone. Every answer that was given is stored; the same command goes on from there.")
+    say("segue: The display is gone. Every response is stored; the same command resumes.")
     os._exit(2)
 
 
@@ -183,6 +183,6 @@ def _tell_of_timing(window: Window) -> None:
     else:
         why = "reports no refresh rate" if pacing.reported_hz == 0 else "does not make swaps wait"
         say(
-            f"display: it {why} (a virtual one?), so frames follow an own clock of {pacing.refresh_hz:g} Hz. "
+            f"display: it {why} (a virtual one?), so frames follow a clock of {pacing.refresh_hz:g} Hz. "
             "TIMING WAS NOT MEASURED in this session; its record says so."
         )

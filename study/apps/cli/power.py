@@ -65,13 +65,13 @@ def _sizes(text: str) -> list[int]:
 
 @click.command()
 @click.argument("protocol")
-@click.option("--study", "name", help="Name of the study; the only one unless given.")
-@click.option("--participants", default="8,12,16,24,35,50", show_default=True, help="Numbers to try.")
+@click.option("--study", "name", help="Name of the study (not needed if there is only one).")
+@click.option("--participants", default="8,12,16,24,35,50", show_default=True, help="Numbers of participants to try.")
 @click.option("--target", type=click.FloatRange(0, 1, True, True), default=0.8, show_default=True, help="Power.")
 @click.option("--share", type=click.FloatRange(0, 1, True, True), default=0.65, show_default=True,
               help="Preference: true share for the first method.")  # fmt: skip
 @click.option("--correlation", type=click.FloatRange(0, 0.9), default=0.1, show_default=True,
-              help="Preference, rating: intraclass correlation of a participant's answers.")  # fmt: skip
+              help="Preference, rating: intraclass correlation of a participant's responses.")  # fmt: skip
 @click.option("--order-bias", type=float, default=0.1, show_default=True, help="Preference: logits for the first.")
 @click.option("--difference", type=float, default=0.7, show_default=True,
               help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
@@ -82,14 +82,16 @@ def _sizes(text: str) -> list[int]:
 @click.option("--spread", type=click.FloatRange(0, 1), default=0.15, show_default=True,
               help="Same-different: how participants differ.")  # fmt: skip
 @click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
-              help="Same-different: half the width asked of the 95% intervals, frames.")  # fmt: skip
+              help="Same-different: required half-width of the 95% intervals, frames.")  # fmt: skip
 @click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=0.005, show_default=True,
-              help="Share of answers missed by inattention, besides those that come too late.")  # fmt: skip
+              help="Share of trials without a response because of inattention, besides late responses.")  # fmt: skip
 @click.option("--studies", type=click.IntRange(min=10), help="Simulated studies.  [default: 1000; thresholds 200]")
-@click.option("--sessions", is_flag=True, help="Through whole sessions and the whole analysis: slow, and the same.")
+@click.option(
+    "--sessions", is_flag=True, help="Simulate whole sessions and the whole analysis: slow, with the same result."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path),
-              help="Results folder that gets power_STUDY.json and .csv; its report shows them.")  # fmt: skip
+              help="Results folder for power_STUDY.json and .csv, which its report shows.")  # fmt: skip
 @library_option
 @json_option
 def power(
@@ -101,7 +103,7 @@ def power(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """How many participants a protocol needs, at stated effects, by simulation."""
+    """How many participants a protocol needs for given effects, by simulation."""
     from study.analysis.exclusions import rules_of
     from study.analysis.to_json import to_json
     from study.apps.cli.shared import load

@@ -26,26 +26,36 @@ from study.apps.cli.shared import (
 @WORKERS
 @database_option
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0 for all.")
-@click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="0 for any free one.")
-@click.option("--participants", type=click.IntRange(min=1), help="No more than so many; drop-outs are given back.")
 @click.option(
-    "--groups", type=click.IntRange(min=1), help="Groups to fill evenly; what the protocol needs unless given."
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8000,
+    show_default=True,
+    help="Port; Port; Port; Port; Port; 0 for any free one.",
 )
-@click.option("--parameter", "parameters", multiple=True, metavar="NAME", help="Keep this parameter of the link, too.")
+@click.option(
+    "--participants", type=click.IntRange(min=1), help="Most participants; places of drop-outs become available again."
+)
+@click.option("--groups", type=click.IntRange(min=1), help="Groups to fill evenly (default: what the protocol needs).")
+@click.option("--parameter", "parameters", multiple=True, metavar="NAME", help="Also store this parameter of the link.")
 @click.option("--completion-code", default="", help="Shown at the end.")
-@click.option("--completion-url", default="", metavar="URL", help="Where the last button leads.")
+@click.option("--completion-url", default="", metavar="URL", help="Address behind the last button.")
 @click.option(
-    "--researcher-token", envvar="SEGUE_RESEARCHER_TOKEN", help="Made up unless given; 16 characters or more."
+    "--researcher-token",
+    envvar="SEGUE_RESEARCHER_TOKEN",
+    help="At least 16 characters (default: a new one at each start).",
 )
-@click.option("--behind-proxy", is_flag=True, help="Believe the proxy on this machine about https and addresses.")
+@click.option("--behind-proxy", is_flag=True, help="Trust X-Forwarded-* headers from a local reverse proxy.")
 @click.option(
     "--public-url",
     "public_urls",
     multiple=True,
     metavar="URL",
-    help="Address that participants open, where its name is not this machine's own, as behind a proxy.",
+    help="Address that participants open, if it is not this machine's own name, as behind a proxy.",
 )
-@click.option("--root-path", default="", metavar="PATH", help="Where the proxy shows this study, such as /study.")
+@click.option(
+    "--root-path", default="", metavar="PATH", help="Path under which the proxy shows this study, such as /study."
+)
 def serve(
     protocol: str,
     library: str | None,
@@ -64,9 +74,9 @@ def serve(
     public_urls: tuple[str, ...],
     root_path: str,
 ) -> None:
-    """Sessions in the browser. What is not rendered yet is rendered first; ends with Ctrl-C, and goes on from there.
+    """Sessions in the browser. Renders missing stimuli first; Ctrl-C stops it, the same command resumes.
 
-    A results folder that is rendered whole is served as it is, without --library, on any machine.
+    A completely rendered results folder can be served on any machine without --library.
     """
     from study.apps.server.names import own_names
     from study.apps.server.running import run
@@ -107,7 +117,7 @@ def serve(
             say(
                 "Only localhost, this machine's name and IP addresses are answered: give the proxy's with --public-url."
             )
-        say("Ctrl-C ends it; the same command goes on from there.")
+        say("Ctrl-C stops it; the same command resumes.")
 
     run(
         checked,

@@ -20,9 +20,9 @@ OUT = click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     default=None,
-    help="Results folder; results/<name of the protocol> unless given.",
+    help="Results folder (default: results/<name of the protocol>).",
 )
-WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes; one a core unless given.")
+WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes (default: one a core).")
 
 
 def load(protocol: str) -> Protocol:
@@ -33,7 +33,7 @@ def load(protocol: str) -> Protocol:
 
 
 def load_for_people(protocol: str) -> Protocol:
-    """A protocol that people are about to read; what has still to be written in it is said on standard error."""
+    """A protocol that people are about to read; what is still to be written in it is reported on standard error."""
     from study.experiment.protocol.proofreading import to_do
 
     loaded = load(protocol)

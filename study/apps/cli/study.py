@@ -39,7 +39,7 @@ def simulate_participants(
 ) -> dict[str, Any]:
     """Simulated sessions on the stimuli of a results folder; the numbers for `--json`.
 
-    `goes_wrong` are shares of the observers' settings, such as `missed`; the usual ones where they are left out.
+    `goes_wrong` are shares of the observers' settings, such as `missed`; by default the usual ones.
     """
     from study.experiment.simulation import simulate as simulate_all
     from study.experiment.stimuli.manifest import read_manifest
@@ -79,12 +79,12 @@ def analyse_results(folder: Path, database: str | None = None) -> Analysis:
 @click.command()
 @click.argument("protocol")
 @library_option
-@click.option("--texts", is_flag=True, help="Print all that participants read, too.")
+@click.option("--texts", is_flag=True, help="Also print everything that participants read.")
 @json_option
 def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> None:
-    """Check a protocol before running it: what will be shown, every error, and any text that is still to be written.
+    """Check a protocol before running it: what will be shown, every error, and any text you have still to write.
 
-    Exit status 2 where something can't be shown.
+    Exit status 2 if something can't be shown.
     """
     from study.experiment.protocol.proofreading import to_do
     from study.experiment.stimuli.outlook import look_ahead
@@ -121,7 +121,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
 @WORKERS
 @json_option
 def render(protocol: str, library: str | None, out: Path | None, workers: int | None, as_json: bool) -> None:
-    """Render all stimuli of a protocol; what is rendered already is reused, so an interrupted run goes on."""
+    """Render all stimuli of a protocol; existing ones are reused, so an interrupted run resumes."""
     from study.experiment.stimuli.rendering import rendered_already
     from study.motion.library import open_library
 
@@ -142,13 +142,19 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
 
 @click.command()
 @click.argument("protocol")
-@click.option("--participants", type=click.IntRange(min=1), help="How many in the end; the protocol's unless given.")
-@click.option("--seed", type=click.IntRange(min=0), help="Of the observers' chance; the protocol's unless given.")
 @click.option(
-    "--missed", type=SHARE, default=0.005, show_default=True, help="Share of answers missed, slow ones apart."
+    "--participants", type=click.IntRange(min=1), help="Total number of participants (default: the protocol's)."
 )
-@click.option("--badly-shown", type=SHARE, default=0.0, show_default=True, help="Share of showings that stall.")
-@click.option("--careless", type=SHARE, default=0.0, show_default=True, help="Share of participants who do not look.")
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of the observers (default: the protocol's).")
+@click.option(
+    "--missed",
+    type=SHARE,
+    default=0.005,
+    show_default=True,
+    help="Share of trials without a response, besides late responses.",
+)
+@click.option("--badly-shown", type=SHARE, default=0.0, show_default=True, help="Share of presentations that stall.")
+@click.option("--careless", type=SHARE, default=0.0, show_default=True, help="Share of participants who do not watch.")
 @library_option
 @OUT
 @database_option
@@ -163,7 +169,7 @@ def simulate(
     as_json: bool,
     **goes_wrong: float,
 ) -> None:
-    """Sessions by simulated observers, marked as simulated for ever. Needs no videos, only the stimuli's record."""
+    """Sessions of simulated observers, always marked as simulated. Needs no videos, only the record of the stimuli."""
     from study.experiment.folder import MANIFEST, PROTOCOL
     from study.experiment.stimuli.manifest import record
     from study.files import read_text
@@ -202,12 +208,12 @@ def analyse(results: Path, database: str | None, as_json: bool) -> None:
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the page, tables and figures; the results folder unless given.",
+    help="Folder for the page, tables and figures (default: the results folder).",
 )
 @database_option
 @json_option
 def report(results: Path, out: Path | None, database: str | None, as_json: bool) -> None:
-    """One self-contained HTML page, and its tables as CSV and JSON."""
+    """Write the report: one self-contained HTML page, and its tables as CSV and JSON."""
     from study.report.document import write_report
 
     page = write_report(results, out=out, database=database)
@@ -220,7 +226,7 @@ def report(results: Path, out: Path | None, database: str | None, as_json: bool)
 @click.option("--participants", type=click.IntRange(min=1), default=12, show_default=True, help="Simulated.")
 @json_option
 def demo(out: Path | None, workers: int | None, participants: int, as_json: bool) -> None:
-    """A small study end to end, with no screen and no network: stimuli, simulated observers, analysis, report."""
+    """A small study from end to end, without screen or network: stimuli, simulated observers, analysis, report."""
     from study.analysis.analyse import analysis_json
     from study.report.document import write_report
 

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
     from study.transitions.timewarp import WarpLength
 
 LENGTHS = {name: one.length for name, one in METHODS.items() if one.length.windows and not one.make.sets_span}
-"""Methods whose blend stands between two given frames, and the length of each."""
+"""Methods whose blend lies between two given frames, and the length of each."""
 
 
 def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Adds the two clips, the frames that a transition joins, and the frame rate to a verb."""
     for decorate in (
-        click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate."),
+        click.option(
+            "--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at."
+        ),
         click.option("--end", type=click.IntRange(min=0), required=True, help="Last blended frame, in DST."),
         click.option("--start", type=click.IntRange(min=0), required=True, help="First blended frame, in SRC."),
         clips_options,
@@ -60,14 +62,14 @@ def specification_option(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command("blend-length")
 @clip_options
 @click.option("--method", type=click.Choice(list(LENGTHS)), default="geodesic", show_default=True)
-@click.option("--fixed-frames", type=click.IntRange(min=1), help="For --method fixed; 0.33 s unless given.")
+@click.option("--fixed-frames", type=click.IntRange(min=1), help="For --method fixed (default: 0.33 s).")
 @weights_option
 @specification_option
-@click.option("--printed-sum", is_flag=True, help="With timewarp: the undivided sum that Eqs. 5 and 6 print.")
+@click.option("--printed-sum", is_flag=True, help="With timewarp: the undivided sum as printed in Eqs. 5 and 6.")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="X.png: the costs as a picture. X.csv: the costs as numbers.",
+    help="X.png: the costs as an image; X.csv: as numbers.",
 )
 @json_option
 def blend_length(
@@ -148,11 +150,11 @@ def _check_two_windows(method: str, specification: str) -> None:
 @click.option(
     "--joint", "joints", multiple=True, metavar="ROLE=FRAMES", help="Blend one joint shorter; can be repeated."
 )
-@click.option("--keep-slide", is_flag=True, help="Leave the feet as blending leaves them, sliding or not.")
+@click.option("--keep-slide", is_flag=True, help="Do not remove the sliding of feet.")
 @click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "in"]),
-    help="Length unit of X.bvh; SRC's own unless given. Its frame rate is SRC's own, too, unless --fps is given.",
+    help="Length unit of X.bvh (default: that of SRC). Its frame rate is that of SRC unless --fps is given.",
 )
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
@@ -238,7 +240,7 @@ def join(
     specification: str = "start-end",
     shorter: dict[str, int] | None = None,
 ) -> tuple[Transition, BlendLength | WarpLength | None]:
-    """The transition of so many frames, or as long as a method says, and what the method found.
+    """The transition of a given or a method's length, and the method's result.
 
     `shorter` has blends of joints' own, by role.
     """

@@ -23,7 +23,7 @@ ANSWERS = {"g": "good", "b": "bad", "s": "skip", "q": "quit"}
 @click.command()
 @click.argument("motions", nargs=-1, required=True, metavar="SRC DST [SRC DST]...")
 @clips_options
-@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Work at this rate.")
+@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at.")
 @click.option("--best", type=click.IntRange(min=0), default=2, show_default=True, help="Best cuts by each metric.")
 @click.option("--worst", type=click.IntRange(min=0), default=1, show_default=True, help="Worst cuts by each metric.")
 @click.option("--random", "at_random", type=click.IntRange(min=0), default=2, show_default=True, help="Random cuts.")
@@ -50,10 +50,10 @@ def label(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Say of cuts between motions whether they are good or bad (Wang & Bodenheimer 2003, section 3).
+    """Judge cuts between motions as good or bad (Wang & Bodenheimer 2003, section 3).
 
-    The cuts are the best, the worst and random ones by several metrics; which, is not shown. The answers are for
-    `segue fit-weights`.
+    The cuts are the best, worst and random ones by several metrics, unlabelled. `segue fit-weights` uses the
+    judgements.
     """
     import numpy as np
 
@@ -95,7 +95,7 @@ def label(
             asked[said] += 1
     text = f"{out}: {asked['good']} good, {asked['bad']} bad, {asked['skip']} skipped"
     if left:
-        text += f"; {left} {noun(left, 'is', 'are')} left: the same command goes on from there"
+        text += f"; {left} {noun(left, 'is', 'are')} left: the same command resumes"
     emit({"file": str(out), **asked, "left": left, "known": len(known)}, as_json, text)
 
 
@@ -136,11 +136,11 @@ def _drawn(source: Clip, destination: Clip, candidate: Candidate, folder: Path, 
 
 @click.command("fit-weights")
 @click.argument("table", metavar="TRANSITIONS.csv", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--library", metavar="NAME|FOLDER", help="Where the motions come from; as the table says unless given.")
+@click.option("--library", metavar="NAME|FOLDER", help="Library of the motions (default: that of the table).")
 @as_is_option
-@click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of the velocities.")
-@click.option("--transfer", nargs=2, metavar="SRC DST", help="A pair of motions that no label is about, to test with.")
-@click.option("--no-cross-validation", is_flag=True, help="Only fit.")
+@click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of velocities.")
+@click.option("--transfer", nargs=2, metavar="SRC DST", help="A pair of motions without labels, to test with.")
+@click.option("--no-cross-validation", is_flag=True, help="Fit only, without cross-validation.")
 @json_option
 def fit_weights(
     table: Path,

@@ -111,7 +111,7 @@ export function play(video, film, fps) {
   });
 }
 
-// The display's refresh rate, from the time between animation frames; null where it can't be told.
+// The display's refresh rate, from the time between animation frames; null where it can't be determined.
 export function refreshRate(samples = 40) {
   return new Promise((resolve) => {
     const times = [];

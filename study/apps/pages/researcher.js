@@ -31,7 +31,7 @@ function sessions(data) {
     one.participant,
     one.group + 1,
     one.state,
-    one.state === "at it" ? one.step : "",
+    one.state === "in progress" ? one.step : "",
     `${one.answers} of ${one.questions}`,
     time(one.began_at),
     time(one.seen_at),
@@ -39,7 +39,7 @@ function sessions(data) {
     one.focus_losses,
     Object.entries(one.parameters).map(([name, value]) => `${name}=${value}`).join(" "),
   ]);
-  return table(["participant", "group", "state", "step", "answers", "began", "last heard of", "faults", "focus lost", "link"], rows);
+  return table(["participant", "group", "state", "step", "answers", "began", "last active", "faults", "focus lost", "link"], rows);
 }
 
 // What went wrong first, then where: "32768 of 315300 bytes · trial 1 · place first".

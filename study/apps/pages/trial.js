@@ -12,7 +12,7 @@ const MOST_RESTARTS = 3;
 export function stage(study) {
   const [width, height] = study.size;
   const room = [Math.min(window.innerWidth - 16, width * 1.5), Math.max(160, window.innerHeight - 150)];
-  // Never larger than the film is, but for very small ones: what is seen is what was rendered.
+  // Never larger than the film is, except for very small ones: what is seen is what was rendered.
   const scale = Math.min(1, room[0] / width, room[1] / height);
   const made = element("div", { class: "stage", "data-focus": true, tabindex: "-1" });
   made.style.width = `${Math.floor(width * scale)}px`;

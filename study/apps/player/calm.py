@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 NICE = -10
-"""How far before other processes; programs that sound and show things in time ask for as much."""
+"""Priority over other processes, as usual for programs with real-time audio or video."""
 
 
 def take_precedence() -> bool:

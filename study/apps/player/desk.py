@@ -25,7 +25,7 @@ _KEPT_PAGES = 6
 
 
 class Stopped(Exception):  # noqa: N818 - not an error: the participant leaves
-    """The participant leaves, from wherever the session stands."""
+    """The participant leaves, at any point of the session."""
 
     def __init__(self, end: str) -> None:
         super().__init__(end)
@@ -70,7 +70,7 @@ class Desk:
         """Show a page until one of its buttons is chosen; the button and when, or None once the time is over."""
         self.window.cursor(True)
         drawn, shown_s = self.show_page(page)
-        # Keys from before the page stood there answer nothing, were they to arrive as late as now or later.
+        # Keys pressed before the page appeared are ignored, even if they arrive later.
         self.notice(self.window.poll())
         while True:
             left = None if deadline_s is None else deadline_s - self.window.now()

@@ -32,7 +32,7 @@ from study.tasks.trial import PLACES
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a sitting ended (`finished`, `stopped`, `declined`), the answers given in it, and flips that were dropped."""
+    """How a session ended (`finished`, `stopped`, `declined`), the answers given in it, and flips that were dropped."""
 
     end: str
     answers: int
@@ -74,7 +74,7 @@ def play(
 
 
 class _Player(Desk):
-    """The state of a sitting: the session, and what was shown of the present trial."""
+    """The state of the player: the session, and what was shown of the current trial."""
 
     def __init__(
         self,
@@ -114,7 +114,7 @@ class _Player(Desk):
         self._rate = rate = find_rate(self.protocol.fps, self.window.pacing.refresh_hz)
         if not rate.even:
             flips = f"{rate.shortest_flips} or {rate.longest_flips} flips of {self.window.pacing.refresh_hz:.4g} Hz"
-            self._say(f"frames of {rate.fps:g} a second stand for {flips}: not all equally long")
+            self._say(f"frames of {rate.fps:g} a second are shown for {flips}: not all equally long")
         self.store.event("display", {**self.window.describe(), **asdict(rate)})
 
     def _check_pages(self) -> None:
@@ -303,14 +303,14 @@ class _Player(Desk):
         self._answers += 1
         self._faulty += not shown_well
         which = f"trial {step.trial}" + (f" {step.item}" if step.item else "")
-        badly = "" if shown_well else f"; shown badly: {', '.join(self._reasons())}"
+        badly = "" if shown_well else f"; display failure: {', '.join(self._reasons())}"
         self._say(f"{which}, showing {step.attempt}: answer stored{badly}")
 
     def _reasons(self) -> list[str]:
         reasons = [*self.faults, *(fault for showing in self.showings for fault in showing.faults)]
         worst = max(showing.longest_gap_frames for showing in self.showings)
         if not reasons:
-            reasons.append(f"a picture stood for {worst:.1f} frames")
+            reasons.append(f"a frame was shown for {worst:.1f} frames")
         return list(dict.fromkeys(reasons))
 
     def _presentations(self, step: Step) -> list[Presentation]:

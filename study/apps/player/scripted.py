@@ -103,7 +103,7 @@ class ScriptedWindow:
         return next_flip(self._last_flip_s, self.pacing.period_s, self._now_s)
 
     def flip(self) -> float:
-        """Time goes on to the next beat, or past it where the script says so."""
+        """Advance the time to the next beat, or past it if the script says so."""
         number = len(self.shown)
         at = self.next_flip_s()
         if number in self._late:
@@ -136,7 +136,7 @@ class ScriptedWindow:
         """The next flip shows a page."""
         del background
         if picture.released:
-            raise SessionError("Expected a picture that is still there, found one that was released.")
+            raise SessionError("Expected a loaded image, found one that was released.")
         self._drawn = ("page", picture)
 
     def paint_frame(self, drawing: Shown, frame: int) -> None:
@@ -152,9 +152,9 @@ class ScriptedWindow:
         return due
 
     def wait(self, timeout_s: float | None = None) -> tuple[Event, ...]:
-        """Time goes on to the next event, or to the timeout."""
+        """Advance the time to the next event, or to the timeout."""
         if not self._coming and timeout_s is None:
-            raise SessionError("Expected an act for this page, found the script at its end; nobody would ever answer.")
+            raise SessionError("Expected an act for this page, found the end of the script.")
         until = min((event.time_s for event in self._coming), default=np.inf)
         self._now_s = max(self._now_s, min(until, np.inf if timeout_s is None else self._now_s + timeout_s))
         return self.poll()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 SMALLEST = (320, 240)
-"""Pages are drawn for a window of this size at least; of a smaller one they stick out."""
+"""The least size of window for which pages are drawn; in a smaller one they are cut off."""
 
 
 def draw_page(page: Page, size: tuple[int, int], look: Look, *, must_fit: bool = False) -> DrawnPage:
@@ -248,7 +248,7 @@ class _Sheet:
             self._middle(pen, self.page.note, 1.8 * self.base, 0.9 * self.base / self.em, 0.6)
 
     def _draw_back(self, pen: ImageDraw) -> Box:
-        """The way back, small and in the corner, where nobody takes it for an answer."""
+        """The back button, small and in the corner, so that it is not mistaken for an answer."""
         assert self.page.back is not None, "asked for only where there is one"
         em, font, words = self.base, Face(self.look.fonts, max(6, round(0.8 * self.base))), self.page.back
         text = f"{words.key_words}  {words.words}"

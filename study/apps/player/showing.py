@@ -14,11 +14,11 @@ from typing import Any
 from study.errors import SessionError
 
 LONGEST_GAP_FRAMES = 1.5
-"""A frame that stood longer than this is a fault in the presentation: the trial is shown again."""
+"""A frame that is shown longer than this is a display failure: the trial is repeated."""
 
 _JITTER_FLIPS = 0.25
 _SAME_RATE = 0.01
-"""How far rates may differ that count as the same: nobody sees a motion that is one in a hundred faster."""
+"""Relative difference of frame rates that counts as none: a motion that is 1% faster is not noticed."""
 
 
 def frame_at(flip_s: float, onset_s: float, fps: float, period_s: float) -> int:
@@ -34,9 +34,9 @@ class Rate:
     ----------
     fps
         Frames per second as they are shown: the study's, or the display's divided by a whole number where that is
-        nearly the same (29.97 for 30 on 59.94 Hz), so that every frame stands equally long.
+        nearly the same (29.97 for 30 on 59.94 Hz), so that every frame is shown equally long.
     shortest_flips, longest_flips
-        For how many flips of the display a frame stands.
+        Number of flips for which a frame is shown.
     """
 
     fps: float
@@ -45,7 +45,7 @@ class Rate:
 
     @property
     def even(self) -> bool:
-        """Whether all frames stand equally long."""
+        """Whether all frames are shown equally long."""
         return self.shortest_flips == self.longest_flips
 
 
@@ -55,7 +55,7 @@ def find_rate(fps: float, refresh_hz: float) -> Rate:
     Raises
     ------
     SessionError
-        For a display that is slower than the motions, and for one on which some frames would stand for more than 1.5
+        For a display that is slower than the motions, and for one on which some frames would be shown for more than 1.5
         of theirs: one flip and two in turn jerk.
     """
     flips = refresh_hz / fps
@@ -118,7 +118,7 @@ class Showing:
 
     @property
     def longest_gap_frames(self) -> float:
-        """The longest time that one picture stood, in frames of the stimulus."""
+        """The longest time for which one frame was shown, in frames of the stimulus."""
         times = [at for _, at in self.presented]
         if self.ended_s is not None:
             times.append(self.ended_s)
@@ -131,7 +131,7 @@ class Showing:
 
     @property
     def shown_well(self) -> bool:
-        """Whether every picture stood for at most 1.5 frames (and a quarter of a flip, for jitter), to the end."""
+        """Whether every frame was shown for at most 1.5 frame durations (and a quarter of a flip, for jitter)."""
         allowed = LONGEST_GAP_FRAMES + _JITTER_FLIPS * self.period_s * self.fps
         whole = bool(self.frames) and self.frames[0] == 0 and self.frames[-1] == self.frames_in_all - 1
         return whole and not self.faults and self.longest_gap_frames <= allowed

@@ -1,6 +1,6 @@
 """Store: where a player's answers and events go, each committed before the player goes on.
 
-A database that goes away for a moment (a server that is started again) is waited for: nobody loses a sitting to it.
+If the database is away for a moment (a server that restarts), the player waits, so that no session is lost.
 Nothing is written before `begin`, which the player calls once the participant has agreed to take part (at once where
 nobody is asked): who declines leaves nothing behind.
 """
@@ -56,7 +56,7 @@ class ResponsesStore:
         self._waiting: list[tuple[str, Mapping[str, Any] | None]] = []
 
     def before(self) -> tuple[tuple[Answer, ...], tuple[str, ...], bool]:
-        """What an earlier sitting left: answers, steps passed (`consent`, `form`), and whether it was finished."""
+        """What was stored before: answers, steps passed (`consent`, `form`), and whether it was finished."""
         record = find_session(self._responses, self._plan.participant)
         if record is None:
             return (), (), False

@@ -1,8 +1,8 @@
 """Connections: uvicorn's HTTP protocol with patience that ends. Bytes of one client come in, whole requests go on.
 
-A client that opens connections and sends nothing, or a request byte by byte, would hold them for ever; one that sends
-endless headers, or many bodies by half, would fill the memory. uvicorn with httptools sets no bounds to any of this;
-they are set here.
+A client that opens connections and sends nothing, or a request byte by byte, would hold them indefinitely; one that
+sends endless headers, or many bodies by half, would fill the memory. uvicorn with httptools sets no bounds to any of
+this; they are set here.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from typing import Any
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 REQUEST_SECONDS = 30.0
-"""In which a request has to arrive whole; the largest one takes that at 270 kbit a second."""
+"""Seconds within which a request must arrive completely; the largest one needs 270 kbit per second for that."""
 
 REPLY_SECONDS = 300.0
-"""In which a reply has to be taken; a film of five megabytes takes that at 140 kbit a second. It is longer than uvicorn
-keeps idle connections, and ends those that uvicorn closes but which never end, as their reply is not taken."""
+"""Seconds within which a reply must be taken; a film of five megabytes needs 140 kbit per second for that.
+It is longer than uvicorn keeps idle connections, and ends those that uvicorn closes but whose reply is never taken."""
 
 LARGEST_HEAD = 32_768
 """Bytes of a request line and its headers."""
 
 MOST_BODIES = 32_000_000
-"""Bytes of all bodies whose requests have no reply yet; beyond it the oldest is let go, and its page sends again."""
+"""Bytes of all bodies whose requests have no reply yet; beyond it the oldest is closed, and its page sends again."""
 
 _bodies: dict[Connection, int] = {}
 """Bytes of the bodies of this process that have no reply yet, the oldest first."""

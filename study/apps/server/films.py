@@ -24,7 +24,7 @@ _BOX = 12
 """Bytes of the smallest box: its own size, its name, the number of frames."""
 
 PIECE = 512 * 1024
-"""Most films in one piece: each one more is a walk to a thread and back."""
+"""Films up to this size are sent in one piece, which saves changes of thread."""
 
 
 def whole_bytes(sizes: Iterable[int]) -> int:
@@ -33,7 +33,7 @@ def whole_bytes(sizes: Iterable[int]) -> int:
 
 
 class Film(Response):
-    """A film under a name that nobody else knows; the file's own marks would tell that two films are the same one.
+    """A film under a secret name; the file's own marks would tell that two films are the same one.
 
     The file has `size` bytes, of which `whole` are made.
     """

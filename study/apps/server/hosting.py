@@ -1,4 +1,4 @@
-"""Hosting: the live sittings of a study, and every rule about them that is not HTTP.
+"""Hosting: the live sessions of a study, and every rule about them that is not HTTP.
 
 A results folder and settings come in; views for the page go out. All that counts is in the database: a sitting in
 memory is only its answers taken up again, so a restart of the server loses nothing but who had which tab open.
@@ -47,17 +47,17 @@ from study.experiment.store.sessions import SessionRecord, session_by_id
 from study.tasks.answer import Answer
 
 TAB_SECONDS = 45.0
-"""A tab that was not heard of for so long is closed; pages say every ten seconds that they are there."""
+"""Seconds without a message after which a tab counts as closed; pages send one every ten seconds."""
 
 GONE_SECONDS = 300.0
-"""After so long without a word, a sitting is kept in the database alone and taken up from there; where its page was
-closed, after the time of a tab."""
+"""Seconds without a message after which a session is kept only in the database, and resumed from there; for
+a closed page it is the time of a tab."""
 
 MOST_EVENTS = 2000
-"""So much of what a page tells, or causes by opening over and over, is stored of a session: it can't fill the disk."""
+"""Events of a page that are stored for one session, so that a page can't fill the disk."""
 
 TELL_EVERY_SECONDS = 10.0
-"""How often it is logged that the database is away."""
+"""Seconds between log lines that the database is away."""
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
@@ -66,7 +66,7 @@ log = logging.getLogger("segue.serve")
 
 @dataclass
 class Sitting:
-    """One participant at it: the state of the session, what was stored, and which tab shows it."""
+    """One session in progress: its state, what was stored, and which tab shows it."""
 
     record: SessionRecord
     participant: Participant
@@ -81,7 +81,7 @@ class Sitting:
 
     @property
     def is_under_way(self) -> bool:
-        """Whether somebody is there who is not done yet."""
+        """Whether a session is in progress."""
         silent_s = time.monotonic() - self.page_seen
         return silent_s < (GONE_SECONDS if self.page else TAB_SECONDS) and current(self.state).kind != "done"
 
@@ -93,7 +93,7 @@ class Host:
         self.protocol, self.manifest, self.responses, self.settings = protocol, manifest, responses, settings
         self.writer = Writer(responses.engine)
         self.cookie = f"segue-{protocol.sha256[:8]}"
-        """Its name: browsers keep one for all ports of a machine, where two studies may be served."""
+        """Part of its name: browsers share cookies among all ports of a machine, which may serve several studies."""
         self.frames = {record.id: record.frames for record in manifest.records}
         self.film_bytes = whole_bytes(int(video.get("bytes", 0)) for video in manifest.videos.values())
         groups = settings.groups or groups_of(protocol, manifest.pairs)
@@ -104,7 +104,7 @@ class Host:
         self.recent: set[int] = set()
         self.questions: dict[int, int] = {}
         self._told_away = -math.inf
-        # Arrivals at this server stand in line here, not as threads that wait for the database's lock.
+        # Arrivals at this server queue here, not as threads that wait for the database's lock.
         self._starting = asyncio.Lock()
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ class Host:
     # Who it is
 
     async def sitting(self, token: str) -> Sitting | None:
-        """The sitting of a token: the live one, or the one that the database has; None for a token of nobody."""
+        """The session of a token: the live one, or the one in the database; None for an unknown token."""
         key = people.hashed(token)
         if key not in self.sittings:
             participant = await asyncio.to_thread(people.find_by_token, self.responses, token)
@@ -168,7 +168,7 @@ class Host:
         return any(parameters[name] != stored.get(name) for name in self.settings.identifying if parameters.get(name))
 
     async def _admit(self, parameters: dict[str, str]) -> tuple[Sitting | dict[str, Any], str]:
-        """A new participant, or one who comes back by the very same link; or why not."""
+        """A new participant, or one who returns with the identical link; or why not."""
         token = people.new_token()
         who = {name: parameters[name] for name in self.settings.identifying if name in parameters}
         known = await asyncio.to_thread(people.find_by_parameters, self.responses, who) if who else None
@@ -302,7 +302,7 @@ class Host:
         return state if step.kind == "answer" and (step.trial, step.item, step.attempt) == key else None
 
     async def happened(self, sitting: Sitting, message: Happened) -> None:
-        """Something besides answers, told by the page."""
+        """Another event, reported by the page."""
         await self._page_event(sitting, message.kind, message.detail)
 
     async def _page_event(self, sitting: Sitting, kind: str, detail: Mapping[str, Any]) -> None:
@@ -347,7 +347,7 @@ class Host:
         if size is None or size != video["bytes"]:
             detail = {"what": "film damaged", "stimulus": step.stimulus, "bytes": size, "expected": video.get("bytes")}
             await self._page_event(sitting, "fault", detail)
-            # Which one it is stands in the event: a page must not learn it.
+            # The event records which one it is: a page must not learn it.
             raise SessionError("Expected the film whole, found it damaged; the researcher has to render again.")
         return Film(path, name, size, self.frames[step.stimulus], self.film_bytes)
 
@@ -365,7 +365,7 @@ class Host:
         return session_id is not None
 
     async def note_who_is_here(self) -> None:
-        """Store who was heard of, so that drop-outs can be told apart; let go of those who are gone or done."""
+        """Store who was active, so that drop-outs are known; forget sessions that are closed or finished."""
         self.sittings = {key: one for key, one in self.sittings.items() if one.lock.locked() or one.is_under_way}
         recent, self.recent = self.recent, set()
         try:

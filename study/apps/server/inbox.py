@@ -36,7 +36,7 @@ LARGEST_FIELD = 6_200
 """Bytes of one field of the form: a thousand characters, as JSON may write them."""
 
 SMALLEST_MESSAGE = 1_000
-"""Bytes of messages that say hardly anything."""
+"""Bytes of messages without content."""
 
 DATABASE_AWAY = "The database can't be reached now; send this again."
 
@@ -127,7 +127,7 @@ async def answer(host: Host, letter: Letter) -> Reply:
 
 
 async def happened(host: Host, letter: Letter) -> Reply:
-    """Something besides answers."""
+    """Another event than a response."""
     sitting, body = await _from_participant(host, letter, LARGEST_MESSAGE)
     message: Happened = read(Happened, body)
     await host.happened(sitting, message)
@@ -141,7 +141,7 @@ async def alive(host: Host, letter: Letter) -> Reply:
 
 
 async def leave(host: Host, letter: Letter) -> Reply:
-    """The page was closed. A beacon can't carry our header: the page's name is the body, and it can only let go."""
+    """The page was closed. A beacon can't carry our header: its body is the page's name, and it only ends the hold."""
     _same_origin(letter)
     sitting = host.live(letter.cookie(host.cookie))
     if sitting is not None:

@@ -13,10 +13,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 GUESSES_AT_ONCE = 10
 SECONDS_A_GUESS = 6.0
-"""Of codes that nobody has, an address may send so many at once, and then one in this time."""
+"""Wrong codes that an address may send at once, and seconds until each further one."""
 
 MOST_GUESSERS = 5000
-"""Addresses that are remembered; where more guess within a minute, further ones have to wait."""
+"""Addresses that are remembered; if more of them guess within a minute, further ones must wait."""
 
 _POLICY = "; ".join(
     (

@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 from urllib.parse import unquote
 
 VISIT = "SESSION_ID"
-"""The recruiting service's number of one visit, which nobody can guess: it lets a person go on in another browser."""
+"""The recruiting service's number of one visit, which nobody can guess: with it a person can change the browser."""
 
 _SLOT = re.compile(
     r"""\{[^{}]*\} | \[\[.*\]\] | <<.*>> | <%.*%> | «.*» | \*\|.*\|\* | %[a-z_][\w .:-]*% | \ufffd""",
@@ -24,11 +24,11 @@ _ALL_SLOT = re.compile(
     | x{3,}""",
     re.VERBOSE | re.IGNORECASE,
 )
-"""A value that is one slot as a whole."""
+"""A value that is a slot as a whole."""
 
 _NOTHING = {"", "undefined", "null", "none", "nan", "nil", "void", "false", "unknown", "anonymous", "empty", "blank"}
 _NOTHING |= {"objectobject", "assignmentidnotavailable"}
-"""What programs write where they have nothing, in letters and digits alone."""
+"""What programs write for a missing value, letters and digits only."""
 
 _NAMES = {
     "id",

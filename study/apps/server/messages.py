@@ -90,7 +90,7 @@ class Answered(Message):
 
 
 class Happened(Message):
-    """Something besides answers."""
+    """Another event than a response."""
 
     kind: Literal["focus-lost", "focus-back", "resized", "fault", "interrupted", "waited"]
     detail: Annotated[dict[Annotated[str, Field(max_length=40)], float | Text | None], Field(max_length=20)] = {}

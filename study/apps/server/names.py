@@ -22,7 +22,7 @@ from study.errors import SessionError
 from study.experiment.protocol.whole import Protocol
 
 MOST_TOLD = 20
-"""Foreign names that are logged; more tell nothing new."""
+"""Number of foreign names that are logged."""
 
 log = logging.getLogger("segue.serve")
 
@@ -33,7 +33,7 @@ def own_names(listened_at: str, public_urls: Collection[str] = ()) -> frozenset[
     Raises
     ------
     SessionError
-        For a public address that is none.
+        For an invalid public address.
     """
     machine = socket.gethostname()
     names = {listened_at, machine, machine.partition(".")[0], f"{machine.partition('.')[0]}.local"}
@@ -82,7 +82,10 @@ class Named:
     def _tell(self, name: str) -> None:
         if name not in self._told and len(self._told) < MOST_TOLD:
             self._told.add(name)
-            log.warning("A request for %r was refused; if participants come by it: --public-url http://...", name[:200])
+            log.warning(
+                "A request for %r was refused; if participants use this address, add --public-url http://...",
+                name[:200],
+            )
 
 
 @lru_cache(maxsize=64)

@@ -79,7 +79,7 @@ def _overview(host: Host, live: Mapping[int, Sitting]) -> dict[str, Any]:
     return {
         "title": host.protocol.title,
         "protocol_sha256": host.protocol.sha256,
-        "counts": {state: states.count(state) for state in ("at it", "finished", "dropped out", "declined")},
+        "counts": {state: states.count(state) for state in ("in progress", "finished", "dropped out", "declined")},
         "withdrawn": withdrawn,
         "most_participants": host.settings.most_participants,
         "groups": people.filled_groups(host.responses, host.places, clock=host.clock),
@@ -98,7 +98,7 @@ def _listed(host: Host, row: Mapping[str, Any], sitting: Sitting | None, now: da
     elif now - row["seen_at"] > host.settings.dropped_after and sitting is None:
         state = "dropped out"
     else:
-        state = "at it"
+        state = "in progress"
     return {
         "participant": row["participant"],
         "group": row["group_number"],

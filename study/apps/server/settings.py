@@ -1,4 +1,4 @@
-"""Settings: how a study is run. What depends on the place and the recruiting service, and so stands in no protocol."""
+"""Settings: how a study is run. What depends on the place and the recruiting service, and so is in no protocol."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Settings:
     dropped_after: timedelta = DROPPED_AFTER
 
     def __post_init__(self) -> None:
-        """A token that nobody guesses; an empty one would let in everybody."""
+        """A token that cannot be guessed; an empty one would admit everybody."""
         if len(self.researcher_token) < SHORTEST_TOKEN:
             raise SessionError(
                 f"Expected a researcher's token of {SHORTEST_TOKEN} characters or more, found one of "

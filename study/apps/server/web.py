@@ -93,7 +93,7 @@ def _lifespan(host: Host) -> Callable[[Starlette], contextlib.AbstractAsyncConte
             try:
                 await host.note_who_is_here()
             except Exception:
-                log.exception("Noting who is here failed; it is tried again in %g s.", HERE_EVERY_SECONDS)
+                log.exception("Recording who is active failed; next attempt in %g s.", HERE_EVERY_SECONDS)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:

@@ -54,15 +54,13 @@ class Staircase(Settings):
         1, "How many times as large as steps down the steps up are; with `down = 1`, 3 aims at 75% and 4 at 80%."
     )
     side: Literal["both", "shorter", "longer"] = setting("both", "Which blends are compared with the reference.")
-    reversals: Annotated[int, Ge(2), Le(100)] = setting(8, "A staircase stops after so many reversals.")
-    averaged: Annotated[int, Ge(1), Le(100)] = setting(
-        6, "The threshold is the mean of so many reversals, the last ones."
-    )
+    reversals: Annotated[int, Ge(2), Le(100)] = setting(8, "Number of reversals after which a staircase stops.")
+    averaged: Annotated[int, Ge(1), Le(100)] = setting(6, "Number of last reversals whose mean is the threshold.")
     most_trials: Annotated[int, Ge(2), Le(1000)] = setting(
-        50, "A staircase stops after so many trials, whatever its reversals. [trials]"
+        50, "Trials after which a staircase stops in any case. [trials]"
     )
     catch_every: Annotated[int, Ge(0), Le(1000)] = setting(
-        5, "Of so many trials one shows no difference; 0 for none. [trials]"
+        5, "One trial in this number shows no difference; 0 for none. [trials]"
     )
 
     def __post_init__(self) -> None:

@@ -78,7 +78,7 @@ def check_whole(protocol: Whole) -> None:
 
 
 def _check_names(protocol: Whole) -> None:
-    """Refuse names that stand twice, and studies that name transitions that there are not."""
+    """Refuse duplicate names, and studies that name unknown transitions."""
     for kind in ("transitions", "methods", "studies", "form"):
         names = [part.name for part in getattr(protocol, kind)]
         if (index := repeated(names)) is not None:
@@ -98,7 +98,7 @@ def _check_names(protocol: Whole) -> None:
 
 
 def _check_methods(protocol: Whole, study: StudySpec, index: int) -> None:
-    """Refuse methods that there are not, and those that can't stand in a study of this kind, or side by side."""
+    """Refuse unknown methods, methods that do not suit the task, and pairs that cannot be compared."""
     where, who = ("studies", index), f"the {study.task} study {study.name!r}"
     for key in ("reference", "comparison"):
         if name := getattr(study, key):
@@ -124,7 +124,7 @@ def _check_methods(protocol: Whole, study: StudySpec, index: int) -> None:
 
 
 def _check_known(names: Sequence[str], known: Sequence[str], what: str, *location: int | str) -> None:
-    """Refuse names of what there is not, with the nearest one."""
+    """Refuse unknown names, with the nearest known one."""
     there = set(known)
     if (name := next((name for name in names if name not in there), None)) is not None:
         near = get_close_matches(name, known, n=1) if len(name) <= LONGEST_NAME else []
@@ -176,7 +176,7 @@ def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
 
 
 def _check_practice(protocol: Whole, study: StudySpec, index: int) -> None:
-    """Refuse practice that shows what the study shows, and transitions for a practice that there is not."""
+    """Refuse practice with the transitions of the study, and practice transitions without practice trials."""
     where = ("studies", index, "practice_transitions")
     if study.practice_transitions and not study.practice:
         raise KeyMismatchError("expected practice of one trial or more with them, found none; set practice", *where)

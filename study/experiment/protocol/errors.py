@@ -41,7 +41,7 @@ def full_location(detail: Mapping[str, Any]) -> Location:
 def telling(model: type[BaseModel], details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
     """The findings that are about the protocol itself, without those that only follow from another one.
 
-    A list whose only part has a mistake is not empty; a key that stands there misspelled is not missing.
+    A list whose only part has a mistake is not empty; a misspelled key is not missing.
     """
     faulty = [tuple(full_location(detail)) for detail in details]
     meant = set()
@@ -235,7 +235,7 @@ def _unit(model: type[BaseModel], location: Location) -> str:
 
 
 def line_of(lines: Mapping[tuple[int | str, ...], int], location: Location) -> int:
-    """The line (from 1) at which the key of a location, or else its nearest parent, stands; 0 where none does."""
+    """The line (from 1) at which the key of a location, or else its nearest parent, is; 0 where none is."""
     steps = tuple(location)
     while steps:
         if steps in lines:

@@ -42,7 +42,7 @@ def has_words(language: str) -> bool:
 def with_words(data: Mapping[str, Any]) -> dict[str, Any]:
     """A protocol's data with the words of its language where it has no own; what is malformed stays as it is."""
     language = data.get("language", FALLBACK)
-    # A language that is none is refused later; the rest shall not look wrong for it.
+    # An unknown language is refused later, and should cause no other errors here.
     table, filled = words(language if isinstance(language, str) else FALLBACK), dict(data)
     for part in _PARTS:
         own = data.get(part, {})

@@ -22,16 +22,16 @@ from study.transitions.methods.registry import LENGTHS, MAKES, METHODS, POINTS
 class _OwnMethod(Part):
     """A method of the protocol's own. Its settings come before those of the study and of `[stimuli]`."""
 
-    name: Slug = Field(description="What studies, records and reports call it; none of the built-in names.")
+    name: Slug = Field(description="Name in studies, records and reports; not a built-in name.")
     make: str = Field(description=f"How the frames are made: {', '.join(f'`{name}`' for name in MAKES)}.")
     length: str | None = Field(
         default=None,
-        description="How long the blend takes: "
-        f"{', '.join(f'`{name}`' for name, part in LENGTHS.items() if part.windows)}; nothing for a make without one.",
+        description="Blend length: "
+        f"{', '.join(f'`{name}`' for name, part in LENGTHS.items() if part.windows)}; omitted for a make without one.",
     )
     points: str = Field(
         default="shared",
-        description="Where it stands: `shared` takes the points that `[points]` gives to all methods; `least-cost` "
+        description="Transition points: `shared` uses those of `[points]`, the same for all methods; `least-cost` "
         "those where `metric` is least.",
     )
     utility: float = Field(

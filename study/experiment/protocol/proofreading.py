@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol, StudySpec
 
 TO_FILL_IN = "FILL IN"
-"""A text that says so has still to be written."""
+"""Marks of a text that is still to be written."""
 
 
 def to_do(protocol: Protocol) -> list[str]:

@@ -20,7 +20,7 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Colours(Part):
-    """Colours of the picture; a key that is left out keeps the renderer's own."""
+    """Colours of the picture; the renderer's defaults where a key is missing."""
 
     background: Colour | None = Field(default=None, description="Behind the figure, as #rrggbb.")
     left: Colour | None = Field(default=None, description="Left limbs, as #rrggbb.")
@@ -35,14 +35,14 @@ class StimulusSettings(Part):
     height: int = Field(default=480, ge=64, le=2160, multiple_of=2, description="Height of the video; even. [pixels]")
     view: Literal["clearest", "front", "side", "three-quarter"] = Field(
         default="clearest",
-        description="From where the fixed camera looks at the group's common heading; `clearest` is the view in which "
+        description="Direction of the fixed camera relative to the group's heading; `clearest` is the view in which "
         "the group's figures are large and their limbs move most in the picture.",
     )
     track_s: float | None = Field(
         default=None,
         gt=0,
         le=60,
-        description="Let the camera travel with the figure, smoothed over so long, instead of staying fixed. [seconds]",
+        description="Let the camera follow the figure; smoothing window. [seconds]",
     )
     style: Literal["stick", "points", "mannequin"] = Field(default="stick", description="How the figure is drawn.")
     floor: bool = Field(
@@ -70,24 +70,25 @@ class Timing(Part):
 
     gap_s: float = Field(default=1.0, ge=0, le=60, description="Blank between the two stimuli of a pair. [seconds]")
     answer_s: float = Field(
-        default=5.0, gt=0, le=600, description="Time to answer; after it the answer is missed. [seconds]"
+        default=5.0, gt=0, le=600, description="Response deadline; after it the trial has no response. [seconds]"
     )
-    pause_s: float = Field(default=1.0, ge=0, le=60, description="Enforced pause after each answer. [seconds]")
+    pause_s: float = Field(default=1.0, ge=0, le=60, description="Enforced pause after each response. [seconds]")
     show_again: int = Field(
         default=1,
         ge=0,
         le=3,
-        description="How often a trial that was badly shown is shown again, at the end of its study.",
+        description="How often a trial is repeated after a display failure, at the end of its study.",
     )
     break_after: int = Field(
-        default=0, ge=0, le=1_000_000, description="A break after so many trials; 0 for none. [trials]"
+        default=0, ge=0, le=1_000_000, description="Number of trials between breaks; 0 for none. [trials]"
     )
 
 
 class Points(Part):
     """How transition points are chosen: given, or drawn at random from the protocol's seed under conditions.
 
-    Every key may stand in `[points]`, in a study's `points` and in a transition's `points`; the nearer one wins.
+    Every key may be given in `[points]`, in a study's `points` and in a transition's `points`; the most specific one
+    counts.
     """
 
     choose: Literal["random", "given"] | None = Field(
@@ -111,24 +112,23 @@ class Points(Part):
     longest_frames: int | None = Field(
         default=None, ge=1, le=600, description="Longest optimal blend to accept. [frames]"
     )
-    avoid_frames: int | None = Field(
-        default=None, ge=1, le=600, description="A blend length to stay away from. [frames]"
-    )
+    avoid_frames: int | None = Field(default=None, ge=1, le=600, description="A blend length to avoid. [frames]")
     avoid_within_frames: int | None = Field(
-        default=None, ge=0, le=600, description="No optimal blend this near to `avoid_frames` is accepted. [frames]"
+        default=None, ge=0, le=600, description="Optimal blends this close to `avoid_frames` are rejected. [frames]"
     )
     least_warp_frames: int | None = Field(
         default=None,
         ge=0,
         le=600,
-        description="A time-warped blend is accepted if its two windows differ by so much at least. [frames]",
+        description="Least difference between the two windows of a time-warped blend. [frames]",
     )
     source_within: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(
-        default=None, description="Part of the source clip in which its point is drawn, as two fractions of its length."
+        default=None,
+        description="Part of the source clip from which its point is drawn, as two fractions of its length.",
     )
     destination_within: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(
         default=None,
-        description="The same for the destination; [0.0, 0.4] of a turning motion leaves the turn to be seen.",
+        description="The same for the destination; [0.0, 0.4] of a turning motion keeps the turn visible.",
     )
 
     @model_validator(mode="after")
@@ -149,8 +149,8 @@ class Points(Part):
 class TransitionSpec(Part):
     """One transition: from a motion of the library to another."""
 
-    name: Slug = Field(description="What studies, plans and reports call it; unique.")
-    category: str = Field(min_length=1, description="Type of motion, such as walking; answers are grouped by it.")
+    name: Slug = Field(description="Name in studies, plans and reports; unique.")
+    category: str = Field(min_length=1, description="Type of motion, such as walking; results are grouped by it.")
     source: str = Field(min_length=1, description="Motion of the library that it starts from.")
     destination: str = Field(min_length=1, description="Motion of the library that it leads to.")
     points: Points = Field(default=Points(), description="Conditions for this transition alone.")

@@ -32,7 +32,7 @@ Difference = Annotated[int, Field(ge=-600, le=600)]
 class Item(Part):
     """One question of a rating study, answered on a scale."""
 
-    name: Slug = Field(description="What the answers call it; unique in its study.")
+    name: Slug = Field(description="Name in the responses; unique in its study.")
     question: str = Field(min_length=1, description="What the participant reads.")
     low: str = Field(default="", description="Words at the lowest point of the scale.")
     middle: str = Field(default="", description="Words at the middle of a scale with an odd number of points.")
@@ -43,15 +43,15 @@ class OneHop(Part):
     """How the method `one-hop` finds its hops (Koyama and Goto 2019)."""
 
     hops: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="Motions that may be hops; those of the study's transitions where it is left out."
+        default=(), description="Motions that may be hops; by default those of the study's transitions."
     )
     stay_s: float = Field(
         default=1.0, ge=0, le=10, description="Longest stay in the source and in the hop; 0 for none. [seconds]"
     )
     weight: float | None = Field(
-        default=None, ge=0, le=0.01, description="Cost of a frame of stay, square metres; that of Eq. 5 if left out."
+        default=None, ge=0, le=0.01, description="Cost of a frame of stay, square metres; by default that of Eq. 5."
     )
-    weight_times: float = Field(default=1.0, ge=0, le=100, description="What the weight is multiplied by (Figure 11).")
+    weight_times: float = Field(default=1.0, ge=0, le=100, description="Factor of the weight (Figure 11).")
     conditions: int = Field(default=100, ge=1, le=10000, description="Transitions drawn for the weight of Eq. 5.")
 
 
@@ -66,13 +66,13 @@ def procedure_of(table: object) -> Settings:
 
 
 class StudySpec(Part):
-    """One study of the sitting: a task over transitions."""
+    """One study of the session: a task over transitions."""
 
-    name: Slug = Field(description="What plans, answers and reports call it; unique.")
-    title: str = Field(default="", description="Heading for reports; the name where it is left out.")
+    name: Slug = Field(description="Name in plans, responses and reports; unique.")
+    title: str = Field(default="", description="Heading for reports; by default the name.")
     task: TaskName = Field(description="What the participant decides.")
     transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="Names of the transitions shown; all of them where it is left out."
+        default=(), description="Names of the transitions shown; by default all."
     )
     reference: str = Field(
         default="geodesic",
@@ -84,7 +84,7 @@ class StudySpec(Part):
     )
     show: Show | None = Field(
         default=None,
-        description="Rating: each transition by itself (`single`, as where it is left out), or both methods' "
+        description="Rating: each transition by itself (`single`, the default), or both methods' "
         "transitions as a `pair`, with items that compare the second with the first.",
     )
     differences_frames: Annotated[tuple[Difference, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
@@ -96,7 +96,7 @@ class StudySpec(Part):
         default=None,
         ge=1,
         le=600,
-        description="Blend length of the method `fixed`, and of both blends of `one-hop`; 0.33 s where it is left out, "
+        description="Blend length of the method `fixed`, and of both blends of `one-hop`; by default 0.33 s, "
         "which are 10 frames at 30 fps. [frames]",
     )
     one_hop: OneHop = Field(default=OneHop(), description="How the method `one-hop` finds its hops.")
@@ -120,12 +120,12 @@ class StudySpec(Part):
     )
     example: bool = Field(default=True, description="Whether the instructions can show one stimulus as an example.")
     practice: int = Field(
-        default=0, ge=0, le=100, description="Trials with feedback before the study; they count for nothing. [trials]"
+        default=0, ge=0, le=100, description="Trials with feedback before the study, which are not analysed. [trials]"
     )
     practice_transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(),
-        description="Transitions for practice and the example alone, so that neither shows what the study shows; the "
-        "study's own where it is left out.",
+        description="Transitions for practice and the example only, so that neither shows the study's stimuli; "
+        "by default the study's own.",
     )
     attention_checks: int = Field(
         default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
@@ -177,14 +177,14 @@ def _check_task(study: StudySpec) -> None:
 
 
 def check_once(values: Sequence[object], what: str, *location: int | str) -> None:
-    """Refuse what stands twice in a list."""
+    """Refuse duplicates in a list."""
     if (index := repeated(values)) is not None:
         found = f"found {values[index]!r} twice"
         raise KeyMismatchError(f"expected each {what} once, {found}; change or remove one", *location)
 
 
 def repeated(values: Sequence[object]) -> int | None:
-    """Where the first value stands that stood before in a list; None where all differ."""
+    """The index of the first duplicate in a list; None if all differ."""
     seen: set[object] = set()
     for index, value in enumerate(values):
         if value in seen:
@@ -194,44 +194,42 @@ def repeated(values: Sequence[object]) -> int | None:
 
 
 class Exclusions(Part):
-    """What the analysis leaves out, stated before there is data; nothing where nothing is stated."""
+    """The analysis' exclusions, stated before there is data; by default none."""
 
     fastest_s: float | None = Field(
-        default=None, gt=0, le=10, description="Leave out answers sooner than this. [seconds]"
+        default=None, gt=0, le=10, description="Exclude responses faster than this. [seconds]"
     )
-    badly_shown: bool = Field(
-        default=False, description="Leave out answers after a stimulus that stalled or was hidden."
-    )
+    badly_shown: bool = Field(default=False, description="Exclude responses after a display failure.")
     most_missed: float | None = Field(
-        default=None, ge=0, lt=1, description="Leave out participants who missed a larger share of their trials."
+        default=None, ge=0, lt=1, description="Exclude participants with a larger share of trials without a response."
     )
     most_failed_checks: float | None = Field(
-        default=None, ge=0, lt=1, description="Leave out participants who failed more of the attention checks."
+        default=None, ge=0, lt=1, description="Exclude participants who failed a larger share of the attention checks."
     )
     most_too_fast: float | None = Field(
         default=None,
         ge=0,
         lt=1,
-        description="Leave out participants with a larger share of answers sooner than `fastest_s`, or 0.2 s.",
+        description="Exclude participants with a larger share of responses faster than `fastest_s`, or 0.2 s.",
     )
 
 
 class AnalysisSettings(Part):
-    """What was decided about the analysis before there was data."""
+    """Preregistered settings of the analysis."""
 
     threshold: float = Field(
         default=0.75, gt=0, lt=1, description="Proportion that defines the just noticeable difference."
     )
-    alpha: float = Field(default=0.01, gt=0, lt=1, description="Level of significance (2004 section 5.2).")
+    alpha: float = Field(default=0.01, gt=0, lt=1, description="Significance level (2004 section 5.2).")
     equivalence_points: float = Field(
         default=10.0,
         gt=0,
         lt=50,
-        description="How far from an even split a preference may lie and count as none; 10 is 40 to 60%. [points]",
+        description="Equivalence margin of a preference around 50%; 10 is 40 to 60%. [points]",
     )
     confirmatory: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(),
-        description="Studies whose tests are adjusted together (Holm) and decide; those with a preference where it is "
-        "left out. Tests of the others explore.",
+        description="Studies whose tests are adjusted together (Holm) and decide; by default those with a "
+        "preference. Tests of the others explore.",
     )
-    exclusions: Exclusions = Field(default=Exclusions(), description="Who and what is left out.")
+    exclusions: Exclusions = Field(default=Exclusions(), description="Preregistered exclusions.")

@@ -37,7 +37,7 @@ class Part(BaseModel):
 
 
 SLOTS = ("standard", "minutes", "trials", "studies", "answer_s", "contact")
-"""What may stand in braces in the longer texts: the built-in text, minutes and trials of the sitting, its studies,
+"""What may be written in braces in the longer texts: the built-in text, minutes and trials of the session, its studies,
 seconds to answer, and the protocol's contact. `{minutes:minute|minutes}` are the words that go with one or several."""
 
 
@@ -52,14 +52,14 @@ def known_slots(text: str, *location: int | str) -> None:
 
 
 class Consent(Part):
-    """What a participant agrees to before anything else; without text nobody is asked."""
+    """What a participant agrees to before anything else; without a text there is no consent page."""
 
     text: str = Field(
         default="",
         description="What is asked of participants, what is stored, whom to ask; `{standard}` is the built-in text.",
     )
     contact: str = Field(
-        default="", description="Who runs the study, where, how to be reached, who approved it; `{contact}` in texts."
+        default="", description="Who runs the study, where, contact details, who approved it; `{contact}` in texts."
     )
     agree: str = Field(default="I agree and take part", min_length=1, description="Button that agrees.")
     decline: str = Field(default="I do not take part", min_length=1, description="Button that declines.")
@@ -77,18 +77,18 @@ class Consent(Part):
 class FormField(Part):
     """One question of the form about the participant."""
 
-    name: Slug = Field(description="What tables call it; unique in the form.")
+    name: Slug = Field(description="Name in tables; unique in the form.")
     label: str = Field(
         min_length=1,
-        description="What the participant reads; age, gender, vision and animation can be left to their name.",
+        description="What the participant reads; age, gender, vision and animation have a built-in one.",
     )
-    kind: Literal["text", "number", "choice"] = Field(default="text", description="What is filled in.")
+    kind: Literal["text", "number", "choice"] = Field(default="text", description="Type of answer.")
     choices: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="What can be chosen; for `choice` only."
+        default=(), description="The choices; for `choice` only."
     )
-    least: float | None = Field(default=None, description="Smallest number that is taken; for `number` only.")
-    most: float | None = Field(default=None, description="Largest number that is taken; for `number` only.")
-    required: bool = Field(default=False, description="Whether it has to be filled in.")
+    least: float | None = Field(default=None, description="Smallest valid number; for `number` only.")
+    most: float | None = Field(default=None, description="Largest valid number; for `number` only.")
+    required: bool = Field(default=False, description="Whether an answer is required.")
 
     @model_validator(mode="after")
     def _fits_kind(self) -> Self:
@@ -105,10 +105,10 @@ class FormField(Part):
 class Keys(Part):
     """Keys that answer; on-screen buttons do the same. Ratings are answered with the digits."""
 
-    same: Key = Field(default="s", description="Answers that both are the same.")
-    different: Key = Field(default="d", description="Answers that they differ.")
-    first: Key = Field(default="1", description="Answers with the first of a pair.")
-    second: Key = Field(default="2", description="Answers with the second of a pair.")
+    same: Key = Field(default="s", description="Key for the answer `same`.")
+    different: Key = Field(default="d", description="Key for the answer `different`.")
+    first: Key = Field(default="1", description="Key for the answer `first`.")
+    second: Key = Field(default="2", description="Key for the answer `second`.")
     third: Key = Field(default="3", description="Answers with the third of three.")
 
     @model_validator(mode="after")
@@ -125,7 +125,7 @@ class Texts(Part):
     title: str = Field(
         default="How do you see movement?",
         min_length=1,
-        description="What the study is called on the participants' pages; the protocol's title may tell too much.",
+        description="Title on the participants' pages, in place of the protocol's title, which may reveal too much.",
     )
     welcome: str = Field(default="", description="Read before the first study; `{standard}` is the built-in text.")
     break_text: str = Field(default="You can rest now. Go on when you are ready.", description="Read at a break.")
@@ -145,21 +145,21 @@ class Texts(Part):
     )
     practice_noted: str = Field(
         default="Your answer was noted. There is no right or wrong here.",
-        description="After an answer in practice where none is right.",
+        description="After an answer in practice, for tasks without a right answer.",
     )
     practice_over: str = Field(
         default="That was the practice. From now on your answers count.",
-        description="Read between practice and study; left out where it is empty.",
+        description="Read between practice and study; not shown if empty.",
     )
-    missed: str = Field(default="The time to answer was over.", description="After a missed answer.")
+    missed: str = Field(default="The time to answer was over.", description="After a trial without a response.")
     attention_check: str = Field(
         default="This one checks the controls. Please answer: {answer}",
-        description="The question of an attention check; {answer} is what to answer.",
+        description="The question of an attention check; {answer} is the answer to give.",
     )
     form: str = Field(default="A few questions about you", description="Heading of the form.")
     skip: str = Field(default="Skip", min_length=1, description="Button that leaves a question of the form empty.")
-    previous: str = Field(default="Back", min_length=1, description="Button that leads to the question before.")
-    not_taken: str = Field(default="Please check this.", description="After something that the form does not take.")
+    previous: str = Field(default="Back", min_length=1, description="Button that leads to the previous question.")
+    not_taken: str = Field(default="Please check this.", description="After an invalid answer in the form.")
     space_key: str = Field(default="Space", description="Name of the space bar, on buttons of the window.")
     enter_key: str = Field(default="Enter", description="Name of the Enter key, on buttons of the window.")
     stop_question: str = Field(default="Do you want to stop?", description="Before the window closes.")
@@ -171,7 +171,7 @@ class Texts(Part):
     stay: str = Field(default="Go on", min_length=1, description="Button that stays.")
     away: str = Field(
         default="The window was left. Click here, then go on when you are ready.",
-        description="Read when the window has lost the keyboard before a trial.",
+        description="Read when the window has lost the focus before a trial.",
     )
     close: str = Field(default="Close", min_length=1, description="Button that closes the window at the end.")
     finished: str = Field(default="That was all. Your answers are stored.", description="Read when all is done.")
@@ -187,9 +187,7 @@ class Texts(Part):
         default="A film could not be shown. Nothing of what you did is lost.", description="When a film can't be shown."
     )
     try_again: str = Field(default="Try again", min_length=1, description="Button that loads a film again.")
-    pass_over: str = Field(
-        default="Go on without it", min_length=1, description="Button that passes over such a trial."
-    )
+    pass_over: str = Field(default="Go on without it", min_length=1, description="Button that skips such a trial.")
     elsewhere: str = Field(
         default="This study is open in another tab or window. Please go on there.",
         description="In a second tab of one participant.",
@@ -208,16 +206,16 @@ class Texts(Part):
     )
     no_script: str = Field(
         default="This study needs JavaScript. Please switch it on and open the link again.",
-        description="Where the browser runs no JavaScript.",
+        description="When the browser runs no JavaScript.",
     )
     no_film: str = Field(
         default="This browser can't play the films. Please use a current Chrome, Edge, Firefox or Safari.",
-        description="Where the browser can't play the stimuli at all.",
+        description="When the browser can't play the stimuli at all.",
     )
     reduced_motion: str = Field(
         default="Your device asks for little motion. This study shows short films of a moving figure, and can't do "
         "without.",
-        description="Where a participant's device asks for reduced motion.",
+        description="When a participant's device asks for reduced motion.",
     )
     withdrawal: str = Field(
         default="With this code you can have your answers deleted at any time:",
@@ -236,7 +234,7 @@ class Texts(Part):
     )
     wrong_address: str = Field(
         default="There is no study at this address. Please open the link that you were given.",
-        description="Where a page is asked for under a name that is not the server's (`--public-url`).",
+        description="When a page is requested under another name than the server's (`--public-url`).",
     )
     completion: str = Field(default="Your completion code:", description="Above the completion code.")
     back: str = Field(default="Finish", min_length=1, description="Button that leads back to the recruiting site.")

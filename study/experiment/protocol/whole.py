@@ -4,7 +4,7 @@ A TOML file comes in; a frozen `Protocol` goes out, with the exact text and its 
 say under which protocol it was made. A protocol names motions, never files: a library supplies them. The keys
 cover the four studies of 2004 (section 4, one sitting) and the rating study of 2003 (section 4.2).
 
-What a key means stands in its `description`; `docs/protocols.md` is written from these (`protocol_keys`).
+The meaning of a key is its `description`; `docs/protocols.md` is written from these (`keys`).
 """
 
 from __future__ import annotations
@@ -50,18 +50,18 @@ MOST_PROBLEMS = 50
 
 
 class Protocol(Part):
-    """A whole sitting."""
+    """A whole session."""
 
     name: Slug = Field(description="Name of the protocol and of its results folder.")
     title: str = Field(min_length=1, description="Heading for researchers; participants read `texts.title`.")
-    source: str = Field(default="", description="Paper and section that it follows.")
+    source: str = Field(default="", description="Paper and section on which it is based.")
     fps: float = Field(default=30.0, ge=1, le=240, description="Frame rate of every stimulus. [frames per second]")
-    seed: int = Field(ge=0, description="Where all of the protocol's randomness comes from.")
+    seed: int = Field(ge=0, description="Seed of all of the protocol's randomness.")
     participants: int | None = Field(
-        default=None, ge=1, le=100_000, description="How many people are to take part, fixed before there is data."
+        default=None, ge=1, le=100_000, description="Planned number of participants, fixed before there is data."
     )
     study_order: Literal["as-listed", "random"] = Field(
-        default="as-listed", description="Order of the studies in a sitting."
+        default="as-listed", description="Order of the studies in a session."
     )
     stimuli: StimulusSettings = Field(default=StimulusSettings(), description="How stimuli are built and drawn.")
     timing: Timing = Field(default=Timing(), description="Times of a trial.")
@@ -70,7 +70,7 @@ class Protocol(Part):
         default="en",
         description="Language of the built-in words (en, de, fr, ja) and, for screen readers, of all texts.",
     )
-    touch: bool = Field(default=True, description="Whether tablets and telephones may take part.")
+    touch: bool = Field(default=True, description="Whether tablets and telephones are admitted.")
     consent: Consent = Field(default=Consent(), description="What participants agree to.")
     form: Annotated[tuple[FormField, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
         default=(), description="Questions about the participant, one `[[form]]` each."
@@ -82,10 +82,10 @@ class Protocol(Part):
         Field(description="The transitions, one `[[transitions]]` each.")
     )
     studies: Annotated[tuple[StudySpec, ...], Field(strict=False, min_length=1, max_length=100)] = Field(
-        description="The studies of the sitting, one `[[studies]]` each, in order."
+        description="The studies of the session, one `[[studies]]` each, in order."
     )
     methods: Annotated[tuple[OwnMethod, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="Methods of the protocol's own, one `[[methods]]` each."
+        default=(), description="Your own methods, one `[[methods]]` each."
     )
 
     _text: str = PrivateAttr(default="")

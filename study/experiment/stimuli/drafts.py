@@ -38,7 +38,7 @@ class Draft:
 
 
 def add_drafts(protocol: Protocol, planned: Planned, drafts: dict[Film, Draft], ways: Ways) -> None:
-    """Make what is seen in one study of one transition, but for what was made before."""
+    """Make what is seen in one study of one transition, except for what was made before."""
     for showing in planned.showings:
         condition = showing.condition
         for film, method, difference in zip(showing.films, condition.methods, condition.added_frames, strict=True):

@@ -35,7 +35,7 @@ class Film:
     way
         How it is made, with its length.
     frames_on
-        How long the destination goes on, so that both films of a pair end together.
+        How long the destination continues, so that both films of a pair end together.
     """
 
     transition: str

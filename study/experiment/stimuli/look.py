@@ -2,7 +2,7 @@
 
 Drafts come in; `Stimulus` objects go out. One fixed camera serves a group (2004 section 4.1: groups of motions were
 shown from the same position). Transitions start over the same point with the same heading, so that it sees all of them
-from the same side, as near as may be.
+from the same side, as close as possible.
 """
 
 from __future__ import annotations

@@ -252,7 +252,7 @@ _ANEW = "restore a copy of it, or render into a new folder"
 
 @dataclass(frozen=True)
 class _Stored:
-    """The keys of a manifest that are read, but for the videos."""
+    """The keys of a manifest that are read, except for the videos."""
 
     protocol: str
     protocol_sha256: str

@@ -67,7 +67,7 @@ def open_engine(url_or_path: str | Path) -> sa.Engine:
     patience = {"connect_timeout": BUSY_SECONDS, "tcp_user_timeout": 2000 * BUSY_SECONDS, "application_name": "segue"}
     arguments = {name: value for name, value in patience.items() if name not in url.query}
     try:
-        # Before each use a connection is tried: one that a restart of the server cut is made anew.
+        # A connection is tested before each use, and replaced if a restart of the server cut it.
         engine = sa.create_engine(url, connect_args=arguments, pool_pre_ping=True)
     except ImportError as error:
         raise SessionError(
@@ -112,7 +112,7 @@ def sqlite_file(url_or_path: str | Path) -> Path | None:
 
 
 def shown(url: sa.URL) -> str:
-    """A URL as it may be printed: without the password, wherever it stands; of SQLite the file."""
+    """A URL as it may be printed: without the password, anywhere in it; for SQLite the file."""
     if url.get_backend_name() == "sqlite":
         return url.database or "a database in memory"
     hidden = {name: "***" for name in url.query if "password" in name}
@@ -178,7 +178,7 @@ def patiently(
     Parameters
     ----------
     work
-        What may be done twice and counts once: a commit may stand though the word of it was lost.
+        What may be done twice and counts once: a commit may have succeeded although its confirmation was lost.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def patiently(
                 raise SessionError(
                     f"{place}: expected a database that can be written to, found that for {patience_s:g} s it could "
                     f"not be ({in_words(error)}). Nothing that was stored is lost: when it is back, the same command "
-                    "goes on from there."
+                    "resumes."
                 ) from error
         wait(pause_s)
         pause_s = min(2 * pause_s, 2.0)
@@ -260,7 +260,7 @@ def damaged(place: str, found: str) -> SessionError:
 
 @contextmanager
 def readable_copy(file: Path) -> Iterator[Path]:
-    """A copy of a SQLite file for this process alone, with what stands in its write-ahead log; gone at the end.
+    """A copy of a SQLite file for this process alone, with its write-ahead log; gone at the end.
 
     Even to read, SQLite writes beside the file, which it can't where the place is read-only or full.
     """
@@ -298,7 +298,7 @@ def unusable(place: str, error: BaseException) -> SessionError:
     found, advice = _REFUSED.get(code or 0, ("", ""))
     if not found:
         found = f"one that can't be opened ({in_words(error)})"
-        # libpq tells of a refused connection in words alone, in the server's language: an unknown one is passed on.
+        # libpq describes a refused connection only in words, in the server's language: an unknown one is passed on.
         known = (advice for words, advice in _ADVICE if words in found)
         advice = next(known, "check the path or URL, or keep that database and name another")
     return SessionError(f"{place}: expected a database of responses, found {found}; {advice}.")
@@ -326,7 +326,7 @@ _HELD = (
     "wait until that program is done, or close it, and run the same command again",
 )
 _UNWRITABLE = (
-    "one that may not be written to, or stands in a folder that may not be",
+    "one that may not be written to, or is in a folder that may not be",
     "change its rights, or name another place (--out, --database); analyse, report and export only read it",
 )
 _DAMAGED = (
@@ -344,7 +344,7 @@ _REFUSED = {
     ),
     sqlite3.SQLITE_FULL: (
         "no room left on its disk",
-        "make room, and the same command goes on from there; what was stored before is whole",
+        "make room, and the same command resumes; what was stored before is intact",
     ),
     sqlite3.SQLITE_IOERR: ("that its disk fails", "check the disk, or copy the file to another one"),
     sqlite3.SQLITE_CORRUPT: _DAMAGED,

@@ -139,7 +139,7 @@ def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) ->
 
 
 def _replaceable(folder: Path) -> bool:
-    """Whether there is nothing in it but what `export` wrote."""
+    """Whether it contains only what `export` wrote."""
     if not folder.is_dir():
         return False
     if not any(folder.iterdir()):

@@ -35,7 +35,7 @@ from study.experiment.store.tables import (
 )
 
 DROPPED_AFTER = timedelta(hours=1)
-"""A session that is not finished and was not heard of for so long counts as dropped out."""
+"""Time without activity after which an unfinished session counts as dropped out."""
 
 CODE_LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
@@ -47,7 +47,7 @@ def _utc_now() -> datetime:
 def steady_clock() -> Clock:
     """A clock that is set now, by the machine's, and then runs by itself.
 
-    It tells who is still there: no place is given away, or held on to, because the machine's clock was set.
+    It decides who is still active, so that setting the machine's clock neither frees nor holds a place.
     """
     began, ticks = _utc_now(), time.monotonic()
     return lambda: began + timedelta(seconds=time.monotonic() - ticks)
@@ -206,7 +206,7 @@ def give_token(responses: Responses, participant: Participant, token: str) -> No
 
 
 def seen(responses: Responses, session_ids: Collection[int], *, clock: Clock = _utc_now) -> None:
-    """Participants were heard of just now."""
+    """Record that participants are active now."""
     if session_ids:
         change = sa.update(participants).where(participants.c.session_id.in_(session_ids))
         with responses.engine.begin() as connection:
@@ -219,7 +219,7 @@ def finished_sessions() -> sa.Select[tuple[int]]:
 
 
 def filled_groups(responses: Responses, places: Places, *, clock: Clock = _utc_now) -> list[int]:
-    """How many participants each group has, finished or at it; drop-outs and those who declined are given back."""
+    """How many participants each group has, finished or in progress; drop-outs and those who declined do not count."""
     with responses.engine.connect() as connection:
         return _filled(connection, places, clock())
 
@@ -241,7 +241,7 @@ def _filled(connection: sa.Connection, places: Places, now: datetime) -> list[in
 
 
 def overview(responses: Responses) -> list[dict[str, Any]]:
-    """One mapping a session in the browser, newest first: who is where; for the researcher's eyes."""
+    """One mapping a session in the browser, newest first, for the researcher's page."""
     count = (
         sa.select(sa.func.count())
         # A trial that is shown again asks the same questions, which are counted once.

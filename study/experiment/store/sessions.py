@@ -142,7 +142,7 @@ def _refuse_other_protocol(connection: sa.Connection, place: str, protocol: Prot
             raise SessionError(
                 f"{place}: expected sessions of {protocol.name!r} with sha256 {protocol.sha256[:12]}, found "
                 f"some of {name!r} with {sha256[:12]}. Answers under different protocols are not mixed: use another "
-                "results folder, or the protocol.toml that stands in this one."
+                "results folder, or the protocol.toml of this one."
             )
 
 

@@ -143,7 +143,7 @@ def _parse_regular(chunk: bytes, moving: dict[str, int]) -> dict[str, FloatArray
 def _first_frame(
     data: ByteArray, starts: IntArray, stops: IntArray, moving: dict[str, int]
 ) -> tuple[dict[str, int], int]:
-    """Where in a frame's words each bone's name stands, and how many words a frame has, by the first frame."""
+    """The position of each bone's name among a frame's words, and how many words a frame has, by the first frame."""
     blocks: dict[str, int] = {}
     at = 1
     while at < len(starts):
@@ -231,7 +231,7 @@ def _assemble(
     for j, bone in enumerate(bones):
         rotations[:, j] = _rotation(bone, values.get(bone.name), frames, degrees)
         if j > 0 and bone.name in values and (stretch := _stretch(bone, values[bone.name])) > 0.0:
-            source.warn(f"bone {bone.name!r} shifts or stretches by up to {stretch:.4g} units, which is left out")
+            source.warn(f"bone {bone.name!r} shifts or stretches by up to {stretch:.4g} units, which is ignored")
     leaves = np.array(sorted(set(range(len(bones))) - {int(p) for p in parents}), dtype=np.int64)
     path = np.tile(body.root_position, (frames, 1))
     for k, dof in enumerate(bones[0].dofs):

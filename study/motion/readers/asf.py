@@ -21,7 +21,7 @@ LINE = re.compile(rb"[^\r\n]+")
 _WORD = re.compile(rb"[^\s()]+")
 _DOFS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
 ROOT = "root"
-# Shorter directions and units of length are zero but for rounding.
+# Shorter directions and units of length are zero except for rounding.
 _SMALLEST = 1e-9
 _Words = list[tuple[bytes, int]]
 
@@ -51,7 +51,7 @@ class Body:
 
 
 def _sections(source: Source) -> Iterator[tuple[str, int, list[_Words]]]:
-    """Each `:section` of an ASF with the words of its lines, the heading's own words first; comments left out."""
+    """Each `:section` of an ASF with the words of its lines, the heading's own words first; without comments."""
     heading: tuple[str, int] | None = None
     lines: list[_Words] = []
     for line in LINE.finditer(source.raw):

@@ -2,7 +2,7 @@
 
 In: Biovision hierarchy files as real tools write them. Out: `Clip` (Y up, metres, radians, wxyz). Rotation channels
 multiply in the order in which each joint lists them; position channels are the joint's place in its parent's frame
-and replace its OFFSET, wherever they stand in the list. What a clip can't hold (a limb that changes its length) causes
+and replace its OFFSET, in any position of the list. What a clip can't hold (a limb that changes its length) causes
 a warning; what can't be read is refused with file, line and column.
 """
 

@@ -4,7 +4,7 @@ The fast way reads decimal digits eight at a time, as bytes of 64-bit words, for
 (after D. Lemire, "Number parsing at a gigabyte per second", Software: Practice and Experience 51, 2021;
 here over arrays instead of one number after the other). Digits make a whole number below 2**53, divided once by a power
 of ten: both exact, so the quotient is the nearest double, the same that `float` gives. Anything unusual (more than 15
-digits, large exponents) goes through `float`, and anything wrong is found again, word by word, to say where it stands.
+digits, large exponents) goes through `float`, and anything wrong is found again, word by word, to say where it is.
 """
 
 from __future__ import annotations

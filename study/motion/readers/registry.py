@@ -39,7 +39,7 @@ def read_clip(
     fps: float | None = None,
     mapping: Mapping[str, str] | None = None,
 ) -> Clip:
-    """Read a motion file; where another axis than Y is up, the clip is put upright and its history says so.
+    """Read a motion file; if another axis than Y is up, the clip is turned upright, and its history says so.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class Source:
     raw: bytes
 
     def error(self, offset: int, message: str) -> MotionFileError:
-        """The refusal of what stands at a byte offset; to be raised by the caller."""
+        """The refusal of what is at a byte offset; to be raised by the caller."""
         before = self.raw[:offset]
         ends = list(_LINE_END.finditer(before))
         start = ends[-1].end() if ends else 0

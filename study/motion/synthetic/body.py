@@ -23,7 +23,7 @@ FOREARM = 0.146 * STATURE
 # To the knuckles, half of the hand's 0.108: hands are half closed here.
 HAND = 0.054 * STATURE
 
-# Hip joint centres lie 0.17 m apart (Bell et al. 1990 by way of pelvic width), shoulder joints 0.36 m.
+# Hip joint centres lie 0.17 m apart (from pelvic width, Bell et al. 1990), shoulder joints 0.36 m.
 HIP_HALF_WIDTH = 0.085
 SHOULDER_HALF_WIDTH = 0.18
 # The root stands a little above the line through the hips.

@@ -1,7 +1,7 @@
-"""Boxing against nobody: guard, jabs, crosses, hooks, slips and small steps, in orthodox stance.
+"""Shadow boxing: guard, jabs, crosses, hooks, slips and small steps, in orthodox stance.
 
 Timing after published measurements: a straight punch takes 0.2-0.3 s to land and about as long to come back, the
-hand reaching 6-9 m/s, driven from the rear foot by way of hips and trunk, which turn first (Turner et al. 2011;
+hand reaching 6-9 m/s, driven from the rear foot through hips and trunk, which turn first (Turner et al. 2011;
 Lenetsky et al. 2013; Dinu & Louis 2020).
 """
 

@@ -39,7 +39,7 @@ class Description:
     line
         What is to be seen, in a line.
     parameters
-        What can be set besides length, frame rate and seed, with the defaults.
+        Further parameters than length, frame rate and seed, with their defaults.
     """
 
     name: str

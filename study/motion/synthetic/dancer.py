@@ -60,7 +60,7 @@ class Dancer:
 
 
 def new_dancer(seconds: float, rng: np.random.Generator, beats_per_minute: float) -> Dancer:
-    """A dancer who stands, arms down, with a score of so many seconds to fill."""
+    """A standing dancer, arms down, with an empty score of the given duration."""
     score = Score(grid(seconds), dict(_STYLE))
     dancer = Dancer(score, rng, 60.0 / float(np.clip(beats_per_minute, 40.0, 180.0)))
     for side in (LEFT, RIGHT):

@@ -141,7 +141,7 @@ class _Going:
         return float(np.interp(time, self.course.times, values))
 
     def when(self, way: float) -> float:
-        """The first time at which so far has been gone; for ever where it never is."""
+        """The first time at which this distance is reached; infinite if it never is."""
         return float(np.interp(way, self.way, self.course.times, right=FOREVER))
 
 

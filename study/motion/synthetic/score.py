@@ -124,7 +124,7 @@ class Score:
         track.visit(start - 0.05, middle, stop + 0.05, [track.now[0], track.now[1] + heel])
 
     def sweep(self, side: int, start: float, stop: float, via: ArrayLike, to: ArrayLike) -> None:
-        """Move a hand to a place by way of another, in one rounded path."""
+        """Move a hand to a place through another, on one rounded path."""
         long = stop - start
         self.hands[side].move(start, start + 0.66 * long, via)
         self.hands[side].move(start + 0.34 * long, stop, to)

@@ -61,7 +61,7 @@ class Section:
     anchor, title
         Where links lead, and the heading.
     headlines
-        They stand at the top of the page.
+        Shown at the top of the page.
     drawings, tables, notes
         In this order; the tables follow the first drawing.
     folded
@@ -166,7 +166,7 @@ def readings_table(sections: Sequence[Section]) -> Table | None:
     return tables.make(
         "results",
         "Every result as published and corrected, with 95% intervals in brackets. Published: the statistics of the "
-        "papers, which take all answers for independent or read thresholds off straight lines. Corrected: the "
+        "papers, which treat all responses as independent or interpolate thresholds linearly. Corrected: the "
         "participant is the unit, and thresholds come from a model of the task.",
         "result published corrected",
         rows,

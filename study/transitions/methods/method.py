@@ -1,4 +1,4 @@
-"""What a method is: the choice of where a transition stands, how long its blend takes, and how its frames are made.
+"""What a method is: the choice of where a transition is placed, how long its blend takes, and how its frames are made.
 
 Three independent parts make a method: `Points`, `Length` and `Make`. Each member is a frozen dataclass in a module of
 its own; its fields are its settings, which are also the keys that a protocol's `[[methods]]` takes. The registry finds
@@ -81,7 +81,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Room:
-    """Frames that a method needs around its points, besides entry and exit.
+    """Frames that a method needs around its points, in addition to entry and exit.
 
     `blend` from the start point on and up to the end point; `search` the same where the motions have as many, so that
     long blends can be found. `entry` before the start point. `stay` beyond the blend in both motions, and `after`
@@ -171,7 +171,7 @@ class MethodPart(ABC):
 
 
 class Points(MethodPart):
-    """Where a transition stands: at points that all methods of a study share, or at points of the method's own."""
+    """Where a transition is placed: at points that all methods of a study share, or at points of the method's own."""
 
     own: ClassVar[bool] = False
 

@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 def read_beats(path: Path, clip: Clip) -> OffsetArray:
     """The beats of a clip from a text file with a time in seconds first on each line, as frames of the clip.
 
-    Further columns (the number of the beat in its bar) are not used, empty lines and lines with `#` are left out, and
+    Further columns (the number of the beat in its bar) are not used, empty lines and lines with `#` are ignored, and
     so are times outside of the clip.
     """
     times = []
@@ -41,7 +41,7 @@ def read_beats(path: Path, clip: Clip) -> OffsetArray:
 
 
 def beats_at(times_s: Sequence[float], clip: Clip) -> OffsetArray:
-    """Times in seconds from a clip's frame 0 as frames of the clip; those outside of it are left out."""
+    """Times in seconds from a clip's frame 0 as frames of the clip; those outside of it are ignored."""
     frames = np.unique(np.round(np.array(times_s) * clip.fps).astype(np.int64))
     return frames[(frames >= 0) & (frames < clip.frames)]
 

@@ -47,7 +47,7 @@ def build_table(
     problem
         Clips, switches and what counts as good.
     workers
-        Threads; one a core unless given.
+        Threads (default: one a core).
     memory_bytes
         About how much memory to work in, clips not counted. Less makes more and smaller jobs.
     checkpoint
@@ -98,7 +98,7 @@ def build_table(
 
 
 class _State:
-    """What was found so far; the main thread alone changes it."""
+    """The results so far; only the main thread changes them."""
 
     def __init__(self, problem: Problem, jobs: tuple[Job, ...]) -> None:
         self.problem = problem

@@ -1,8 +1,8 @@
 """More than one hop, by dynamic programming.
 
-Koyama & Goto 2019, section 5, Multiple hops: a straightforward extension that they left out for its cost. Trying all
-pairs of hops would square the number of combinations; here each further hop costs one (min, +) product of the
-matrix of all hop-to-hop distances with the best ways to go on, because these depend only on the clip, its frame and
+Koyama & Goto 2019, section 5, Multiple hops: a straightforward extension that they did not make because of its cost.
+Trying all pairs of hops would square the number of combinations; here each further hop costs one (min, +) product of
+the matrix of all hop-to-hop distances with the best ways to go on, because these depend only on the clip, its frame and
 the destination's frame (the time). That is `n^2` sums for `n` hop frames and each time: seconds for a dozen short
 clips, minutes for twenty of 20 seconds, and memory for the matrix, which is refused beyond a bound.
 """
@@ -44,7 +44,7 @@ class Chain:
 def find_chains(
     problem: Problem, switch: Switch, hops: int, *, memory_bytes: int = MEMORY_BYTES
 ) -> tuple[Chain | None, ...]:
-    """The best transition by at most so many hops, for each triggered frame of a switch.
+    """The best transition through at most n hops, for each triggered frame of a switch.
 
     Parameters
     ----------

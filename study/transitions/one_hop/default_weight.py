@@ -92,7 +92,7 @@ def default_weight(
 
 
 def draw_condition(clips: Sequence[Clip], settings: Settings, rng: np.random.Generator) -> Switch:
-    """A source, another clip as destination, a triggered frame, and the destination's frame at it."""
+    """A source, another clip as destination, a triggered frame, and the destination's frame at that time."""
     blend = settings.blend_frames
     able = [number for number, clip in enumerate(clips) if clip.frames >= blend]
     if len(able) < 2:

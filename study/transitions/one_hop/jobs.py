@@ -51,7 +51,7 @@ class Found:
 def make_jobs(problem: Problem, memory_bytes: int) -> tuple[Job, ...]:
     """All jobs, hops that are destinations first; each takes about `memory_bytes` at most.
 
-    The cost of the direct transition, known from the destination as hop, leaves out much of the work of the others.
+    The cost of the direct transition, known from the destination as hop, saves much of the work for the others.
     """
     blend = problem.settings.blend_frames
     rows = sum(max(clip.frames - blend + 1, 0) for clip in _used_clips(problem))

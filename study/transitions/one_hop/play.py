@@ -76,7 +76,7 @@ class Step:
     clip
         The number of the clip to blend into.
     offset
-        The frame of the transition's source at which that clip's frame 0 stands.
+        The frame of the transition's source that coincides with that clip's frame 0.
     blend_frames
         Frames of the blend.
     """
@@ -150,7 +150,7 @@ class _Tape:
 def crossfade(a: Clip, b: Clip, weight: str = "linear") -> Clip:
     """Pose by pose from one stretch of motion into another of the same length, that was placed on it.
 
-    The paper's pose-space linear blend: slerp of every joint, the root on the straight line between both.
+    The paper's pose-space linear blend: slerp of every joint, the root by linear interpolation.
     """
     share = blend_weights(a.frames, weight)
     rotations = slerp_one_way(a.rotations, b.rotations, np.tile(share[:, None], (1, a.skeleton.joints)))

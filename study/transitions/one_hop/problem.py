@@ -190,7 +190,7 @@ class Problem:
     offsets
         By (source, hop), the only offsets that the hop may have, ascending (section 4.4); any unless given.
     nearest_to_direct
-        Where given, the hop must be the destination itself, and its offset lie within so many frames of the
+        Where given, the hop must be the destination itself, and its offset lie within this many frames of the
         destination's (section 5, Higher responsiveness).
     """
 

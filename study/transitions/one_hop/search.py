@@ -229,7 +229,7 @@ def minima_by_stay(first: Table, second: IntArray, triggers: range, weight: int,
     weight
         Counts a frame of stay.
     limit : (triggers,)
-        The best cost known so far; what costs more is left out.
+        The best cost known so far; higher costs are skipped.
 
     Returns
     -------

@@ -40,7 +40,7 @@ class Entry:
     hop
         The hop clip's number.
     offset
-        The source's frame at which the hop's frame 0 stands.
+        The source's frame that coincides with the hop's frame 0.
     stay_source, stay_hop
         Frames to wait before the first and before the second blend.
     blend_first, blend_second
@@ -131,7 +131,7 @@ class OneHopTable:
         )
 
     def position(self, source: int, destination: int, trigger: int) -> int:
-        """Where the entry for a triggered frame stands in `entries`."""
+        """The index of a triggered frame's entry in `entries`."""
         row = self.row(source, destination)
         last = row.first_trigger + row.triggers - 1
         if not row.first_trigger <= trigger <= last:

@@ -1,6 +1,6 @@
 """A study in which pairs were rated, on the page: `pair_ratings` in, headline, figure, tables and notes out.
 
-2003 Table 2 gives mean and standard deviation of all answers; beside them stands what one score a participant says.
+2003 Table 2 gives mean and standard deviation of all answers; beside them are tests over one score a participant.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def pair_ratings_section(result: PairRatings, about: About) -> Section | None:
     scale = f"on a scale of 0 to {top}; {questions[0].middle:g} means that both were the same"
     caption = (
         f"How {_other(questions[0])} compares with {_reference(questions[0])}, {scale}. Bars: answers at each point "
-        "with their counts, turned by the order of presentation. Squares: mean over participants with 95% interval "
+        "with their counts, signed as comparison minus reference. Squares: mean over participants with 95% interval "
         "(Student’s t)."
     )
     svg = likert_figure(questions, f"study-{name}-compared", about.mark, about.ends)
@@ -74,7 +74,7 @@ def _headline(questions: Sequence[PairQuestion], top: int, alpha: float) -> Head
         (test,) = known
         statement = f"Compared with {_reference(first)}, {_other(first)} was rated {test.mean:.2f} on average, {scale}"
         if test.p_value is not None:
-            told = "this is not chance" if test.p_value < alpha else "this can’t be told from chance"
+            told = "this is significant" if test.p_value < alpha else "this is not significant"
             statement += f"; across participants {told} ({words.p(test.p_value)})"
         return Headline(f"{statement}.", f"{_size(questions)}. {detail}")
     detail = f"{_size(questions)}, {scale}. {detail}"
@@ -139,7 +139,7 @@ def published_table(name: str, questions: Sequence[PairQuestion]) -> Table:
     return tables.make(
         f"{name}_published",
         f"As published (2003 Table 2): how {_other(questions[0])} compares with {_reference(questions[0])}. Mean and "
-        "standard deviation of all answers, turned by the order of presentation.",
+        "standard deviation of all answers, signed as comparison minus reference.",
         "item answers mean standard_deviation",
         [vars(question.published) | {"item": _item(question), "answers": question.answers} for question in questions],
     )
@@ -159,7 +159,7 @@ def corrected_table(name: str, questions: Sequence[PairQuestion]) -> Table:
 def _folded(name: str, questions: Sequence[PairQuestion]) -> list[Table]:
     counts = tables.make(
         f"{name}_points",
-        "Answers at each point of the scale, turned by the order of presentation.",
+        "Answers at each point of the scale, signed as comparison minus reference.",
         "item point answers",
         [
             {"item": _item(question), "point": int(point), "answers": count}
@@ -212,8 +212,9 @@ def _main_results(result: PairRatings, study: str) -> Iterator[MainResult]:
 def _methods(found: Collection[PairRatings], analysis: Analysis) -> str:
     del found, analysis
     return (
-        "Comparisons on a scale were turned by the order of presentation, so that they say how the comparison was "
-        "rated against the reference; one mean score a participant was tested against the middle of the scale by "
+        "The sign of comparisons on a scale was reversed where the order was reversed, so that scores compare the "
+        "comparison with the reference; each participant’s mean score "
+        "was tested against the middle of the scale by "
         "Student’s t and Wilcoxon’s signed ranks, and between the orders by analysis of variance."
     )
 

@@ -56,7 +56,7 @@ def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
         axes.set_xlim(-1, 101)
         axes.set_xticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
         a, b = readable(comparison.method_a), readable(comparison.method_b)
-        axes.set_xlabel(f"answers that favoured {a} over {b}")
+        axes.set_xlabel(f"responses that favoured {a} over {b}")
         add_mark(figure, mark)
         known = [row for row in motions if row.percent is not None]
         spoken = "; ".join(f"{readable(row.motion)}: {row.percent:.0f}%" for row in known)

@@ -131,12 +131,12 @@ def _notes(comparison: Comparison) -> list[str]:
         f"{people.undecided} towards neither."
     ]
     if comparison.ties:
-        notes.append(f"{counted(comparison.ties, 'answer')} chose neither: left out of the published test.")
+        notes.append(f"{counted(comparison.ties, 'answer')} chose neither: excluded from the published test.")
     if clusters.design_effect is not None and clusters.intraclass_correlation is not None:
         correlation = words.signed(clusters.intraclass_correlation, 3, plus=False)
         notes.append(
             f"Answers of one participant correlate by {correlation}: the pooled test counts "
-            f"{counted(comparison.published.answers, 'answer')} that are worth "
+            f"{counted(comparison.published.answers, 'answer')} as informative as "
             f"{clusters.effective_answers or 0:.0f} "
             f"independent ones (design effect {clusters.design_effect:.2f})."
         )
@@ -178,7 +178,8 @@ def preference_table(name: str, comparison: Comparison) -> Table:
         f"{name}_preference",
         f"Percent favouring {first} over {second}. As published: all answers as independent (Wilson’s interval), "
         "which a participant’s "
-        "answers are not. Corrected: one share a participant, by Student’s t (the default test) and by ranks; and the "
+        "answers are not. Corrected: each participant’s percentage, by Student’s t (the default test) and by ranks; "
+        "and the "
         "pooled percentage with its variance over participants. Orders balanced: the mean of the percentages with the "
         "first method shown first and second. A typical participant and the population: models with a term for the "
         "order, which differ where participants do. Other motions: tests that take the motions for a sample too.",
@@ -353,8 +354,8 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
     count = len(analysis.confirmatory)
     family = f" and adjusted by Holm’s method over {count} comparisons" if count > 1 else ""
     return (
-        "Preferences were tested by Student’s t of one share a participant against one half"
-        f"{family}; chi-square and exact binomial tests of all answers are given as published, with Wilson’s "
+        "Preferences were tested by Student’s t of each participant’s percentage against 50%"
+        f"{family}; chi-square and exact binomial tests of all responses are given as published, with Wilson’s "
         "intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite quadrature) and generalised "
         "estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) account for the order of "
         "presentation. Evidence for no preference is an equivalence test (Schuirmann 1987) and a Bayes factor "

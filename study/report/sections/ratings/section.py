@@ -93,7 +93,7 @@ def _of_one(question: Question, difference: MethodDifference, points: int, alpha
         first, second = second, first
     size = f"{counted(question.answers, 'answer')} of {counted(question.participants, 'participant')}"
     if mean == 0:
-        statement = f"{words.sentence(first)} and {second} were rated alike on average, on a scale of 0 to {points - 1}"
+        statement = f"{words.sentence(first)} and {second} had equal mean ratings, on a scale of 0 to {points - 1}"
     else:
         statement = (
             f"{words.sentence(first)} was rated {abs(mean):.2f} points higher than {second} on "
@@ -101,7 +101,7 @@ def _of_one(question: Question, difference: MethodDifference, points: int, alpha
             f"a scale of 0 to {points - 1}"
         )
     if difference.p_value is not None:
-        told = "this is not chance" if difference.p_value < alpha else "this can’t be told from chance"
+        told = "this is significant" if difference.p_value < alpha else "this is not significant"
         statement += f"; across participants {told} ({words.p(difference.p_value)})"
     return Headline(f"{statement}.", f"{size}. {_tests([question])}")
 
@@ -115,7 +115,7 @@ def _of_several(known: Sequence[tuple[Question, MethodDifference]], alpha: float
     if len(down) > len(up):
         first, second, up = second, first, down
     if not up:
-        return Headline(f"{words.sentence(first)} and {second} were rated alike on average.", tests)
+        return Headline(f"{words.sentence(first)} and {second} had equal mean ratings.", tests)
     clear = sum(difference.p_value is not None and difference.p_value < alpha for difference in up)
     return Headline(
         f"{words.sentence(first)} was rated higher than {second} in {len(up)} of "
@@ -159,7 +159,7 @@ def _omnibus(question: Question) -> list[str]:
 
 def _f(row: VarianceEffect | WithinEffect, p_value: float | None) -> str:
     if row.f is None or p_value is None:
-        return "no F, for the ratings do not vary"
+        return "no F, since the ratings do not vary"
     degrees = f"{row.degrees_of_freedom}, {row.error_degrees_of_freedom}"
     return f"F({degrees}) = {row.f:.2f}, {words.p(p_value)}"
 
@@ -228,7 +228,7 @@ def variance_table(name: str, questions: Sequence[Question]) -> Table:
         f"{name}_anova",
         "As published: two-way analysis of variance between subjects, method by order of presentation. 2003 section "
         "4.2, "
-        "type III sums of squares. It takes the ratings of one participant for independent; the next table does not. "
+        "type III sums of squares. It treats the ratings of one participant as independent; the next table does not. "
         "Effect sizes with 90% intervals.",
         f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
         _by_question(questions, lambda question: question.anova),
@@ -239,15 +239,16 @@ def difference_table(name: str, questions: Sequence[Question]) -> Table:
     """Return the difference of the methods over participants."""
     return tables.make(
         f"{name}_differences",
-        "Corrected: difference of each participant’s own ratings of two methods. Mean, 95% interval, and t test (the "
-        "exact sign test where all participants differ alike); p-values of several pairs adjusted by Holm’s method.",
+        "Corrected: difference between each participant’s ratings of two methods. Mean, 95% interval, and t test (the "
+        "exact sign test if all differences are equal)"
+        "; p-values of several pairs adjusted by Holm’s method.",
         "item of mean low high t degrees_of_freedom p_value holm_p_value",
         _by_question(questions, lambda question: question.differences),
     )
 
 
 def _folded(name: str, result: Ratings) -> list[Table]:
-    """The cells of the design, and whatever other analyses could be made; those without a row are left out."""
+    """The cells of the design, and whatever other analyses could be made; those without a row are omitted."""
     cells_table = tables.make(
         f"{name}_cells",
         "Ratings by method and by order of presentation. Order: the method that a participant saw first. Means over "
@@ -257,14 +258,13 @@ def _folded(name: str, result: Ratings) -> list[Table]:
     )
     type_ii = tables.make(
         f"{name}_anova_type_ii",
-        "The published analysis by type II sums of squares. It differs where the cells hold unequal numbers of "
-        "answers.",
+        "The published analysis by type II sums of squares. It differs if cells have unequal numbers of answers.",
         f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
         _by_question(result.questions, lambda question: question.type_ii or ()),
     )
     mixed = tables.make(
         f"{name}_mixed_design",
-        "Mixed design: participants as random. Methods (and motions, where everybody rated all) vary within "
+        "Mixed design: participants as random. Methods (and motions, if everybody rated all) vary within "
         "participants, the order between them; p corrected by Greenhouse and Geisser’s epsilon.",
         f"{_VARIANCE} f p_value epsilon corrected_p_value generalized_eta_squared {_EFFECT}",
         _by_question(result.questions, lambda question: question.mixed_design.effects),
@@ -278,7 +278,7 @@ def _folded(name: str, result: Ratings) -> list[Table]:
     )
     ordinal = tables.make(
         f"{name}_ordinal",
-        "Ordinal mixed model. Points of the scale as ordered only, participants as random: effects in logits (above 0: "
+        "Ordinal mixed model. Points of the scale as ordinal, participants as random: effects in logits (above 0: "
         "rated higher), as odds ratios, with 95% intervals.",
         "item effect value standard_error low high odds_ratio p_value",
         [
@@ -313,7 +313,7 @@ def _methods(found: Collection[Ratings], analysis: Analysis) -> str:
     del found, analysis
     return (
         "Ratings were compared by the two-way between-subjects analysis of variance of 2003 (method by order; type "
-        "III sums of squares), and by Student’s t of each participant’s own difference."
+        "III sums of squares), and by Student’s t of each participant’s difference."
     )
 
 

@@ -33,7 +33,7 @@ SIGNS: Mapping[Side, float] = {"shorter": -1.0, "longer": 1.0}
 
 
 def _points(axes: Axes, rows: Sequence[PercentDifferent], size: float = 5.0) -> None:
-    """Percentages with bars of one standard error, joined by straight lines as in 2004 Figure 6."""
+    """Percentages with bars of one standard error, interpolated linearly as in 2004 Figure 6."""
     across = [row.difference_frames for row in rows]
     up = [row.percent for row in rows]
     errors = [row.standard_error or 0.0 for row in rows]
@@ -135,7 +135,7 @@ def motions_figure(result: SameDifferent, name: str, mark: str) -> str:
 
 
 def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mapping[Side, float]) -> str:
-    """Thresholds with intervals: all motions and each one, straight lines and model, shorter and longer."""
+    """Thresholds with intervals: all motions and each one, linear interpolation and model, shorter and longer."""
     entries: list[tuple[str, SameDifferent | MotionThresholds]] = [("all motions", result)]
     entries += [(readable(motion.motion), motion) for motion in result.motions if len(result.motions) > 1]
     with style():
@@ -178,11 +178,13 @@ def _threshold_key(axes: Axes, known: bool) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=INK, marker="o", markersize=4.5, label="straight lines (as published)"),
+        Line2D([], [], color=INK, marker="o", markersize=4.5, label="linear interpolation (as published)"),
         Line2D([], [], color=BLUE, marker="s", markersize=4.5, label="differencing model"),
     ]
     if known:
-        handles.append(Line2D([], [], color=ORANGE, linestyle=(0, (2, 2)), label="known of the simulated observers"))
+        handles.append(
+            Line2D([], [], color=ORANGE, linestyle=(0, (2, 2)), label="true values of the simulated observers")
+        )
     axes.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8.5, labelcolor=SOFT)
 
 

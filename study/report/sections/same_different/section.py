@@ -1,6 +1,6 @@
 """A same-different study on the page: the analysis of `analyse_jnd` in, headline, figures, tables and notes out.
 
-2004 section 5.1 and Figure 6; every threshold stands as published (straight lines) and corrected (model).
+2004 section 5.1 and Figure 6; every threshold is given as published (linear interpolation) and corrected (model).
 """
 
 from __future__ import annotations
@@ -79,15 +79,15 @@ def _drawings(result: SameDifferent, about: About) -> list[Drawing]:
             "curve",
             lambda place: figures.same_different_figure(result, place, about.mark),
             "Answers “different” by the difference in blend length from k, the length that the reference method "
-            "gives. Points: means over participants ± one standard error, joined by straight lines as in 2004. Curve: "
+            "gives. Points: means over participants ± one standard error, interpolated linearly as in 2004. Curve: "
             "the differencing model; its drop lines are the just noticeable differences, the bars at their feet 95% "
             "intervals (jackknife over participants).",
         ),
         (
             "thresholds",
             lambda place: figures.thresholds_figure(result, place, about.mark, truth),
-            "The just noticeable difference with 95% intervals over participants: Fieller’s for straight lines, the "
-            "jackknife’s for the model. Without a bar, the interval reaches beyond the levels shown.",
+            "The just noticeable difference with 95% intervals over participants: Fieller’s for linear interpolation, "
+            "the jackknife’s for the model. Without a bar, the interval reaches beyond the levels shown.",
         ),
     ]
     if len(result.motions) > 1:
@@ -104,7 +104,7 @@ def headline(result: SameDifferent, fps: float, data: str) -> Headline:
     """Return the just noticeable difference as a statement and what it rests on."""
     if not result.answers:
         missed = result.missed
-        why = f"all {counted(missed, 'question')} were missed" if missed else "there are no answers"
+        why = f"all {counted(missed, 'question')} had no response" if missed else "there are no answers"
         return Headline(f"No just noticeable difference can be given: {why}.", "")
     who = SUBJECTS[data](result.participants)
     percent = f"{100 * result.level:.0f}% “different”"
@@ -141,18 +141,18 @@ def _detail(result: SameDifferent, chosen: Mapping[Side, Threshold]) -> str:
     parts = []
     if result.model:
         ends = [f"{_ends(found)} {side}" for side, _ in SIDES if (found := chosen.get(side)) and _closed(found)]
-        over = "over participants" if result.participants > 1 else "of one participant’s answers as independent"
+        over = "over participants" if result.participants > 1 else "of one participant, answers treated as independent"
         parts.append(
             f"Differencing model, {size}" + (f"; 95% intervals {over}: {words.joined(ends)}." if ends else ".")
         )
     else:
-        parts.append(f"Straight lines between the levels, {size}. No model was fitted: {result.model_note}.")
+        parts.append(f"Linear interpolation, {size}. No model was fitted: {result.model_note}.")
     absent = [side for side, _ in SIDES if side in chosen and chosen[side].frames is None]
     parts += [f"Where the blend was {side}: {chosen[side].note}." for side in absent]
     if result.model:
         published = result.published
         places = [f"k {sign} {_frames(published[side])}" for side, sign in SIDES if side in published]
-        parts.append(f"Straight lines between the levels, as published in 2004: {words.joined(places)} frames.")
+        parts.append(f"Linear interpolation, as published in 2004: {words.joined(places)} frames.")
     return " ".join(parts)
 
 
@@ -174,7 +174,7 @@ def _readings(result: SameDifferent) -> Iterator[Reading]:
         published = result.published.get(side)
         yield Reading(
             f"just noticeable difference, {side}",
-            f"{_with_interval(published, sign)}; straight lines" if published else "–",
+            f"{_with_interval(published, sign)}; linear interpolation" if published else "–",
             f"{_with_interval(model[side], sign)}; differencing model" if side in model else "no model was fitted",
         )
 
@@ -192,8 +192,9 @@ def _staircase_note(found: Staircases) -> str:
     return (
         f"Trials came by staircases that aim at {100 * found.target:.1f}% “different”. Their threshold is the mean of "
         f"the last {found.averaged} reversals of each, averaged over the staircases of a participant and then over "
-        f"participants{spread}. It assumes no model and moves with the rate of false alarms. The differencing model is "
-        "fitted to all trials; straight lines between levels that were seldom shown mean little here."
+        f"participants{spread}. It assumes no model and moves with the false-alarm rate. The differencing model is "
+        "fitted "
+        "to all trials; linear interpolation between rarely shown levels means little here."
     )
 
 
@@ -211,9 +212,8 @@ def _notes(result: SameDifferent) -> list[str]:
     order = result.order_test
     if order.p_value is not None and order.difference_percent is not None:
         notes.append(
-            f"By order: {words.signed(order.difference_percent)} percentage points more “different” where the "
-            f"reference came first, {words.p(order.p_value)} over participants; neither rule expects the order to "
-            "matter."
+            f"By order: {words.signed(order.difference_percent)} percentage points more “different” if the "
+            f"reference came first, {words.p(order.p_value)} over participants; both rules predict no effect of order."
         )
     notes += _across_motions(result.across_motions)
     effect, likeness = result.clustering.design_effect, result.clustering.intraclass_correlation
@@ -228,13 +228,13 @@ def _notes(result: SameDifferent) -> list[str]:
 
 def _model_notes(model: ModelFit) -> list[str]:
     notes = [
-        f"Pairs without any difference were called different in {100 * model.false_alarms:.1f}% (model). The "
-        f"criterion is {model.criterion:.2f} standard deviations of one impression, the lapse rate "
+        f"Identical pairs were called different in {100 * model.false_alarms:.1f}% (model). The "
+        f"criterion is {model.criterion:.2f} standard deviations of an impression, the lapse rate "
         f"{100 * model.lapse:.1f}%."
     ]
     fit = model.fit_p_value
     if fit is not None:
-        says = "the curve follows the data" if fit >= 0.05 else "the curve does not follow the data closely"
+        says = "the curve fits" if fit >= 0.05 else "the curve does not fit closely"
         notes.append(
             f"Deviance from free percentages {model.fit_deviance:.1f} on "
             f"{counted(model.fit_degrees_of_freedom, 'degree')} of freedom, {words.p(fit)}: {says}."
@@ -250,7 +250,7 @@ def _mixed_note(mixed: MixedThresholds) -> str:
     """How people differ, by the mixed model."""
     text = (
         "By the mixed model, participants’ logarithms of sensitivity and criterion have standard deviations of "
-        f"{mixed.sensitivity_spread:.2f} and {mixed.criterion_spread:.2f}; the test that they are alike gives "
+        f"{mixed.sensitivity_spread:.2f} and {mixed.criterion_spread:.2f}; the test that they are equal gives "
         f"{words.p(mixed.alike_p_value)} (likelihood ratio)."
     )
     return f"{text} Caution: {mixed.note}." if mixed.note else text
@@ -271,7 +271,7 @@ def _across_motions(test: AcrossMotions) -> list[str]:
         return []
     text = (
         f"Correct answers across motions: chi-square({test.chi_square_degrees_of_freedom}) = "
-        f"{test.chi_square:.2f}, {words.p(test.chi_square_p_value)} with answers as independent"
+        f"{test.chi_square:.2f}, {words.p(test.chi_square_p_value)} with answers treated as independent"
     )
     if test.f_p_value is None or test.f_degrees_of_freedom is None:
         return [f"{text}; {test.note}."]
@@ -299,7 +299,7 @@ def _methods(found: Collection[SameDifferent], analysis: Analysis) -> str:
     percent = f"{100 * next(iter(found)).level:.0f}%"
     return (
         f"Percentages of “different” are means over participants ± standard errors. Just noticeable differences "
-        f"are where these reach {percent}: read off straight lines as in 2004, with Fieller’s intervals over "
+        f"are where these reach {percent}: found by linear interpolation as in 2004, with Fieller’s intervals over "
         "participants, and on a differencing model of the same-different task (Macmillan & Creelman 2005: one "
         "criterion, a slope each for shorter and longer blends, a lapse rate of at most 10%), fitted by maximum "
         "likelihood to all answers, with intervals by Student’s t of the logarithm from a jackknife over "

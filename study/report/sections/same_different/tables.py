@@ -18,7 +18,7 @@ SIDES: tuple[tuple[Side, str], ...] = (("longer", "+"), ("shorter", "−"))
 
 def _threshold_rows(entry: SameDifferent | MotionThresholds, fps: float) -> list[dict[str, Any]]:
     """Every reading of the thresholds of all motions together, or of one."""
-    kinds = [("straight lines (as published)", entry.published)]
+    kinds = [("linear interpolation (as published)", entry.published)]
     if model := entry.model:
         kinds += [("model", model.jnd), ("model", _profiled(entry))]
         kinds += [("model, best criterion", model.corrected), ("model, Abbott’s correction", model.guess_corrected)]
@@ -78,16 +78,19 @@ def threshold_table(name: str, result: SameDifferent, fps: float) -> Table:
     rows = _threshold_rows(result, fps)
     return make(
         f"{name}_thresholds",
-        f"The just noticeable difference, as published and corrected. Straight lines: where {percent} of the answers "
-        "are “different”, read off between the levels; this moves with the rate of false alarms and cuts the corners "
-        f"of the curve. Model: the same {percent} on the fitted curve. Best criterion: the difference at which an "
-        f"observer with the best criterion would be right in {percent} of same and different pairs, whatever the "
-        "criterion people took. Abbott: after taking false alarms for guesses. Mixed model: participants with "
-        "sensitivities and criteria of their own, the median one of them, and the mean of all. Fieller’s and the "
+        f"The just noticeable difference, as published and corrected. Linear interpolation: where {percent} of the "
+        "answers "
+        "are “different”, interpolated between the levels; this depends on the false-alarm rate and is biased for a "
+        "curved function. "
+        f"Model: the same {percent} on the fitted curve. Best criterion: the difference at which an "
+        f"observer with the best criterion would be right in {percent} of same and different pairs, whatever "
+        "criterion the participants used"
+        ". Abbott: corrected for false alarms as guesses. Mixed model: participants with individual sensitivities and "
+        "criteria: the median one, and the mean of all. "
+        "Fieller’s and the "
         "jackknife’s intervals are over participants, the curvature’s rest on the mixed model; profile likelihood "
-        "takes "
-        "all answers for independent and is too narrow where participants differ. A dash where an interval reaches "
-        "beyond the levels shown.",
+        "treats all answers as independent and is too narrow if participants differ"
+        ". A dash: the interval reaches beyond the levels shown.",
         _THRESHOLDS,
         rows,
         headings={"interval": "interval by"},
@@ -117,7 +120,8 @@ def percent_table(name: str, result: SameDifferent) -> Table:
     return make(
         f"{name}_percent_different",
         "Answers “different” by difference in blend length. Mean and standard error over participants; Wilson’s "
-        "interval of the answers as if independent.",
+        "interval with answers treated as independent"
+        ".",
         "difference_frames participants answers different percent standard_error:one low:one high:one",
         [vars(row) for row in result.percent_different],
     )
@@ -128,7 +132,7 @@ def d_prime_table(name: str, result: SameDifferent) -> Table:
     return make(
         f"{name}_d_prime",
         "Sensitivity at every level. Under the differencing rule, against the pairs without a difference; answers "
-        "pooled, taken as independent; one half added to each count.",
+        "pooled, treated as independent; one half added to each count.",
         "difference_frames d_prime standard_error low high criterion",
         [vars(row) for row in result.d_prime],
     )
@@ -154,7 +158,7 @@ def recovery_table(name: str, result: SameDifferent, known: Mapping[str, Any]) -
         own = result.staircases.thresholds if result.staircases else {}
         for label, thresholds, truths, key in (
             ("differencing model", result.model.jnd if result.model else {}, known, f"threshold_{side}_frames"),
-            ("straight lines", result.published, known, f"interpolated_{side}_frames"),
+            ("linear interpolation", result.published, known, f"interpolated_{side}_frames"),
             ("staircases", own, known.get("staircase", {}), f"threshold_{side}_frames"),
         ):
             truth, found = truths.get(key), thresholds.get(side)
@@ -174,7 +178,8 @@ def recovery_table(name: str, result: SameDifferent, known: Mapping[str, Any]) -
             )
     return make(
         f"{name}_recovery",
-        "What the simulated observers had and what was found, in frames. For straight lines the known value is where "
+        "What the simulated observers had and what was found, in frames. For linear interpolation the known value is "
+        "where "
         "they would cross with endless data; for staircases it is where the observers reach what these aim at.",
         "estimate side known found standard_error distance standard_errors",
         rows,

@@ -48,7 +48,7 @@ class Fixed(Length):
     follows = False
 
     fixed_frames: Annotated[int | None, Ge(1), Le(600)] = setting(
-        None, "Length `fixed`: the blend length; that of the study, or 0.33 s, where it is left out. [frames]"
+        None, "Length `fixed`: the blend length; by default that of the study, or 0.33 s. [frames]"
     )
 
     def frames(self, fps: float) -> int:

@@ -54,10 +54,10 @@ class Blending(Make):
     """What all makes that blend can be told."""
 
     weight: Literal["linear", "sigmoid"] = setting(
-        "linear", "How the blend weight runs from 0 to 1; as in `[stimuli]` where it is left out."
+        "linear", "How the blend weight runs from 0 to 1; by default as in `[stimuli]`."
     )
     clean_feet: bool = setting(
-        True, "Whether sliding of planted feet is removed after blending; as in `[stimuli]` where it is left out."
+        True, "Whether sliding of planted feet is removed after blending; by default as in `[stimuli]`."
     )
 
     def details(self) -> str:

@@ -1,4 +1,4 @@
-"""Optimal one-hop transitions: by way of a third motion, with the waits that cost least (Koyama & Goto 2019).
+"""Optimal one-hop transitions: through a third motion, with the stays of least cost (Koyama & Goto 2019).
 
 The transition points are theirs in this way: the source's point is the triggered frame, and the destination stands in
 time as the direct blend of the same length has it. Both blends are made and cleaned as the direct one beside them.
@@ -118,13 +118,13 @@ class OneHop(Blending):
     draws = 20
 
     hops: tuple[str, ...] = setting(
-        (), "Make `one-hop`: motions that may be hops; those of the study's transitions where it is left out."
+        (), "Make `one-hop`: motions that may be hops; by default those of the study's transitions."
     )
     stay_s: Annotated[float, Ge(0), Le(10)] = setting(
         1.0, "Make `one-hop`: longest stay in the source and in the hop; 0 for none. [seconds]"
     )
     hop_weight: Annotated[float | None, Ge(0), Le(0.01)] = setting(
-        None, "Make `one-hop`: cost of a frame of stay, square metres; that of Eq. 5 where it is left out."
+        None, "Make `one-hop`: cost of a frame of stay, square metres; by default that of Eq. 5."
     )
     weight_times: Annotated[float, Ge(0), Le(100)] = setting(
         1.0, "Make `one-hop`: what that cost is multiplied by (Figure 11)."

@@ -1,1 +1,1 @@
-"""Where a transition stands."""
+"""Where a transition is placed: the points."""
