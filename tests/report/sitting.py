@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from study.experiment import session as sitting
 from study.experiment.folder import PROTOCOL
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import load_protocol
+from study.experiment.session import open_session, walk
 from study.experiment.steps import Step
 from study.experiment.stimuli.manifest import read_manifest
 from study.experiment.store.answers import Presentation, record_answer, record_event
@@ -88,28 +89,24 @@ def sit(
         record = begin_session(
             responses, protocol, plan, library=manifest.library, library_synthetic=manifest.synthetic
         )
-        state, given = sitting.open_session(protocol, plan, passed=("consent", "form")), 0
-        shown: list[Presentation] = []
-        while (step := sitting.current(state)).kind != "done" and given < most_answers:
-            if step.kind != "answer":
-                state = sitting.advanced(state)
-                continue
-            trial = state.trial(step.trial)
-            reaction = behave(trial, step, rng)
-            shown_well = reaction.gap_frames <= 1.5
-            if reaction.value is None:
-                state, answer = sitting.missed(state, shown_well=shown_well)
-            else:
-                state, answer = sitting.answered(state, reaction.value, reaction.response_s, shown_well=shown_well)
+        reactions: list[Reaction] = []
+
+        def respond(trial: Trial, step: Step) -> tuple[str | None, float]:
+            reactions.append(behave(trial, step, rng))
+            return reactions[-1].value, reactions[-1].response_s
+
+        session = open_session(protocol, plan, passed=("consent", "form"))
+        answers = walk(session, respond, lambda _trial, _step: reactions[-1].gap_frames <= 1.5)
+        for trial, answer in islice(answers, most_answers):
+            frames, gap_frames = (120 if answer.shown_well else 117), reactions[-1].gap_frames
             shown = [
                 Presentation(
-                    trial.trial, step.attempt, place, stimulus, "requestVideoFrameCallback", 120,
-                    120 if shown_well else 117, reaction.gap_frames, shown_well,
+                    trial.trial, answer.attempt, place, stimulus, "requestVideoFrameCallback", 120, frames, gap_frames,
+                    answer.shown_well,
                 )
                 for place, stimulus in zip(PLACES, trial.stimuli, strict=False)
             ]  # fmt: skip
             record_answer(responses, record, trial, answer, shown)
-            given += 1
-        if sitting.current(state).kind == "done":
+        if next(answers, None) is None:
             record_event(responses, record, "finished")
     return record.id
