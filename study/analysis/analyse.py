@@ -47,7 +47,7 @@ class Decided(Protocol):
 
     @property
     def staircases(self) -> Mapping[str, UpDown]:
-        """The rule of each study whose trials came by staircases."""
+        """The rule of each study whose trials were chosen by staircases."""
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class Settings:
     scale_points
         Points of the scale of each rating study, by its name; needed where pairs were rated.
     staircases
-        The rule of each study whose trials came by staircases, by its name.
+        The rule of each study whose trials were chosen by staircases, by its name.
     """
 
     threshold: float = 0.75

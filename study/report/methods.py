@@ -100,7 +100,7 @@ def _study(protocol: Protocol, study: StudySpec) -> str:
     what = task_of(study).in_words(study, lambda method: _blends(protocol, study, method))
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
     order = {1: SINGLE_ORDERS, 2: ORDERS}.get(task_of(study).slots, ORDERS_OF_SEVERAL)[study.order]
-    chosen = f" Trials came by {by}." if (by := study.procedure.in_words()) else ""
+    chosen = f" Trials were chosen by {by}." if (by := study.procedure.in_words()) else ""
     return f"In “{title}”, participants {what}. {order}{repeated}.{chosen}"
 
 

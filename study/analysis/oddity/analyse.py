@@ -76,7 +76,7 @@ class Oddity:
     functions
         The psychometric function of each side, over the size of the difference.
     staircases
-        Thresholds as means of reversals, where trials came by staircases.
+        Thresholds as means of reversals, where trials were chosen by staircases.
     """
 
     keys: ClassVar[Mapping[str, str]] = {"oddity": ""}

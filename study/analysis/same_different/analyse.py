@@ -82,7 +82,7 @@ class SameDifferent(Thresholds):
     answer
         The thresholds in sentences.
     staircases
-        Thresholds as means of reversals, where trials came by staircases.
+        Thresholds as means of reversals, where trials were chosen by staircases.
     """
 
     keys: ClassVar[Mapping[str, str]] = {"jnd": ""}

@@ -69,7 +69,7 @@ def test_the_answer_and_the_report_say_which_threshold_is_which(found: SameDiffe
     assert estimates.count("staircases, mean of the last 10 reversals (70.7%)") == 2
     assert [row["estimate"] for row in tables["jnd_recovery"].rows].count("staircases") == 2
     assert len(tables["jnd_staircases"].rows) == 48
-    assert section.notes[0].startswith("Trials came by staircases that aim at 70.7% “different”.")
+    assert section.notes[0].startswith("Trials were chosen by staircases that aim at 70.7% “different”.")
 
 
 def test_json_has_the_staircases_and_constant_stimuli_have_none() -> None:
