@@ -140,7 +140,7 @@ def draw_plan(
         known = [*practice, *_with_checks(study, shown, checks)]
         trials += [replace(trial, trial=place) for place, trial in enumerate(known, start=number)]
         number += len(known)
-        # Numbers are kept for all trials that may come, so that those of later studies hang on no answer.
+        # Numbers are reserved for all trials that may come, so that later studies do not depend on the answers.
         if (course := study.procedure.course(draw, number)) is not None:
             courses.append(course)
             number += course.most

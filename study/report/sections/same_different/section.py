@@ -190,9 +190,9 @@ def _staircase_note(found: Staircases) -> str:
     spreads = [f"{spread:.1f} frames {side}" for side, spread in found.spread.items()]
     spread = f"; within a staircase these differ by a standard deviation of {words.joined(spreads)}" if spreads else ""
     return (
-        f"Trials were chosen by staircases that aim at {100 * found.target:.1f}% “different”. Their threshold is the mean of "
-        f"the last {found.averaged} reversals of each, averaged over the staircases of a participant and then over "
-        f"participants{spread}. It assumes no model and moves with the false-alarm rate. The differencing model is "
+        f"Trials were chosen by staircases that aim at {100 * found.target:.1f}% “different”. Their threshold is the "
+        f"mean of the last {found.averaged} reversals of each, averaged over the staircases of a participant and then "
+        f"over participants{spread}. It assumes no model and moves with the false-alarm rate. The differencing model is "
         "fitted "
         "to all trials; linear interpolation between rarely shown levels means little here."
     )
