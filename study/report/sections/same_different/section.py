@@ -192,9 +192,8 @@ def _staircase_note(found: Staircases) -> str:
     return (
         f"Trials were chosen by staircases that aim at {100 * found.target:.1f}% “different”. Their threshold is the "
         f"mean of the last {found.averaged} reversals of each, averaged over the staircases of a participant and then "
-        f"over participants{spread}. It assumes no model and moves with the false-alarm rate. The differencing model is "
-        "fitted "
-        "to all trials; linear interpolation between rarely shown levels means little here."
+        f"over participants{spread}. It assumes no model and moves with the false-alarm rate. The differencing model "
+        "is fitted to all trials; linear interpolation between rarely shown levels means little here."
     )
 
 
