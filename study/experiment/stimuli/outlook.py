@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from study.counting import counted, noun
+from study.counting import counted
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.films import Film, Planned, Showing, plan_all
 from study.experiment.stimuli.supply import Supply
@@ -180,7 +180,7 @@ def _too_alike(protocol: Protocol, planned: Sequence[Planned]) -> Iterator[str]:
             longer, shorter = (round(s * protocol.fps) for s in (JND_LONGER_S, JND_SHORTER_S))
             yield (
                 f"{study.name}: in {len(named)} of {counted(len(own), 'transition')} {study.reference} and "
-                f"{study.comparison} {noun(len(named), 'differs', 'differ')} by less than the just noticeable "
+                f"{study.comparison} differ by less than the just noticeable "
                 f"difference, {longer} frames longer or {shorter} shorter: {', '.join(named)} frames. People may see "
                 "no difference there; shortest_frames, avoid_frames and avoid_within_frames choose other points."
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
-from study.analysis.oddity.analyse import SIGNS, Oddity, Side, SideThreshold
+from study.analysis.oddity.analyse import SIGNS, Oddity, SideThreshold
 from study.counting import counted
 from study.models.oddity import CHANCE, HALFWAY
 from study.report import tables, words
@@ -117,10 +117,9 @@ def _recovered(name: str, result: Oddity, about: About) -> Table:
 
 
 def _readings(result: Oddity) -> Iterator[Reading]:
-    signs: dict[Side, str] = {"shorter": "−", "longer": "+"}
     for side, found in result.thresholds.items():
         if found.frames is not None:
-            told = f"{signs[side]}{found.frames:.1f} [{words.bare_interval(found.low, found.high)}]"
+            told = f"{found.frames:.1f} [{words.bare_interval(found.low, found.high)}]"
             yield Reading(f"threshold, {side} [frames]", "", told)
 
 
