@@ -8,6 +8,7 @@ import sys
 import tomllib
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import pytest
 from packaging.requirements import Requirement
@@ -38,13 +39,13 @@ esac
 
 
 @pytest.fixture
-def ask(tmp_path):
+def ask(tmp_path: Path) -> Any:
     """`ask(command)`: what a function of `.ci/packages` prints, with programs in place of the system's own."""
     for name, text in (("apt-cache", SLOW_APT_CACHE), ("dpkg-query", DPKG_QUERY)):
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)
 
-    def run(command):
+    def run(command) -> Any:
         script = f"set -euo pipefail; source {ROOT / '.ci' / 'packages'}; {command}"
         return subprocess.run(
             ["bash", "-c", script],
@@ -57,41 +58,41 @@ def ask(tmp_path):
     return run
 
 
-def test_what_the_distribution_has_is_wanted_however_slowly_it_says_so(ask):
+def test_what_the_distribution_has_is_wanted_however_slowly_it_says_so(ask) -> None:
     for _ in range(10):
         found = ask("wanted_packages chromium libosmesa6 firefox-esr libavcodec-extra unheard-of")
         assert found.returncode == 0, found.stderr
         assert found.stdout.split() == ["chromium", "firefox-esr", "libavcodec-extra"]
 
 
-def test_a_look_up_that_fails_is_not_taken_for_a_missing_package(ask):
+def test_a_look_up_that_fails_is_not_taken_for_a_missing_package(ask) -> None:
     found = ask("wanted=$(wanted_packages libosmesa6 broken firefox-esr); echo went on")
     assert found.returncode != 0
     assert "apt-cache policy broken failed" in found.stderr
     assert "went on" not in found.stdout
 
 
-def test_removed_packages_count_as_missing(ask):
+def test_removed_packages_count_as_missing(ask) -> None:
     found = ask("missing_packages").stdout.split()
     assert "xvfb" not in found
     assert {"postgresql", "chromium", "firefox-esr", "libosmesa6"} <= set(found)
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: f"{path.parent.name}/{path.name}")
-def test_no_script_pipes_into_a_reader_that_stops_early(script):
+def test_no_script_pipes_into_a_reader_that_stops_early(script: Path) -> None:
     """Under `pipefail` the writer then dies of SIGPIPE now and then, and a finding reads as none."""
     text = script.read_text()
     assert not re.findall(r"\|\s*(?:grep\s+-\w*[qm]|head\b|sed\s+-n\s+\S*q|awk\b[^|]*\bexit\b)", text)
     assert subprocess.run(["bash", "-n", script], check=False).returncode == 0
 
 
-def pinned():
+def pinned() -> list[Any]:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     requirements = [Requirement(line) for line in lines if line and not line.startswith("#")]
     return [r for r in requirements if r.marker is None or r.marker.evaluate()]
 
 
-def needed():
+def needed() -> Any:
     """Every distribution that Segue with all its extras asks for, by way of others too, as installed here."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"].values()
@@ -122,14 +123,14 @@ def needed():
     return names
 
 
-def test_every_dependency_is_pinned_to_one_version():
+def test_every_dependency_is_pinned_to_one_version() -> None:
     versions = {canonicalize_name(r.name): str(r.specifier) for r in pinned()}
     assert len(versions) == len(pinned())
     assert all(re.fullmatch(r"==[\w.!+]+", version) for version in versions.values())
     assert needed() <= set(versions), "run scripts/constraints --keep"
 
 
-def test_the_scripts_install_the_pinned_versions():
+def test_the_scripts_install_the_pinned_versions() -> None:
     """Only an environment that the scripts made is held to them: `pip install .` stays free."""
     if Path(sys.prefix) != ROOT / ".venv":
         pytest.skip("this environment was not made by scripts/setup")

@@ -21,7 +21,7 @@ def script(name: str) -> ModuleType:
     return module
 
 
-def test_every_package_that_segue_installs_stands_on_the_page():
+def test_every_package_that_segue_installs_stands_on_the_page() -> None:
     page = (ROOT / "docs" / "security.md").read_text(encoding="utf-8")
     missing = [name for name in script("licences").installed("segue") if f"| {name} | " not in page]
     assert not missing, "run `python scripts/licences.py` and put its lines onto the page"
@@ -53,7 +53,7 @@ def test_every_package_that_segue_installs_stands_on_the_page():
         ),
     ],
 )
-def test_only_packages_that_were_looked_up_pass_an_audit(answer, status, said):
+def test_only_packages_that_were_looked_up_pass_an_audit(answer, status: int, said: str) -> None:
     found, lines = script("audited").audited("pypi", answer if isinstance(answer, str) else json.dumps(answer))
     assert found == status
     assert said in "\n".join(lines)

@@ -6,17 +6,23 @@ import contextlib
 import json
 import socket
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from study.experiment.stimuli.manifest import Manifest
+from study.experiment.store.responses import Responses
+
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent / "browser")]
+
+if TYPE_CHECKING:
+    from serving import Serving
 
 
 @pytest.fixture(scope="session")
-def stimuli(tmp_path_factory):
+def stimuli(tmp_path_factory: pytest.TempPathFactory) -> Manifest:
     """The manifest of a small study whose films are noise."""
     from serving import unfilmed
 
@@ -24,7 +30,7 @@ def stimuli(tmp_path_factory):
 
 
 @pytest.fixture
-def responses(tmp_path):
+def responses(tmp_path: Path) -> Iterator[Responses]:
     """An empty database."""
     from study.experiment.store.responses import open_responses
 
@@ -33,13 +39,13 @@ def responses(tmp_path):
 
 
 @pytest.fixture
-def serve(stimuli, responses):
+def serve(stimuli: Manifest, responses: Responses) -> Iterator[Callable[..., Serving]]:
     """`serve(**settings)`: a new server on the same database (`serving.Serving`)."""
     from serving import Serving
 
     opened = []
 
-    def start(root_path="", **settings):
+    def start(root_path: str = "", **settings) -> Any:
         opened.append(Serving(stimuli, responses, root_path, **settings))
         return opened[-1]
 
@@ -49,11 +55,11 @@ def serve(stimuli, responses):
 
 
 @pytest.fixture
-def connect(port):
+def connect(port: int) -> Iterator[Callable[[], socket.socket]]:
     """`connect()`: a socket to the server that a test file's fixture `port` runs."""
     with contextlib.ExitStack() as stack:
 
-        def opened():
+        def opened() -> Any:
             client = stack.enter_context(socket.create_connection(("127.0.0.1", port)))
             client.settimeout(10)
             return client

@@ -7,7 +7,9 @@ import os
 import subprocess
 import sys
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from postgres_server import PASSWORD, without_password
@@ -21,17 +23,17 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
-def protocol(tmp_path):
+def protocol(tmp_path: Path) -> Path:
     file = tmp_path / "served.toml"
     file.write_text(PROTOCOL, encoding="utf-8")
     return file
 
 
 @pytest.fixture
-def ask(capsys):
+def ask(capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
     """`ask(arguments ...)`: a verb's JSON; a password is nowhere in what it printed."""
 
-    def ask(*arguments):
+    def ask(*arguments) -> Callable[..., Any]:
         status = run([*map(str, arguments), "--json"])
         printed = capsys.readouterr()
         assert status == 0, printed.err
@@ -41,7 +43,9 @@ def ask(capsys):
     return ask
 
 
-def test_verbs_say_the_same_of_answers_in_either_database(ask, protocol, tmp_path, postgres_url):
+def test_verbs_say_the_same_of_answers_in_either_database(
+    ask: Callable[..., Any], protocol: Path, tmp_path: Path, postgres_url: str
+) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
     elsewhere = ("--database", postgres_url)
     ask("simulate", protocol, "--participants", 3, "--out", here)
@@ -62,7 +66,9 @@ def test_verbs_say_the_same_of_answers_in_either_database(ask, protocol, tmp_pat
         assert file.is_dir() or b"wombat" not in file.read_bytes(), file
 
 
-def test_the_database_may_be_named_by_the_environment(ask, protocol, tmp_path, postgres_url, monkeypatch):
+def test_the_database_may_be_named_by_the_environment(
+    ask: Callable[..., Any], protocol: Path, tmp_path: Path, postgres_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A URL on the command line is seen by all users of a machine."""
     monkeypatch.setenv("SEGUE_DATABASE", without_password(postgres_url))
     monkeypatch.setenv("PGPASSWORD", PASSWORD)
@@ -74,7 +80,9 @@ def test_the_database_may_be_named_by_the_environment(ask, protocol, tmp_path, p
         ask("analyse", tmp_path / "results")
 
 
-def test_answers_that_are_not_there_are_not_made_up(capsys, protocol, tmp_path, ask):
+def test_answers_that_are_not_there_are_not_made_up(
+    capsys: pytest.CaptureFixture[str], protocol: Path, tmp_path: Path, ask: Callable[..., Any]
+) -> None:
     ask("simulate", protocol, "--participants", 1, "--out", tmp_path / "results")
     (tmp_path / "results" / "responses.sqlite").unlink()
     for verb in ("analyse", "export"):
@@ -83,7 +91,9 @@ def test_answers_that_are_not_there_are_not_made_up(capsys, protocol, tmp_path, 
         assert not (tmp_path / "results" / "responses.sqlite").exists()
 
 
-def test_a_database_about_other_stimuli_is_refused(capsys, protocol, tmp_path, postgres_url, ask):
+def test_a_database_about_other_stimuli_is_refused(
+    capsys: pytest.CaptureFixture[str], protocol: Path, tmp_path: Path, postgres_url: str, ask: Callable[..., Any]
+) -> None:
     ask("simulate", protocol, "--participants", 1, "--out", tmp_path / "one", "--database", postgres_url)
     manifest = tmp_path / "one" / "manifest.json"
     known = json.loads(manifest.read_text())["stimuli"][0]["id"]
@@ -95,7 +105,7 @@ def test_a_database_about_other_stimuli_is_refused(capsys, protocol, tmp_path, p
 
 
 @pytest.mark.gl
-def test_sessions_are_served_from_postgresql(protocol, tmp_path, postgres_url):
+def test_sessions_are_served_from_postgresql(protocol: Path, tmp_path: Path, postgres_url: str) -> None:
     arguments = ["serve", str(protocol), "--out", str(tmp_path / "results"), "--port", "0"]
     child = subprocess.Popen(
         [sys.executable, "-m", "study.apps.cli", *arguments], cwd=ROOT, stderr=subprocess.PIPE, text=True,

@@ -50,7 +50,9 @@ except KeyboardInterrupt:
         ("--port", "70000", "70000 is not in the range"),
     ],
 )
-def test_what_can_not_be_is_refused_before_anything_is_rendered(capsys, tmp_path, option, value, why):
+def test_what_can_not_be_is_refused_before_anything_is_rendered(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, option: str, value: str, why: str
+) -> None:
     protocol = tmp_path / "study.toml"
     protocol.write_text(PROTOCOL.replace('instructions = ""', 'instructions = "Watch both."'), encoding="utf-8")
     assert run(["serve", str(protocol), "--out", str(tmp_path / "out"), option, value]) == 2
@@ -60,7 +62,7 @@ def test_what_can_not_be_is_refused_before_anything_is_rendered(capsys, tmp_path
     assert not (tmp_path / "out").exists()
 
 
-def test_a_port_that_is_taken_is_refused():
+def test_a_port_that_is_taken_is_refused() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -69,7 +71,7 @@ def test_a_port_that_is_taken_is_refused():
             listen("127.0.0.1", port)
 
 
-def test_it_listens_at_ipv6_too():
+def test_it_listens_at_ipv6_too() -> None:
     try:
         listening = listen("::1", 0)
     except SessionError:
@@ -79,7 +81,7 @@ def test_it_listens_at_ipv6_too():
 
 
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
-def test_it_ends_when_told_to_and_has_stored_who_came(tmp_path, end):
+def test_it_ends_when_told_to_and_has_stored_who_came(tmp_path: Path, end) -> None:
     unfilmed(tmp_path)
     child = subprocess.Popen(
         [sys.executable, "-c", SERVE, str(tmp_path), TOKEN], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,

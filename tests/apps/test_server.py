@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import sqlalchemy as sa
-from serving import PROTOCOL, QUESTIONS, answer_to, protocol_of
+from serving import PROTOCOL, QUESTIONS, Serving, answer_to, protocol_of
 
 from study.apps.server import views
 from study.experiment.plan import draw_plan
 from study.experiment.simulation import simulate
+from study.experiment.stimuli.manifest import Manifest
 from study.experiment.store.answers import stored_form
 from study.experiment.store.frames import answers_frame
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import session_table
 from study.experiment.store.tables import events, presentations
 
 
-def happenings(responses, kind):
+def happenings(responses: Responses, kind) -> list[Any]:
     with responses.engine.connect() as connection:
         rows = connection.execute(sa.select(events.c.detail_json).where(events.c.kind == kind)).scalars().all()
     return [json.loads(row) if row else None for row in rows]
 
 
-def test_a_whole_session_of_every_task(serve, stimuli, responses):
+def test_a_whole_session_of_every_task(serve: Callable[..., Serving], stimuli: Manifest, responses: Responses) -> None:
     person = serve(completion_code="C1").person()
     view = person.begin()
     kinds = []
@@ -51,7 +55,9 @@ def test_a_whole_session_of_every_task(serve, stimuli, responses):
     assert len(happenings(responses, "finished")) == 1
 
 
-def test_the_trial_table_is_that_of_the_simulation(serve, stimuli, responses, tmp_path):
+def test_the_trial_table_is_that_of_the_simulation(
+    serve: Callable[..., Serving], stimuli: Manifest, responses: Responses, tmp_path: Path
+) -> None:
     person = serve().person()
     person.until(person.begin(parameters={"participant": "sim-001"}), "done")
     columns = ["participant", "study", "task", "trial", "item", "repeat", "pair", "motion", "first", "second",
@@ -64,7 +70,7 @@ def test_the_trial_table_is_that_of_the_simulation(serve, stimuli, responses, tm
         assert answers_frame(responses, roles=roles)[columns].equals(there)
 
 
-def test_an_answer_counts_once_whatever_comes_after(serve, responses):
+def test_an_answer_counts_once_whatever_comes_after(serve: Callable[..., Serving], responses: Responses) -> None:
     person = serve().person()
     view = person.until(person.begin(), "trial")
     message = answer_to(view, "same")
@@ -77,7 +83,7 @@ def test_an_answer_counts_once_whatever_comes_after(serve, responses):
     assert len(answers_frame(responses, roles=("practice",))) == 1
 
 
-def test_only_what_is_asked_now_counts(serve, responses):
+def test_only_what_is_asked_now_counts(serve: Callable[..., Serving], responses: Responses) -> None:
     person = serve().person()
     view = person.until(person.begin(), "trial")
     for change in ({"trial": 5}, {"attempt": 2}, {"item": "natural"}):
@@ -98,7 +104,7 @@ def test_only_what_is_asked_now_counts(serve, responses):
     assert len(answers_frame(responses, roles=("practice", "trial", "check"))) == 0
 
 
-def test_a_late_or_missing_answer_is_missed_never_guessed(serve, responses):
+def test_a_late_or_missing_answer_is_missed_never_guessed(serve: Callable[..., Serving], responses: Responses) -> None:
     person = serve().person()
     view = person.until(person.begin(), "trial")
     view = person.until(person.answer(view, "same", response_s=3.2), "trial")
@@ -108,7 +114,7 @@ def test_a_late_or_missing_answer_is_missed_never_guessed(serve, responses):
     assert table["answer"].isna().all()
 
 
-def test_a_trial_shown_badly_comes_again_at_the_end_of_its_study(serve):
+def test_a_trial_shown_badly_comes_again_at_the_end_of_its_study(serve: Callable[..., Serving]) -> None:
     person = serve().person()
     view = person.until(person.begin(), "trial")
     view = person.until(person.step(view), "trial")
@@ -122,7 +128,7 @@ def test_a_trial_shown_badly_comes_again_at_the_end_of_its_study(serve):
     assert order[-1] == (bad, 2)
 
 
-def test_a_restarted_server_goes_on_where_it_was(serve, responses):
+def test_a_restarted_server_goes_on_where_it_was(serve: Callable[..., Serving], responses: Responses) -> None:
     first = serve().person()
     view = first.until(first.begin(), "trial")
     for _ in range(3):
@@ -136,7 +142,9 @@ def test_a_restarted_server_goes_on_where_it_was(serve, responses):
     assert len(answers_frame(responses, roles=("practice", "trial", "check"))) == QUESTIONS
 
 
-def test_a_restart_between_two_items_of_a_rating_loses_neither(serve, responses):
+def test_a_restart_between_two_items_of_a_rating_loses_neither(
+    serve: Callable[..., Serving], responses: Responses
+) -> None:
     first = serve().person()
     view = first.until(first.begin(), "trial")
     while view["kind"] != "trial" or view["question"]["item"] != "noticeable":
@@ -150,7 +158,7 @@ def test_a_restart_between_two_items_of_a_rating_loses_neither(serve, responses)
     assert len(answers_frame(responses, roles=("practice", "trial", "check"))) == QUESTIONS
 
 
-def test_a_reload_in_a_trial_shows_it_again_and_says_so(serve, responses):
+def test_a_reload_in_a_trial_shows_it_again_and_says_so(serve: Callable[..., Serving], responses: Responses) -> None:
     person = serve().person()
     view = person.until(person.begin(), "trial")
     again = person.begin("page-two", previous="page-one")
@@ -158,7 +166,7 @@ def test_a_reload_in_a_trial_shows_it_again_and_says_so(serve, responses):
     assert happenings(responses, "interrupted") == [{"trial": 1, "attempt": 1}]
 
 
-def test_a_second_tab_is_refused_until_it_insists(serve):
+def test_a_second_tab_is_refused_until_it_insists(serve: Callable[..., Serving]) -> None:
     person = serve().person()
     view = person.until(person.begin(), "trial")
     assert person.begin("page-two") == {"kind": "elsewhere"}
@@ -169,7 +177,7 @@ def test_a_second_tab_is_refused_until_it_insists(serve):
     assert person.begin("page-three")["kind"] == "trial"
 
 
-def test_reading_twice_or_late_changes_nothing(serve):
+def test_reading_twice_or_late_changes_nothing(serve: Callable[..., Serving]) -> None:
     person = serve().person()
     consent = person.begin()
     form = person.done(consent)
@@ -181,14 +189,14 @@ def test_reading_twice_or_late_changes_nothing(serve):
     assert person.done(form)["kind"] == "instructions"
 
 
-def test_declining_leaves_nothing(serve, responses):
+def test_declining_leaves_nothing(serve: Callable[..., Serving], responses: Responses) -> None:
     person = serve().person()
     assert person.done(person.begin(), declined=True) == {"kind": "declined"}
     assert len(session_table(responses)) == 0
     assert person.post("/api/alive", {}).status_code == 401
 
 
-def test_a_page_learns_nothing_of_what_answers_mean(serve, stimuli):
+def test_a_page_learns_nothing_of_what_answers_mean(serve: Callable[..., Serving], stimuli: Manifest) -> None:
     person = serve().person()
     view = person.begin()
     films, said = [], []
@@ -201,7 +209,7 @@ def test_a_page_learns_nothing_of_what_answers_mean(serve, stimuli):
     assert not [word for word in words for text in said if word in text]
 
 
-def test_films_are_for_the_participant_whose_trial_it_is(serve):
+def test_films_are_for_the_participant_whose_trial_it_is(serve: Callable[..., Serving]) -> None:
     serving = serve()
     person, other = serving.person(), serving.person()
     view = person.until(person.begin(), "trial")
@@ -222,7 +230,7 @@ def test_films_are_for_the_participant_whose_trial_it_is(serve):
     assert person.client.get(url).status_code == 404
 
 
-def test_a_page_may_load_the_films_of_this_trial_and_of_the_next_and_no_others(serve):
+def test_a_page_may_load_the_films_of_this_trial_and_of_the_next_and_no_others(serve: Callable[..., Serving]) -> None:
     serving = serve()
     person = serving.person()
     person.until(person.begin(), "trial")
@@ -238,7 +246,7 @@ def test_a_page_may_load_the_films_of_this_trial_and_of_the_next_and_no_others(s
         assert person.client.get(f"/films/{name}.mp4").status_code == 404
 
 
-def test_identical_films_look_different_from_outside(serve, stimuli):
+def test_identical_films_look_different_from_outside(serve: Callable[..., Serving], stimuli: Manifest) -> None:
     person = serve().person()
     view = person.until(person.begin(parameters={"participant": "p01"}), "trial")
     plan = draw_plan(protocol_of(), stimuli.pairs, "p01")
@@ -250,7 +258,9 @@ def test_identical_films_look_different_from_outside(serve, stimuli):
     assert heads[0]["last-modified"] == heads[1]["last-modified"] == "Thu, 01 Jan 1970 00:00:00 GMT"
 
 
-def test_a_damaged_film_is_a_fault_on_record(serve, stimuli, responses):
+def test_a_damaged_film_is_a_fault_on_record(
+    serve: Callable[..., Serving], stimuli: Manifest, responses: Responses
+) -> None:
     person = serve().person()
     view = person.until(person.begin(), "trial")
     stimulus = draw_plan(protocol_of(), stimuli.pairs, session_table(responses)["participant"][0]).trials[0].stimuli[0]
@@ -269,7 +279,7 @@ def test_a_damaged_film_is_a_fault_on_record(serve, stimuli, responses):
     ]
 
 
-def test_every_answer_carries_strict_headers(serve):
+def test_every_answer_carries_strict_headers(serve: Callable[..., Serving]) -> None:
     client = serve().client
     for path in ("/", "/pages/main.js", "/api/study", "/researcher", "/withdraw", "/no-such-page"):
         headers = client.get(path).headers
@@ -285,7 +295,7 @@ def test_every_answer_carries_strict_headers(serve):
     assert "samesite=strict" in cookie
 
 
-def test_requests_of_other_sites_and_of_any_size_are_refused(serve):
+def test_requests_of_other_sites_and_of_any_size_are_refused(serve: Callable[..., Serving]) -> None:
     person = serve().person()
     person.begin()
     body = {"kind": "fault", "detail": {}}
@@ -296,7 +306,7 @@ def test_requests_of_other_sites_and_of_any_size_are_refused(serve):
     large = json.dumps({"kind": "fault", "detail": {"what": "x" * 1_100_000}})
     assert person.post("/api/happened", large).status_code == 413
 
-    def pieces():
+    def pieces() -> Iterator[Any]:
         for _ in range(30):
             yield b" " * 50_000
 
@@ -310,7 +320,7 @@ def test_requests_of_other_sites_and_of_any_size_are_refused(serve):
     assert person.post("/api/happened", body).status_code == 401
 
 
-def test_the_token_is_all_that_lets_in(serve):
+def test_the_token_is_all_that_lets_in(serve: Callable[..., Serving]) -> None:
     serving = serve()
     person, thief = serving.person(), serving.person()
     person.begin()
@@ -319,7 +329,7 @@ def test_the_token_is_all_that_lets_in(serve):
         assert thief.post("/api/alive", {}).status_code == 401
 
 
-def test_the_protocol_stands_in_no_page(serve):
+def test_the_protocol_stands_in_no_page(serve: Callable[..., Serving]) -> None:
     serving = serve()
     served = serving.client.get("/api/study").text + serving.client.get("/").text
     assert "geodesic" not in served

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import socket
 import time
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 from serving import listening
@@ -13,7 +16,7 @@ from study.apps.server import connections, running
 LARGE = b"x" * 20_000_000
 
 
-async def app(scope, receive, send):
+async def app(scope, receive, send) -> None:
     """Reads a request; says how long its body was, or sends far more than a socket holds."""
     if scope["type"] != "http":
         return
@@ -29,7 +32,7 @@ async def app(scope, receive, send):
 
 
 @pytest.fixture
-def port(monkeypatch):
+def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """A server that waits a third of a second for a request, and a second and a half for a reply to be taken."""
     monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.3)
     monkeypatch.setattr(connections, "REPLY_SECONDS", 1.5)
@@ -38,7 +41,7 @@ def port(monkeypatch):
         yield port
 
 
-def ended(client):
+def ended(client: socket.socket) -> bool:
     """Whether the server ended the connection, without a reply."""
     try:
         return client.recv(1000) == b""
@@ -46,12 +49,12 @@ def ended(client):
         return True
 
 
-def ask(client, body=b"four"):
+def ask(client: socket.socket, body: bytes = b"four") -> Any:
     client.sendall(b"POST / HTTP/1.1\r\nhost: x\r\ncontent-length: %d\r\n\r\n%b" % (len(body), body))
     return client.recv(1000)
 
 
-def trickle(client, pieces, seconds=3.0):
+def trickle(client: socket.socket, pieces, seconds: float = 3.0) -> bool:
     """Send piece after piece until the connection breaks; whether it did."""
     begin = time.monotonic()
     for piece in pieces:
@@ -65,23 +68,23 @@ def trickle(client, pieces, seconds=3.0):
     return False
 
 
-def test_who_says_nothing_is_let_go(connect):
+def test_who_says_nothing_is_let_go(connect: Callable[[], socket.socket]) -> None:
     assert ended(connect())
 
 
-def test_a_request_that_comes_byte_by_byte_is_let_go(connect):
+def test_a_request_that_comes_byte_by_byte_is_let_go(connect: Callable[[], socket.socket]) -> None:
     head = b"GET / HTTP/1.1\r\nhost: x\r\n" + b"x-slow: y\r\n" * 20
     assert trickle(connect(), (head[i : i + 1] for i in range(len(head))))
 
 
-def test_a_body_that_comes_byte_by_byte_is_let_go(connect):
+def test_a_body_that_comes_byte_by_byte_is_let_go(connect: Callable[[], socket.socket]) -> None:
     client = connect()
     client.sendall(b"POST / HTTP/1.1\r\nhost: x\r\ncontent-length: 1000\r\n\r\n")
     assert trickle(client, [b"x"] * 1000)
 
 
 @pytest.mark.parametrize("piece", [b"x-more: " + b"y" * 900 + b"\r\n", b"y" * 900], ids=["many", "one"])
-def test_endless_headers_are_refused(connect, piece):
+def test_endless_headers_are_refused(connect: Callable[[], socket.socket], piece: bytes) -> None:
     client = connect()
     client.sendall(b"GET / HTTP/1.1\r\nhost: x\r\nx-first: ")
     sent = 0
@@ -95,14 +98,14 @@ def test_endless_headers_are_refused(connect, piece):
         assert client.recv(100).startswith(b"HTTP/1.1 400")
 
 
-def test_headers_of_a_usual_length_are_taken(connect):
+def test_headers_of_a_usual_length_are_taken(connect: Callable[[], socket.socket]) -> None:
     client = connect()
     cookies = b"cookie: " + b"a" * 20_000
     client.sendall(b"GET / HTTP/1.1\r\nhost: x\r\n" + cookies + b"\r\n\r\n")
     assert client.recv(1000).startswith(b"HTTP/1.1 200")
 
 
-def test_who_does_not_take_the_reply_is_let_go(connect):
+def test_who_does_not_take_the_reply_is_let_go(connect: Callable[[], socket.socket]) -> None:
     client = connect()
     client.sendall(b"GET /large HTTP/1.1\r\nhost: x\r\n\r\n")
     time.sleep(2.0)
@@ -113,14 +116,14 @@ def test_who_does_not_take_the_reply_is_let_go(connect):
     assert taken < len(LARGE)
 
 
-def test_an_idle_connection_serves_again(connect):
+def test_an_idle_connection_serves_again(connect: Callable[[], socket.socket]) -> None:
     client = connect()
     assert ask(client).endswith(b"\r\n\r\n4")
     time.sleep(0.6)
     assert ask(client, b"seven !").endswith(b"\r\n\r\n7")
 
 
-def test_nobody_waits_for_the_slow_ones(connect):
+def test_nobody_waits_for_the_slow_ones(connect: Callable[[], socket.socket]) -> None:
     slow = [connect() for _ in range(100)]
     for client in slow:
         client.sendall(b"GET / HTTP/1.1\r\nho")
@@ -128,7 +131,7 @@ def test_nobody_waits_for_the_slow_ones(connect):
     assert all(ended(client) for client in slow)
 
 
-def test_nonsense_is_refused(connect):
+def test_nonsense_is_refused(connect: Callable[[], socket.socket]) -> None:
     for nonsense in (b"\x16\x03\x01\x02\x00\x01\x00", b"GET\r\n\r\n", b"POST / HTTP/1.1\r\ncontent-length: x\r\n\r\n"):
         client = connect()
         client.sendall(nonsense)
@@ -136,7 +139,9 @@ def test_nonsense_is_refused(connect):
         assert reply == b"" or reply.startswith(b"HTTP/1.1 400"), nonsense
 
 
-def test_more_connections_than_are_taken_are_told_to_come_again(connect, monkeypatch):
+def test_more_connections_than_are_taken_are_told_to_come_again(
+    connect: Callable[[], socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connections, "REQUEST_SECONDS", 30.0)
     kept = [connect() for _ in range(149)]
     late = connect()

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from postgres_server import PostgresServer
 from serving import answer_to, free_port, unfilmed
 
 from study.experiment.store.frames import answers_frame
@@ -174,12 +175,14 @@ def compare(acknowledged: list[tuple[str, int, str, int, str | None]], database:
 
 
 @pytest.mark.parametrize("kills", [4, pytest.param(200, marks=pytest.mark.slow)])
-def test_acknowledged_answers_survive_kills_of_the_server(tmp_path, database, kills):
+def test_acknowledged_answers_survive_kills_of_the_server(tmp_path: Path, database: str, kills: int) -> None:
     run_clients(tmp_path, database, kills, Running.kill_and_start)
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.slow)])
-def test_sessions_go_on_when_postgresql_is_killed_and_started_again(tmp_path, postgres_server, postgres_url, kills):
+def test_sessions_go_on_when_postgresql_is_killed_and_started_again(
+    tmp_path: Path, postgres_server: PostgresServer, postgres_url: str, kills: int
+) -> None:
     """The server of pages runs on: it tells them to send again, and connects anew."""
 
     def kill(_: Running) -> None:

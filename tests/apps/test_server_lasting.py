@@ -6,28 +6,31 @@ import asyncio
 import gc
 import threading
 import time
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
-from serving import answer_to
+from serving import Serving, answer_to
 
 from study.apps.server import hosting, web
 from study.apps.server.hosting import MOST_EVENTS
 from study.experiment.store import participants as people
+from study.experiment.store.responses import Responses
 from study.experiment.store.tables import events
 
 
-def count(responses, *kinds):
+def count(responses: Responses, *kinds) -> Any:
     with responses.engine.connect() as connection:
         query = sa.select(sa.func.count()).where(events.c.kind.in_(kinds))
         return connection.execute(query).scalar_one()
 
 
-def later(hours):
+def later(hours) -> Any:
     class Later(datetime):
         @classmethod
-        def now(cls, tz=None):
+        def now(cls, tz=None) -> Any:
             return datetime.now(tz) + timedelta(hours=hours)
 
     return Later
@@ -37,7 +40,9 @@ def later(hours):
 
 
 @pytest.mark.parametrize("restarted", [False, True])
-def test_a_session_of_many_events_is_finished_all_the_same(serve, responses, monkeypatch, restarted):
+def test_a_session_of_many_events_is_finished_all_the_same(
+    serve: Callable[..., Serving], responses: Responses, monkeypatch: pytest.MonkeyPatch, restarted: bool
+) -> None:
     monkeypatch.setattr(hosting, "MOST_EVENTS", 30)
     serving = serve(most_participants=1)
     person = serving.person()
@@ -62,11 +67,13 @@ def test_a_session_of_many_events_is_finished_all_the_same(serve, responses, mon
     assert serving.person().begin() == {"kind": "full"}
 
 
-def test_the_cap_is_far_above_what_a_session_has():
+def test_the_cap_is_far_above_what_a_session_has() -> None:
     assert MOST_EVENTS == 2000
 
 
-def test_who_closes_the_page_over_the_debriefing_has_finished(serve, responses):
+def test_who_closes_the_page_over_the_debriefing_has_finished(
+    serve: Callable[..., Serving], responses: Responses
+) -> None:
     serving = serve(completion_code="C1")
     person = serving.person()
     view = person.until(person.begin(), "debrief")
@@ -84,7 +91,9 @@ def test_who_closes_the_page_over_the_debriefing_has_finished(serve, responses):
 
 
 @pytest.mark.parametrize("hours", [2, 48, -48])
-def test_a_clock_that_is_set_frees_no_place_and_holds_none(serve, monkeypatch, hours):
+def test_a_clock_that_is_set_frees_no_place_and_holds_none(
+    serve: Callable[..., Serving], monkeypatch: pytest.MonkeyPatch, hours: int
+) -> None:
     serving = serve(most_participants=1)
     first = serving.person()
     view = first.until(first.begin(), "trial")
@@ -103,7 +112,7 @@ def test_a_clock_that_is_set_frees_no_place_and_holds_none(serve, monkeypatch, h
     assert serving.person().begin()["kind"] == "consent"
 
 
-def test_a_steady_clock_runs_with_the_time_that_passes(monkeypatch):
+def test_a_steady_clock_runs_with_the_time_that_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = people.steady_clock()
     assert abs(clock() - datetime.now(UTC)) < timedelta(seconds=1)
     monkeypatch.setattr(people, "datetime", later(-5))
@@ -115,12 +124,14 @@ def test_a_steady_clock_runs_with_the_time_that_passes(monkeypatch):
 # Background work and threads
 
 
-def test_work_in_the_background_that_fails_says_so_and_goes_on(serve, monkeypatch, caplog):
+def test_work_in_the_background_that_fails_says_so_and_goes_on(
+    serve: Callable[..., Serving], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr(web, "HERE_EVERY_SECONDS", 0.02)
     happened, failing = [], [True]
     original = hosting.Host.note_who_is_here
 
-    async def note(self):
+    async def note(self) -> None:
         happened.append(self.recent.copy())
         if failing[0]:
             raise RuntimeError("disk on fire")
@@ -142,7 +153,9 @@ def test_work_in_the_background_that_fails_says_so_and_goes_on(serve, monkeypatc
         time.sleep(0.01)
 
 
-def test_who_was_heard_of_is_not_forgotten_where_noting_it_fails(serve, monkeypatch):
+def test_who_was_heard_of_is_not_forgotten_where_noting_it_fails(
+    serve: Callable[..., Serving], monkeypatch: pytest.MonkeyPatch
+) -> None:
     serving = serve()
     person = serving.person()
     person.begin()
@@ -154,7 +167,9 @@ def test_who_was_heard_of_is_not_forgotten_where_noting_it_fails(serve, monkeypa
     assert len(serving.host.recent) == 1
 
 
-def test_the_researcher_looks_on_while_participants_arrive(serve, monkeypatch):
+def test_the_researcher_looks_on_while_participants_arrive(
+    serve: Callable[..., Serving], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What a thread goes through must not change under it: here it always does, as rarely by chance."""
     serving = serve()
     person = serving.person()
@@ -162,7 +177,7 @@ def test_the_researcher_looks_on_while_participants_arrive(serve, monkeypatch):
     looking, arrived = threading.Event(), threading.Event()
     overview = people.overview
 
-    def slow(responses):
+    def slow(responses: Responses) -> Any:
         looking.set()
         assert arrived.wait(10)
         return overview(responses)
@@ -170,7 +185,7 @@ def test_the_researcher_looks_on_while_participants_arrive(serve, monkeypatch):
     class Changing(dict):
         """A dictionary of which a thread other than the loop's must not take the values."""
 
-        def values(self):
+        def values(self) -> Any:
             assert threading.current_thread() is not worker, "gone through in a thread"
             return super().values()
 
@@ -179,7 +194,7 @@ def test_the_researcher_looks_on_while_participants_arrive(serve, monkeypatch):
     answers = []
     worker = None
 
-    def look():
+    def look() -> None:
         answers.append(serving.ask("overview"))
 
     thread = threading.Thread(target=look)
@@ -196,7 +211,7 @@ def test_the_researcher_looks_on_while_participants_arrive(serve, monkeypatch):
 # Memory
 
 
-def test_finished_sessions_leave_the_memory_and_their_pages_still_work(serve):
+def test_finished_sessions_leave_the_memory_and_their_pages_still_work(serve: Callable[..., Serving]) -> None:
     serving = serve(completion_code="C1")
     host = serving.host
     people_ = [serving.person() for _ in range(3)]
@@ -213,7 +228,9 @@ def test_finished_sessions_leave_the_memory_and_their_pages_still_work(serve):
     assert host.sittings == {}
 
 
-def test_who_left_in_the_middle_leaves_the_memory_and_comes_back_from_the_database(serve, monkeypatch):
+def test_who_left_in_the_middle_leaves_the_memory_and_comes_back_from_the_database(
+    serve: Callable[..., Serving], monkeypatch: pytest.MonkeyPatch
+) -> None:
     serving = serve()
     person = serving.person()
     view = person.until(person.begin(), "trial")
@@ -227,14 +244,16 @@ def test_who_left_in_the_middle_leaves_the_memory_and_comes_back_from_the_databa
     assert person.post("/api/answer", answer_to(view)).json()["counted"] is True
 
 
-def test_messages_that_arrive_together_at_the_end_are_counted_once(serve, responses):
+def test_messages_that_arrive_together_at_the_end_are_counted_once(
+    serve: Callable[..., Serving], responses: Responses
+) -> None:
     """While one waits for its turn, the session leaves the memory."""
     serving = serve()
     person = serving.person()
     view = person.until(person.begin(), "debrief")
     token = person.client.cookies[serving.host.cookie]
 
-    async def together():
+    async def together() -> Any:
         from study.apps.server.messages import Done
 
         sittings = [await serving.host.sitting(token) for _ in range(4)]

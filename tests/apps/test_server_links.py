@@ -6,12 +6,16 @@ import json
 import random
 import secrets
 import uuid
+from collections.abc import Callable
+from typing import Any
 from urllib.parse import quote
 
 import pytest
 import sqlalchemy as sa
+from serving import Serving
 
 from study.apps.server.links import filled_in
+from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import session_table
 from study.experiment.store.tables import events
 
@@ -32,7 +36,7 @@ PEOPLE = [
 ]  # fmt: skip
 
 
-def happenings(responses):
+def happenings(responses: Responses) -> list[Any]:
     with responses.engine.connect() as connection:
         rows = connection.execute(sa.select(events.c.detail_json).where(events.c.kind == "fault")).scalars()
         return [json.loads(row) for row in rows]
@@ -40,18 +44,18 @@ def happenings(responses):
 
 @pytest.mark.parametrize("slot", SLOTS)
 @pytest.mark.parametrize("name", ["PROLIFIC_PID", "participant"])
-def test_a_slot_names_nobody(name, slot):
+def test_a_slot_names_nobody(name: str, slot: str) -> None:
     slot = slot.replace("PROLIFIC_PID", name).replace("PROLIFIC PID", name.replace("_", " ").upper())
     kept, unfilled = filled_in({name: slot, "STUDY_ID": "s"}, ("PROLIFIC_PID", "participant"))
     assert (kept, unfilled) == ({"STUDY_ID": "s"}, {name: slot})
 
 
 @pytest.mark.parametrize("person", PEOPLE)
-def test_who_is_named_is_named(person):
+def test_who_is_named_is_named(person: str) -> None:
     assert filled_in({"participant": f" {person} "}, ("participant",)) == ({"participant": person}, {})
 
 
-def test_identifiers_that_programs_make_are_people():
+def test_identifiers_that_programs_make_are_people() -> None:
     chance = random.Random(4)
     for _ in range(20_000):
         one = chance.choice(
@@ -61,13 +65,15 @@ def test_identifiers_that_programs_make_are_people():
         assert filled_in({"participant": one}, ("participant",)) == ({"participant": one}, {}), one
 
 
-def test_parameters_that_name_nobody_are_data_as_they_are():
+def test_parameters_that_name_nobody_are_data_as_they_are() -> None:
     given = {"STUDY_ID": "{{%STUDY_ID%}}", "condition": "none"}
     assert filled_in(given, ("PROLIFIC_PID",)) == (given, {})
 
 
 @pytest.mark.parametrize("slot", ["{{%PROLIFIC_PID%}}", "%PROLIFIC_PID%", "{PROLIFIC_PID}", "", "undefined"])
-def test_two_browsers_with_one_unfilled_link_are_two_participants(serve, responses, slot):
+def test_two_browsers_with_one_unfilled_link_are_two_participants(
+    serve: Callable[..., Serving], responses: Responses, slot: str
+) -> None:
     serving = serve()
     link = {"PROLIFIC_PID": slot, "STUDY_ID": "s", "SESSION_ID": "{{%SESSION_ID%}}"}
     first, second = serving.person(), serving.person()
@@ -84,7 +90,7 @@ def test_two_browsers_with_one_unfilled_link_are_two_participants(serve, respons
     )
 
 
-def test_a_person_with_an_unfilled_visit_goes_on_in_the_same_browser_only(serve):
+def test_a_person_with_an_unfilled_visit_goes_on_in_the_same_browser_only(serve: Callable[..., Serving]) -> None:
     serving = serve()
     link = {"PROLIFIC_PID": "5f1", "SESSION_ID": "{{%SESSION_ID%}}"}
     first = serving.person()

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable, Iterator
 from datetime import timedelta
 
 import pytest
 import sqlalchemy as sa
-from serving import QUESTIONS, TOKEN, Person, answer_to, make_host
+from serving import QUESTIONS, TOKEN, Person, Serving, answer_to, make_host
 from starlette.testclient import TestClient
 
 from study.apps.server.web import make_app
+from study.experiment.stimuli.manifest import Manifest
 from study.experiment.store.frames import answers_frame
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import session_table
 from study.experiment.store.tables import withdrawals
 
 
 @pytest.fixture
-def responses(database):
+def responses(database: str) -> Iterator[Responses]:
     with open_responses(database) as opened:
         yield opened
 
@@ -27,14 +29,16 @@ def responses(database):
 LINK = {"PROLIFIC_PID": "5f1", "STUDY_ID": "s", "SESSION_ID": "9a8", "wave": "2", "unknown": "x"}
 
 
-def test_parameters_of_the_link_are_kept_and_no_others(serve):
+def test_parameters_of_the_link_are_kept_and_no_others(serve: Callable[..., Serving]) -> None:
     serving = serve(parameters=("PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "participant", "wave"))
     serving.person().begin(parameters=LINK)
     kept = serving.ask("overview").json()["sessions"][0]["parameters"]
     assert kept == {name: value for name, value in LINK.items() if name != "unknown"}
 
 
-def test_the_same_link_goes_on_and_the_same_person_begins_once(serve, responses):
+def test_the_same_link_goes_on_and_the_same_person_begins_once(
+    serve: Callable[..., Serving], responses: Responses
+) -> None:
     serving = serve()
     first = serving.person()
     view = first.until(first.begin(parameters=LINK), "trial")
@@ -48,14 +52,16 @@ def test_the_same_link_goes_on_and_the_same_person_begins_once(serve, responses)
     assert len(session_table(responses)) == 1
 
 
-def test_another_person_at_the_same_computer_is_another_participant(serve, responses):
+def test_another_person_at_the_same_computer_is_another_participant(
+    serve: Callable[..., Serving], responses: Responses
+) -> None:
     person = serve().person()
     person.until(person.begin(parameters={"participant": "p01"}), "trial")
     assert person.begin("page-two", parameters={"participant": "p02"})["kind"] == "consent"
     assert list(session_table(responses)["participant"]) == ["p01", "p02"]
 
 
-def test_groups_are_filled_evenly_and_drop_outs_given_back(serve):
+def test_groups_are_filled_evenly_and_drop_outs_given_back(serve: Callable[..., Serving]) -> None:
     serving = serve(dropped_after=timedelta(seconds=-1))
     for _ in range(3):
         serving.person().begin()
@@ -71,7 +77,7 @@ def test_groups_are_filled_evenly_and_drop_outs_given_back(serve):
     assert (overview["groups"], overview["counts"]["finished"]) == ([4, 3], 4)
 
 
-def test_no_more_than_are_wanted(serve):
+def test_no_more_than_are_wanted(serve: Callable[..., Serving]) -> None:
     serving = serve(most_participants=2)
     first, second = serving.person(), serving.person()
     first.begin()
@@ -82,7 +88,9 @@ def test_no_more_than_are_wanted(serve):
     assert serving.person().begin()["kind"] == "consent"
 
 
-def test_a_place_of_a_drop_out_is_free_again_and_its_participant_may_still_come_back(serve):
+def test_a_place_of_a_drop_out_is_free_again_and_its_participant_may_still_come_back(
+    serve: Callable[..., Serving],
+) -> None:
     serving = serve(most_participants=1, dropped_after=timedelta(seconds=-1))
     first, second = serving.person(), serving.person()
     view = first.until(first.begin(), "trial")
@@ -93,7 +101,7 @@ def test_a_place_of_a_drop_out_is_free_again_and_its_participant_may_still_come_
     assert serving.person().begin() == {"kind": "full"}
 
 
-def test_at_the_end_a_code_and_the_way_back_each_once_the_session_is_done(serve):
+def test_at_the_end_a_code_and_the_way_back_each_once_the_session_is_done(serve: Callable[..., Serving]) -> None:
     back = "https://app.prolific.example/submissions/complete?cc=C1"
     person = serve(completion_code="C1", completion_url=back).person()
     view = person.begin(parameters=LINK)
@@ -104,7 +112,7 @@ def test_at_the_end_a_code_and_the_way_back_each_once_the_session_is_done(serve)
     assert person.begin("page-two", previous="page-one")["completion_url"] == back
 
 
-def test_withdrawing_deletes_and_the_server_forgets(serve, responses):
+def test_withdrawing_deletes_and_the_server_forgets(serve: Callable[..., Serving], responses: Responses) -> None:
     serving = serve()
     person, other = serving.person(), serving.person()
     other.until(other.begin(), "done")
@@ -123,7 +131,7 @@ def test_withdrawing_deletes_and_the_server_forgets(serve, responses):
     assert [(line["session_id"], line["answers"]) for line in lines] == [(2, QUESTIONS)]
 
 
-def test_the_researchers_page_needs_the_token(serve):
+def test_the_researchers_page_needs_the_token(serve: Callable[..., Serving]) -> None:
     serving = serve()
     for path in ("overview", "answers.csv", "nothing.csv"):
         for token in ("", "guess", TOKEN[:-1]):
@@ -132,7 +140,7 @@ def test_the_researchers_page_needs_the_token(serve):
     assert serving.ask("nothing.csv").status_code == 404
 
 
-def test_the_researcher_sees_who_is_where_and_takes_the_tables(serve):
+def test_the_researcher_sees_who_is_where_and_takes_the_tables(serve: Callable[..., Serving]) -> None:
     serving = serve()
     person, finished = serving.person(), serving.person()
     finished.until(finished.begin(), "done")
@@ -158,7 +166,7 @@ def test_the_researcher_sees_who_is_where_and_takes_the_tables(serve):
         assert serving.ask(f"{table}.csv").status_code == 200
 
 
-def test_nothing_that_a_participant_typed_is_run(serve):
+def test_nothing_that_a_participant_typed_is_run(serve: Callable[..., Serving]) -> None:
     """In JSON it is text, in a spreadsheet it is text; pages set text, never markup (see the browser's tests)."""
     serving = serve()
     typed = '=HYPERLINK("http://x")<script>alert(1)</script>'
@@ -172,7 +180,7 @@ def test_nothing_that_a_participant_typed_is_run(serve):
     assert overview.json()["sessions"][0]["parameters"]["PROLIFIC_PID"] == typed
 
 
-def test_two_servers_on_one_database_share_places_and_count_an_answer_once(stimuli, database):
+def test_two_servers_on_one_database_share_places_and_count_an_answer_once(stimuli: Manifest, database: str) -> None:
     """As behind a proxy that spreads the load, or while one server takes another's place."""
     with open_responses(database) as one, open_responses(database) as other:
         hosts = [make_host(stimuli, responses, most_participants=1) for responses in (one, other)]

@@ -6,10 +6,12 @@ import asyncio
 import csv
 import io
 import logging
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
-from serving import PROTOCOL, TOKEN, answer_to, make_host
+from serving import PROTOCOL, TOKEN, Serving, answer_to, make_host
 from starlette.testclient import TestClient
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
@@ -18,18 +20,20 @@ from study.apps.server.running import configuration
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
+from study.experiment.stimuli.manifest import Manifest
 from study.experiment.store.answers import stored_form
 from study.experiment.store.frames import answers_frame
+from study.experiment.store.responses import Responses
 from study.experiment.store.tables import events
 
 
 @pytest.fixture
-def film(serve):
+def film(serve: Callable[..., Serving]) -> Any:
     """`film(**headers)`: the reply to a request for a film of the trial that is due."""
     person = serve().person()
     view = person.until(person.begin(), "trial")
 
-    def get(method="GET", **headers):
+    def get(method: str = "GET", **headers) -> Any:
         return person.client.request(method, view["films"][0]["url"], headers=headers)
 
     return get
@@ -50,7 +54,7 @@ def film(serve):
         ("Bytes = 0 - 1", 0, 2),
     ],
 )
-def test_one_range_of_a_film_is_sent_as_that_part(film, asked, start, stop):
+def test_one_range_of_a_film_is_sent_as_that_part(film, asked: str, start: int, stop: int | None) -> None:
     whole = film().content
     part = film(range=asked)
     assert part.status_code == 206
@@ -62,7 +66,7 @@ def test_one_range_of_a_film_is_sent_as_that_part(film, asked, start, stop):
 
 
 @pytest.mark.parametrize("asked", ["bytes=99999-", "bytes=99999-100000", "bytes=99999-99999"])
-def test_a_range_beyond_the_end_of_a_film_is_refused(film, asked):
+def test_a_range_beyond_the_end_of_a_film_is_refused(film, asked: str) -> None:
     size = len(film().content)
     refused = film(range=asked)
     assert (refused.status_code, refused.headers["content-range"]) == (416, f"bytes */{size}")
@@ -73,27 +77,27 @@ def test_a_range_beyond_the_end_of_a_film_is_refused(film, asked):
     ["bytes=0-1,5-6", "bytes=5-2", "bytes=-", "bytes=", "bytes", "frames=0-1", "bytes=a-b", "bytes=1-" + "9" * 5000,
      "bytes=" + ",".join(f"{i}-{i}" for i in range(900)), "bytes=0x1-2", "bytes=--5"],
 )  # fmt: skip
-def test_other_ranges_are_passed_over(film, asked):
+def test_other_ranges_are_passed_over(film, asked: str) -> None:
     reply = film(range=asked)
     assert (reply.status_code, reply.content) == (200, film().content)
     assert "content-range" not in reply.headers
 
 
-def test_a_range_of_an_older_film_is_not_sent(film):
+def test_a_range_of_an_older_film_is_not_sent(film) -> None:
     tag = film().headers["etag"]
     assert film(**{"range": "bytes=0-1", "if-range": tag}).status_code == 206
     for other in ('"another"', f"W/{tag}", "Fri, 02 Jan 1970 00:00:00 GMT"):
         assert film(**{"range": "bytes=0-1", "if-range": other}).status_code == 200
 
 
-def test_the_head_of_a_film(film):
+def test_the_head_of_a_film(film) -> None:
     head = film("HEAD")
     assert (head.status_code, head.content) == (200, b"")
     assert head.headers["content-length"] == str(len(film().content))
     assert head.headers["cache-control"] == "no-store"
 
 
-def test_a_damaged_film_is_not_named(film, stimuli):
+def test_a_damaged_film_is_not_named(film, stimuli: Manifest) -> None:
     files = list((stimuli.folder / "stimuli").glob("*.mp4"))
     contents = [file.read_bytes() for file in files]
     try:
@@ -108,7 +112,9 @@ def test_a_damaged_film_is_not_named(film, stimuli):
 
 
 @pytest.mark.parametrize("name", ["%C3%A9", "%00", "..%2f..%2fresponses.sqlite", "a" * 5000, "%0d%0aset-cookie:%20a=b"])
-def test_odd_names_of_films_are_unknown(serve, name, caplog):
+def test_odd_names_of_films_are_unknown(
+    serve: Callable[..., Serving], name: str, caplog: pytest.LogCaptureFixture
+) -> None:
     person = serve().person()
     person.until(person.begin(), "trial")
     reply = person.client.get(f"/films/{name}.mp4")
@@ -138,7 +144,9 @@ def test_odd_names_of_films_are_unknown(serve, name, caplog):
     ],
     ids=lambda content: repr(content[:45]),
 )
-def test_messages_that_are_none_are_refused_and_stored_nowhere(serve, responses, content):
+def test_messages_that_are_none_are_refused_and_stored_nowhere(
+    serve: Callable[..., Serving], responses: Responses, content: bytes
+) -> None:
     person = serve().person()
     person.begin()
     headers = {"x-segue-page": person.page, "content-type": "application/json"}
@@ -150,7 +158,7 @@ def test_messages_that_are_none_are_refused_and_stored_nowhere(serve, responses,
         assert connection.execute(query).scalar_one() == 0
 
 
-def test_what_looks_like_nul_in_a_text_is_text(serve, responses):
+def test_what_looks_like_nul_in_a_text_is_text(serve: Callable[..., Serving], responses: Responses) -> None:
     person = serve().person()
     form = person.done(person.begin())
     remark = r"\u0000 and é, 日本語, 😀"
@@ -162,7 +170,7 @@ def test_what_looks_like_nul_in_a_text_is_text(serve, responses):
     assert (refused.status_code, "NUL" in refused.json()["error"]) == (422, True)
 
 
-def test_what_cookies_and_headers_hold_is_never_trusted(serve):
+def test_what_cookies_and_headers_hold_is_never_trusted(serve: Callable[..., Serving]) -> None:
     serving = serve()
     person = serving.person()
     person.begin()
@@ -195,7 +203,7 @@ def test_what_cookies_and_headers_hold_is_never_trusted(serve):
         assert person.post("/api/alive", {}, origin=origin).status_code == status, origin
 
 
-def test_only_the_methods_that_there_are(serve):
+def test_only_the_methods_that_there_are(serve: Callable[..., Serving]) -> None:
     client = serve().client
     for method in ("GET", "PUT", "DELETE", "OPTIONS", "PATCH", "HEAD"):
         assert client.request(method, "/api/answer").status_code == 405
@@ -204,7 +212,7 @@ def test_only_the_methods_that_there_are(serve):
         assert client.head(path).status_code == 200
 
 
-def test_the_host_header_leads_nowhere(serve):
+def test_the_host_header_leads_nowhere(serve: Callable[..., Serving]) -> None:
     client = serve().client
     for path in ("/researcher/", "/withdraw/", "/pages/", "/pages", "/films/", "/api/"):
         reply = client.get(path, headers={"host": "elsewhere.example"}, follow_redirects=False)
@@ -217,11 +225,11 @@ def test_the_host_header_leads_nowhere(serve):
     ["/pages/%2e%2e", "/pages/%2e%2e/%2e%2e/cli.py", "/pages/..%5c..%5ccli.py", "/pages/main.js%00", "/pages//passwd",
      "/manifest.json", "/stimuli/", "/responses.sqlite", "/protocol.toml", "/.git/config"],
 )  # fmt: skip
-def test_no_folder_is_listed_and_no_file_outside_is_read(serve, path):
+def test_no_folder_is_listed_and_no_file_outside_is_read(serve: Callable[..., Serving], path: str) -> None:
     assert serve().client.get(path).status_code == 404
 
 
-def test_pages_are_kept_by_browsers_as_long_as_they_are_the_same(serve):
+def test_pages_are_kept_by_browsers_as_long_as_they_are_the_same(serve: Callable[..., Serving]) -> None:
     client = serve().client
     for path in ("/", "/pages/main.js"):
         page = client.get(path)
@@ -230,7 +238,7 @@ def test_pages_are_kept_by_browsers_as_long_as_they_are_the_same(serve):
         assert client.get(path, headers={"if-none-match": '"older"'}).content == page.content
 
 
-def test_replies_forbid_frames_sensors_and_caches(serve):
+def test_replies_forbid_frames_sensors_and_caches(serve: Callable[..., Serving]) -> None:
     serving = serve()
     person = serving.person()
     replies = [person.post("/api/begin", {"page": "page-one"}), serving.client.get("/"), serving.client.get("/nothing")]
@@ -248,13 +256,15 @@ def test_replies_forbid_frames_sensors_and_caches(serve):
 # What goes wrong on our side
 
 
-def test_an_answer_that_could_not_be_stored_is_not_acknowledged_and_can_be_sent_again(serve, responses, monkeypatch):
+def test_an_answer_that_could_not_be_stored_is_not_acknowledged_and_can_be_sent_again(
+    serve: Callable[..., Serving], responses: Responses, monkeypatch: pytest.MonkeyPatch
+) -> None:
     serving = serve()
     person = serving.person()
     view = person.until(person.begin(), "trial")
     message = answer_to(view)
 
-    def full(*_):
+    def full(*_) -> None:
         raise OSError("No space left on device")
 
     with monkeypatch.context() as broken:
@@ -265,13 +275,13 @@ def test_an_answer_that_could_not_be_stored_is_not_acknowledged_and_can_be_sent_
     assert len(answers_frame(responses, roles=("practice",))) == 1
 
 
-def test_one_bad_write_takes_no_others_with_it(serve):
+def test_one_bad_write_takes_no_others_with_it(serve: Callable[..., Serving]) -> None:
     serving = serve()
     people = [serving.person() for _ in range(3)]
     views = [person.until(person.begin(), "trial") for person in people]
     host = serving.host
 
-    async def together():
+    async def together() -> Any:
         sitting = next(iter(host.sittings.values()))
         rows = [hosting.event_row(sitting.record, kind, None, hosting.datetime.now(hosting.UTC)) for kind in "abc"]
         bad = (rows[1][0], {**rows[1][1], "session_id": 999})
@@ -286,7 +296,9 @@ def test_one_bad_write_takes_no_others_with_it(serve):
         assert person.answer(view)["counted"] is True
 
 
-def test_who_is_long_gone_is_taken_up_from_the_database(serve, monkeypatch):
+def test_who_is_long_gone_is_taken_up_from_the_database(
+    serve: Callable[..., Serving], monkeypatch: pytest.MonkeyPatch
+) -> None:
     serving = serve()
     person = serving.person()
     view = person.until(person.begin(), "trial")
@@ -302,7 +314,9 @@ def test_who_is_long_gone_is_taken_up_from_the_database(serve, monkeypatch):
 # The researcher
 
 
-def test_the_researchers_token_is_long_and_stands_in_no_log(serve, caplog):
+def test_the_researchers_token_is_long_and_stands_in_no_log(
+    serve: Callable[..., Serving], caplog: pytest.LogCaptureFixture
+) -> None:
     for short in ("", "x" * 15):
         with pytest.raises(SessionError, match="Expected a researcher's token of 16 characters or more"):
             Settings(researcher_token=short)
@@ -318,7 +332,7 @@ def test_the_researchers_token_is_long_and_stands_in_no_log(serve, caplog):
     assert TOKEN not in "".join(serving.client.get(path).text for path in ("/", "/researcher", "/api/study"))
 
 
-def test_a_name_that_begins_like_a_formula_is_text_in_every_table(serve):
+def test_a_name_that_begins_like_a_formula_is_text_in_every_table(serve: Callable[..., Serving]) -> None:
     serving = serve()
     person = serving.person()
     person.until(person.begin(parameters={"participant": "-2-3"}), "done")
@@ -332,7 +346,7 @@ def test_a_name_that_begins_like_a_formula_is_text_in_every_table(serve):
 # Behind a proxy
 
 
-def test_under_a_path_pages_and_cookies_stay_there(serve):
+def test_under_a_path_pages_and_cookies_stay_there(serve: Callable[..., Serving]) -> None:
     serving = serve(root_path="/study")
     person = serving.person()
     reply = person.client.post("/study/api/begin", json={"page": "page-one"}, headers={"x-segue-page": "page-one"})
@@ -356,7 +370,9 @@ def test_under_a_path_pages_and_cookies_stay_there(serve):
 
 
 @pytest.mark.parametrize(("trusted", "secure"), [("testclient", True), ("10.0.0.1", False)])
-def test_cookies_are_for_https_where_a_trusted_proxy_says_so(stimuli, responses, trusted, secure):
+def test_cookies_are_for_https_where_a_trusted_proxy_says_so(
+    stimuli: Manifest, responses: Responses, trusted: str, secure: bool
+) -> None:
     app = ProxyHeadersMiddleware(make_app(make_host(stimuli, responses)), trusted_hosts=trusted)
     with TestClient(app) as client:
         headers = {"x-segue-page": "page-one", "x-forwarded-proto": "https", "origin": "https://testserver"}
@@ -366,6 +382,6 @@ def test_cookies_are_for_https_where_a_trusted_proxy_says_so(stimuli, responses,
     assert [configuration(app, behind_proxy=behind).proxy_headers for behind in (True, False)] == [True, False]
 
 
-def test_two_studies_on_one_machine_have_cookies_of_their_own(stimuli, responses):
+def test_two_studies_on_one_machine_have_cookies_of_their_own(stimuli: Manifest, responses: Responses) -> None:
     names = {make_host(stimuli, responses, PROTOCOL.replace("seed = 5", f"seed = {seed}")).cookie for seed in (5, 6)}
     assert len(names) == 2

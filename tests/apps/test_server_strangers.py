@@ -9,9 +9,11 @@ import logging
 import socket
 import struct
 import time
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
-from serving import TOKEN, listening, make_host, protocol_of
+from serving import TOKEN, Serving, listening, make_host, protocol_of
 from starlette.testclient import TestClient
 
 from study.apps.server import connections
@@ -22,23 +24,25 @@ from study.apps.server.names import Named, own_names
 from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
+from study.experiment.stimuli.manifest import Manifest
+from study.experiment.store.responses import Responses
 
 # Bodies
 
 
 @pytest.fixture
-def port(stimuli, responses):
+def port(stimuli: Manifest, responses: Responses) -> Iterator[int]:
     """The whole server, on a port."""
     with listening(make_app(make_host(stimuli, responses))) as port:
         yield port
 
 
-def head(path, length, *more):
+def head(path, length, *more) -> bytes:
     lines = [f"POST {path} HTTP/1.1", "host: 127.0.0.1", f"content-length: {length}", "content-type: application/json"]
     return "\r\n".join([*lines, "x-segue-page: page-one", *more, "", ""]).encode()
 
 
-def reply(client):
+def reply(client: socket.socket) -> Any:
     """Status, headers and body of one reply."""
     got = b""
     while b"\r\n\r\n" not in got:
@@ -53,7 +57,7 @@ def reply(client):
     return int(lines[0].split()[1]), headers, rest
 
 
-def arrive(client):
+def arrive(client: socket.socket) -> Any:
     body = b'{"page": "page-one"}'
     client.sendall(head("/api/begin", len(body)) + body)
     status, headers, _ = reply(client)
@@ -62,7 +66,7 @@ def arrive(client):
 
 
 @pytest.mark.parametrize("path", ["/api/answer", "/api/happened", "/api/done", "/api/alive", "/api/leave"])
-def test_nothing_is_read_from_somebody_unknown(connect, path):
+def test_nothing_is_read_from_somebody_unknown(connect: Callable[[], socket.socket], path: str) -> None:
     client = connect()
     client.sendall(head(path, 900_000, "cookie: segue-x=y"))
     status, _, said = reply(client)
@@ -77,7 +81,9 @@ def test_nothing_is_read_from_somebody_unknown(connect, path):
     [("/api/begin", 10_000, 100_000), ("/api/withdraw", 300, 4_000), ("/api/alive", 10, 4_000),
      ("/api/happened", 10_000, 100_000), ("/api/done", 10_000, 100_000), ("/api/answer", 300_000, 2_000_000)],
 )  # fmt: skip
-def test_a_message_may_be_as_long_as_it_needs(connect, path, least, most):
+def test_a_message_may_be_as_long_as_it_needs(
+    connect: Callable[[], socket.socket], path: str, least: int, most: int
+) -> None:
     client = connect()
     known = arrive(client)
     client.sendall(head(path, most, known))
@@ -95,13 +101,15 @@ def test_a_message_may_be_as_long_as_it_needs(connect, path, least, most):
     assert reply(taken)[0] in (200, 422)
 
 
-def test_a_form_in_any_script_is_short_enough(serve):
+def test_a_form_in_any_script_is_short_enough(serve: Callable[..., Serving]) -> None:
     person = serve().person()
     form = person.done(person.begin())
     assert person.done(form, values={"age": "20", "remark": "😀" * 1000})["kind"] == "instructions"
 
 
-def test_half_sent_bodies_are_let_go_the_oldest_first(connect, monkeypatch):
+def test_half_sent_bodies_are_let_go_the_oldest_first(
+    connect: Callable[[], socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connections, "MOST_BODIES", 1_000_000)
     first = connect()
     known = arrive(first)
@@ -135,7 +143,7 @@ def test_half_sent_bodies_are_let_go_the_oldest_first(connect, monkeypatch):
 
 @pytest.mark.parametrize("size", [LARGEST_HEAD + 1_000, 60_000, 100_000, 300_000])
 @pytest.mark.parametrize("where", ["one header", "many headers", "address", "cookie", "trailer"])
-def test_a_head_is_as_long_as_documented_at_most(connect, size, where):
+def test_a_head_is_as_long_as_documented_at_most(connect: Callable[[], socket.socket], size: int, where: str) -> None:
     client = connect()
     many = "".join(f"x-{i}: {'y' * 90}\r\n" for i in range(size // 95))
     post = (
@@ -158,7 +166,7 @@ def test_a_head_is_as_long_as_documented_at_most(connect, size, where):
     assert b"Expected at most 32768 bytes of headers." in said
 
 
-def test_two_requests_in_one_packet_are_both_answered(connect):
+def test_two_requests_in_one_packet_are_both_answered(connect: Callable[[], socket.socket]) -> None:
     client = connect()
     body = b'{"page": "page-one"}' + b" " * 20_000
     client.sendall((head("/api/begin", len(body), "x: " + "y" * 20_000) + body) * 3)
@@ -194,7 +202,9 @@ def test_two_requests_in_one_packet_are_both_answered(connect):
         ("", 421),
     ],
 )
-def test_only_own_names_are_answered(stimuli, responses, caplog, name, status):
+def test_only_own_names_are_answered(
+    stimuli: Manifest, responses: Responses, caplog: pytest.LogCaptureFixture, name: str, status: int
+) -> None:
     app = make_app(make_host(stimuli, responses))
     named = Named(app, own_names("127.0.0.1", ["https://lab.example.org/study"]), protocol_of())
     with TestClient(named) as client:
@@ -212,14 +222,14 @@ def test_only_own_names_are_answered(stimuli, responses, caplog, name, status):
         assert caplog.text.count("--public-url") == 1
 
 
-def test_a_second_host_header_does_not_help(stimuli, responses):
+def test_a_second_host_header_does_not_help(stimuli: Manifest, responses: Responses) -> None:
     named = Named(make_app(make_host(stimuli, responses)), own_names("127.0.0.1"), protocol_of())
     with TestClient(named) as client:
         for pair in (["127.0.0.1", "evil.example"], ["evil.example", "127.0.0.1"]):
             assert client.get("/", headers=[("host", name) for name in pair]).status_code == 421
 
 
-def test_the_name_that_is_listened_at_and_international_ones_are_own():
+def test_the_name_that_is_listened_at_and_international_ones_are_own() -> None:
     assert "lab-pc" in own_names("Lab-PC")
     assert "xn--bcher-kva.example" in own_names("0.0.0.0", ["https://bücher.example:8443/a/b"])
 
@@ -227,7 +237,7 @@ def test_the_name_that_is_listened_at_and_international_ones_are_own():
 @pytest.mark.parametrize(
     "url", ["", "lab.example.org", "ftp://lab.example.org", "https://", "https:///x", "http://[", "x"]
 )
-def test_a_public_address_that_is_none_is_refused(url):
+def test_a_public_address_that_is_none_is_refused(url: str) -> None:
     with pytest.raises(SessionError, match=r"Expected a public address such as https://lab\.example\.org/study, found"):
         own_names("127.0.0.1", [url])
 
@@ -235,7 +245,7 @@ def test_a_public_address_that_is_none_is_refused(url):
 # Guesses
 
 
-def test_guesses_are_slow_and_those_of_others_are_not():
+def test_guesses_are_slow_and_those_of_others_are_not() -> None:
     now = [100.0]
     guesses = Guesses(lambda: now[0])
     assert [guesses.take("a") for _ in range(GUESSES_AT_ONCE + 5)] == [True] * GUESSES_AT_ONCE + [False] * 5
@@ -254,7 +264,7 @@ def test_guesses_are_slow_and_those_of_others_are_not():
     assert guesses.take("one more")
 
 
-def test_withdrawal_codes_can_not_be_guessed_at_speed(serve):
+def test_withdrawal_codes_can_not_be_guessed_at_speed(serve: Callable[..., Serving]) -> None:
     serving = serve()
     code = (person := serving.person()).until(person.begin(), "done")["withdrawal_code"]
     thief = serving.person()
@@ -265,14 +275,14 @@ def test_withdrawal_codes_can_not_be_guessed_at_speed(serve):
     assert thief.post("/api/withdraw", {"code": code}).json() == {"withdrawn": True}
 
 
-def test_guesses_that_are_sent_together_are_counted_each(serve):
+def test_guesses_that_are_sent_together_are_counted_each(serve: Callable[..., Serving]) -> None:
     serving = serve()
 
-    async def together():
+    async def together() -> Any:
         from study.apps.server.inbox import Letter, RefusedError, withdraw
 
-        async def one(number):
-            async def receive():
+        async def one(number) -> Any:
+            async def receive() -> dict[Any, Any]:
                 return {"type": "http.request", "body": json.dumps({"code": str(number)}).encode()}
 
             headers = {b"x-segue-page": b"page-one", b"content-type": b"application/json"}
@@ -294,7 +304,7 @@ def test_guesses_that_are_sent_together_are_counted_each(serve):
     [(f"Bearer {TOKEN}", 200), (f"bearer {TOKEN}", 200), (TOKEN, 401), (f"Basic {TOKEN}", 401), (f"Bearer{TOKEN}", 401),
      (f"Bearer  {TOKEN}", 401), (f" {TOKEN}", 401), ("Bearer ", 401), ("Bearer", 401), (f"Token {TOKEN}", 401)],
 )  # fmt: skip
-def test_the_researchers_token_is_a_bearer_token(serve, given, status):
+def test_the_researchers_token_is_a_bearer_token(serve: Callable[..., Serving], given: str, status: int) -> None:
     answer = serve().client.get("/api/researcher/overview", headers={"authorization": given})
     assert answer.status_code == status
     assert (answer.headers.get("www-authenticate") == "Bearer") is (status == 401)
@@ -303,7 +313,9 @@ def test_the_researchers_token_is_a_bearer_token(serve, given, status):
 # Films before they are loaded
 
 
-def test_no_view_and_no_header_tells_identical_films_from_different_ones(serve, stimuli):
+def test_no_view_and_no_header_tells_identical_films_from_different_ones(
+    serve: Callable[..., Serving], stimuli: Manifest
+) -> None:
     person = serve().person()
     view = person.until(person.begin(parameters={"participant": "p01"}), "trial")
     plan = draw_plan(protocol_of(), stimuli.pairs, "p01")
@@ -326,7 +338,9 @@ def test_no_view_and_no_header_tells_identical_films_from_different_ones(serve, 
     assert len(names) % 2 == 0
 
 
-def test_a_film_is_the_file_and_an_empty_box_that_says_how_many_frames(serve, stimuli):
+def test_a_film_is_the_file_and_an_empty_box_that_says_how_many_frames(
+    serve: Callable[..., Serving], stimuli: Manifest
+) -> None:
     person = serve().person()
     view = person.until(person.begin(parameters={"participant": "p01"}), "trial")
     plan = draw_plan(protocol_of(), stimuli.pairs, "p01")
@@ -349,7 +363,9 @@ def test_a_film_is_the_file_and_an_empty_box_that_says_how_many_frames(serve, st
 # The log
 
 
-def test_what_strangers_send_does_not_fill_the_log(stimuli, responses, caplog):
+def test_what_strangers_send_does_not_fill_the_log(
+    stimuli: Manifest, responses: Responses, caplog: pytest.LogCaptureFixture
+) -> None:
     caplog.set_level(logging.WARNING)
     named = Named(make_app(make_host(stimuli, responses)), own_names("127.0.0.1"), protocol_of())
     with TestClient(named) as client:

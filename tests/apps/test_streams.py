@@ -73,7 +73,9 @@ def test_output_onto_a_full_disk_is_refused_and_messages_are_not_missed() -> Non
         assert done.returncode == 0
 
 
-def test_what_the_system_refuses_is_no_fault_of_ours(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+def test_what_the_system_refuses_is_no_fault_of_ours(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     from study.apps.cli import study as study_commands
 
     def fails(_: str) -> None:

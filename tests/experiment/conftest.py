@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -50,7 +51,7 @@ def jnd_protocol() -> Protocol:
 
 
 @pytest.fixture
-def make_stimuli():
+def make_stimuli() -> Callable[[Protocol], FakeStimuli]:
     """`make_stimuli(protocol)`: pairs of any protocol, with made-up ids."""
     return lambda protocol: FakeStimuli(pairs_of(protocol))
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from pathlib import Path
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
+from toys import FakeStimuli
 
 from study.errors import SegueError, SessionError
+from study.experiment.protocol.whole import Protocol
 from study.experiment.simulation import simulate
 from study.experiment.store import databases
 from study.experiment.store.databases import may_pass, patiently, try_to_write
@@ -19,14 +23,14 @@ from study.experiment.store.tables import metadata
 
 
 @pytest.fixture
-def folder(tmp_path, toy_protocol, toy_stimuli):
+def folder(tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Path:
     """A results folder with two simulated participants' answers."""
     with open_responses(tmp_path) as responses:
         simulate(toy_protocol, toy_stimuli, responses, 2)
     return tmp_path
 
 
-def read_all(folder):
+def read_all(folder) -> Any:
     with open_answers(folder) as responses:
         session_table(responses)
         all_sessions(responses)
@@ -35,14 +39,16 @@ def read_all(folder):
         return answers_frame(responses, all_attempts=True)
 
 
-def failed(code, said="it failed"):
+def failed(code, said: str = "it failed") -> Any:
     """What SQLAlchemy raises for a result code of SQLite."""
     told = sqlite3.OperationalError(said)
     told.sqlite_errorcode = code
     return sa.exc.OperationalError("INSERT", {}, told)
 
 
-def test_a_database_that_another_program_holds_is_waited_for_and_then_said(folder, monkeypatch):
+def test_a_database_that_another_program_holds_is_waited_for_and_then_said(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(databases, "BUSY_SECONDS", 0.2)
     whole = read_all(folder)
     held = sqlite3.connect(folder / "responses.sqlite", isolation_level=None)
@@ -56,7 +62,9 @@ def test_a_database_that_another_program_holds_is_waited_for_and_then_said(folde
     assert read_all(folder).equals(whole)
 
 
-def test_a_simulation_that_can_not_write_says_so(folder, toy_protocol, toy_stimuli, monkeypatch):
+def test_a_simulation_that_can_not_write_says_so(
+    folder: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(databases, "BUSY_SECONDS", 0.2)
     whole = read_all(folder)
     held = sqlite3.connect(folder / "responses.sqlite", isolation_level=None)
@@ -69,7 +77,7 @@ def test_a_simulation_that_can_not_write_says_so(folder, toy_protocol, toy_stimu
     held.close()
 
 
-def test_every_page_may_be_damaged(folder):
+def test_every_page_may_be_damaged(folder: Path) -> None:
     """Each page zeroed, and the file cut at each page: the answers as they were, or a refusal that says so."""
     file = folder / "responses.sqlite"
     content, whole = file.read_bytes(), read_all(folder)
@@ -96,27 +104,29 @@ def test_every_page_may_be_damaged(folder):
         (b"answers of everybody\n" * 200, "the file is something else, or its beginning is damaged; check the path"),
     ],
 )
-def test_what_is_no_database_is_refused_and_left_alone(tmp_path, content, said):
+def test_what_is_no_database_is_refused_and_left_alone(tmp_path: Path, content: bytes, said: str) -> None:
     (tmp_path / "responses.sqlite").write_bytes(content)
     with pytest.raises(SessionError, match=said):
         open_answers(tmp_path)
     assert (tmp_path / "responses.sqlite").read_bytes() == content
 
 
-def test_to_read_makes_no_database(tmp_path):
+def test_to_read_makes_no_database(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match=r"typo\.sqlite: expected answers, found no database"):
         open_answers(tmp_path, tmp_path / "deep" / "typo.sqlite")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_in_its_place_is_said(tmp_path):
+def test_a_folder_in_its_place_is_said(tmp_path: Path) -> None:
     (tmp_path / "responses.sqlite").mkdir()
     with pytest.raises(SessionError, match="found one that can't be opened: it is a folder"):
         open_responses(tmp_path)
 
 
 @pytest.mark.parametrize("index", [True, False], ids=["in use", "left by a kill"])
-def test_a_place_that_can_not_be_written_to_is_read_from_a_copy(folder, tmp_path_factory, monkeypatch, index):
+def test_a_place_that_can_not_be_written_to_is_read_from_a_copy(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, index: bool
+) -> None:
     """With what stands in the log alone: a program that was killed, or one that writes now, has not folded it in."""
     before = read_all(folder)
     writer = sqlite3.connect(folder / "responses.sqlite")
@@ -128,7 +138,7 @@ def test_a_place_that_can_not_be_written_to_is_read_from_a_copy(folder, tmp_path
             shutil.copy(part, place)
     writer.close()
 
-    def refuses(_, where):
+    def refuses(_, where) -> None:
         if where == str(place / "responses.sqlite"):
             raise failed(sqlite3.SQLITE_READONLY)
 
@@ -158,13 +168,15 @@ def test_a_place_that_can_not_be_written_to_is_read_from_a_copy(folder, tmp_path
         (sqlite3.SQLITE_ERROR, "its tables are not as Segue made them", False),
     ],
 )
-def test_what_sqlite_refuses_is_told_apart_and_only_what_may_pass_is_waited_for(tmp_path, code, said, passes):
+def test_what_sqlite_refuses_is_told_apart_and_only_what_may_pass_is_waited_for(
+    tmp_path: Path, code: int, said: str, passes: bool
+) -> None:
     place = str(tmp_path / "responses.sqlite")
     assert said in str(databases.unusable(place, failed(code)))
     assert may_pass(failed(code)) is passes
     waits = []
 
-    def work():
+    def work() -> None:
         raise failed(code)
 
     with pytest.raises(SessionError, match="for 5 s it could" if passes else said):
@@ -172,7 +184,7 @@ def test_what_sqlite_refuses_is_told_apart_and_only_what_may_pass_is_waited_for(
     assert bool(waits) is passes
 
 
-def test_a_damaged_cell_is_refused(folder):
+def test_a_damaged_cell_is_refused(folder: Path) -> None:
     with sqlite3.connect(folder / "responses.sqlite") as connection:
         for (trigger,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
             connection.execute(f"DROP TRIGGER {trigger}")

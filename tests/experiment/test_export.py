@@ -5,24 +5,26 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from toys import keep_answer
+from toys import FakeStimuli, keep_answer
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
+from study.experiment.protocol.whole import Protocol
 from study.experiment.simulation import simulate
 from study.experiment.store.answers import Presentation, record_form
 from study.experiment.store.export import export, label, labels
 from study.experiment.store.frames import export_csv
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import begin_session
 from study.tasks.answer import Answer
 
 
 @pytest.fixture
-def responses(tmp_path, toy_protocol, toy_stimuli):
+def responses(tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Iterator[Responses]:
     """Two simulated participants, and a person who missed the first question and gave the second answer."""
     with open_responses(tmp_path / "answers.sqlite") as opened:
         simulate(toy_protocol, toy_stimuli, opened, 2, seed=1)
@@ -39,7 +41,7 @@ def rows(path: Path, delimiter: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file, delimiter=delimiter, quoting=quoting))
 
 
-def test_psych_ds_names_and_describes_everything(tmp_path, toy_protocol, responses):
+def test_psych_ds_names_and_describes_everything(tmp_path: Path, toy_protocol: Protocol, responses: Responses) -> None:
     folder = export(toy_protocol, responses, "psych-ds", tmp_path / "out")
     files = sorted((folder / "data").iterdir())
     assert files
@@ -63,7 +65,9 @@ def test_psych_ds_names_and_describes_everything(tmp_path, toy_protocol, respons
 
 @pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t=", "\r", " =", "\ufeff=", "＝"])
 @pytest.mark.parametrize("kind", ["csv", "psych-ds", "bids"])
-def test_no_text_in_any_export_begins_like_a_formula(tmp_path, toy_protocol, toy_stimuli, sign, kind):
+def test_no_text_in_any_export_begins_like_a_formula(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli, sign: str, kind: str
+) -> None:
     """What participants type, and what a browser sends of its presentations."""
     said = f"{sign}HYPERLINK(1)"
     with open_responses(tmp_path / "answers.sqlite") as opened:
@@ -84,7 +88,9 @@ def test_no_text_in_any_export_begins_like_a_formula(tmp_path, toy_protocol, toy
     assert [float(value) for value in differences if value]
 
 
-def test_bids_has_a_file_a_participant_and_study_with_its_sidecar(tmp_path, toy_protocol, responses):
+def test_bids_has_a_file_a_participant_and_study_with_its_sidecar(
+    tmp_path: Path, toy_protocol: Protocol, responses: Responses
+) -> None:
     folder = export(toy_protocol, responses, "bids", tmp_path / "out")
     description = json.loads((folder / "dataset_description.json").read_text(encoding="utf-8"))
     assert description["BIDSVersion"] == "1.10.0"
@@ -107,7 +113,9 @@ def test_bids_has_a_file_a_participant_and_study_with_its_sidecar(tmp_path, toy_
     assert (second["answer"], float(second["response_s"])) == ("same", 0.75)
 
 
-def test_an_export_is_written_again_but_nothing_else_is_overwritten(tmp_path, toy_protocol, responses):
+def test_an_export_is_written_again_but_nothing_else_is_overwritten(
+    tmp_path: Path, toy_protocol: Protocol, responses: Responses
+) -> None:
     for kind in ("psych-ds", "bids", "psych-ds"):
         folder = export(toy_protocol, responses, kind, tmp_path / "out")
     assert not list(folder.glob("sub-*"))
@@ -120,7 +128,7 @@ def test_an_export_is_written_again_but_nothing_else_is_overwritten(tmp_path, to
     assert not list(tmp_path.glob(".*.part"))
 
 
-def test_no_answers_are_refused(tmp_path, toy_protocol):
+def test_no_answers_are_refused(tmp_path: Path, toy_protocol: Protocol) -> None:
     with (
         open_responses(tmp_path / "empty.sqlite") as opened,
         pytest.raises(SessionError, match="expected answers to export, found none"),
@@ -129,7 +137,7 @@ def test_no_answers_are_refused(tmp_path, toy_protocol):
     assert not (tmp_path / "out").exists()
 
 
-def test_labels_hold_letters_and_digits_and_stay_apart():
+def test_labels_hold_letters_and_digits_and_stay_apart() -> None:
     assert label("geodesic_vs-fixed 2") == "geodesicvsfixed2"
     made = labels(["p-1", "p_1", "p1", "..."])
     assert len(set(made.values())) == 4

@@ -7,21 +7,24 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from toys import FakeStimuli
 
 from study.errors import SessionError
 from study.experiment.observers import person, truth
-from study.experiment.protocol.whole import parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import open_session, walk
 from study.experiment.simulation import simulate
 from study.experiment.store.answers import has_event
 from study.experiment.store.frames import answers_frame
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import all_sessions
 from study.models.choice import PreferenceObserver, preference_probability
 from study.models.population import SameDifferentObserver, population_different, probability_different
@@ -33,12 +36,12 @@ def alike(settings: ObserverSettings) -> ObserverSettings:
     return replace(settings, same_different=replace(settings.same_different, log_sensitivity_sd=0.0, criterion_sd=0.0))
 
 
-def timeless(responses) -> pd.DataFrame:
+def timeless(responses: Responses) -> pd.DataFrame:
     roles = ("trial", "practice", "check")
     return answers_frame(responses, all_attempts=True, roles=roles).drop(columns="answered_at")
 
 
-def test_the_differencing_model_agrees_with_simulated_percepts():
+def test_the_differencing_model_agrees_with_simulated_percepts() -> None:
     """Percepts drawn one by one, against the closed form."""
     observer = SameDifferentObserver(0.3, 0.5, criterion=1.7, lapse=0.1)
     rng = np.random.default_rng(1)
@@ -51,13 +54,13 @@ def test_the_differencing_model_agrees_with_simulated_percepts():
         assert float(probability_different(observer, difference)) == pytest.approx(different.mean(), abs=0.005)
 
 
-def test_false_alarms_have_their_closed_form():
+def test_false_alarms_have_their_closed_form() -> None:
     """2 Phi(-criterion / sqrt 2) with no difference, no lapse."""
     observer = SameDifferentObserver(0.3, 0.5, criterion=1.7, lapse=0.0)
     assert float(probability_different(observer, 0.0)) == pytest.approx(math.erfc(1.7 / 2.0), abs=1e-12)
 
 
-def test_the_population_is_the_mean_over_participants():
+def test_the_population_is_the_mean_over_participants() -> None:
     observer = SameDifferentObserver(0.37, 0.43, log_sensitivity_sd=0.3, criterion_sd=0.3)
     settings = replace(default_observer(), same_different=observer)
     people = [person(settings, f"sim-{n}", 3).settings.same_different for n in range(4000)]
@@ -66,7 +69,7 @@ def test_the_population_is_the_mean_over_participants():
         assert float(population_different(observer, difference)) == pytest.approx(mean, abs=0.012)
 
 
-def test_the_default_observer_has_the_threshold_of_the_paper(jnd_protocol):
+def test_the_default_observer_has_the_threshold_of_the_paper(jnd_protocol: Protocol) -> None:
     """2004 section 5.1: 75% at k - 8 and k + 7."""
     settings = default_observer()
     known = truth(jnd_protocol, settings)["studies"]["jnd"]
@@ -80,7 +83,7 @@ def test_the_default_observer_has_the_threshold_of_the_paper(jnd_protocol):
     assert known["interpolated_longer_frames"] == pytest.approx(7.0, abs=1.0)
 
 
-def test_the_default_preferences_are_those_of_table_2():
+def test_the_default_preferences_are_those_of_table_2() -> None:
     """2004 Table 2: 96.4% for the geodesic method, 65.7% for the velocity method."""
     from study.experiment.protocol.whole import find_protocol, load_protocol
 
@@ -91,14 +94,16 @@ def test_the_default_preferences_are_those_of_table_2():
         )
 
 
-def test_an_observer_without_threshold_is_refused(jnd_protocol):
+def test_an_observer_without_threshold_is_refused(jnd_protocol: Protocol) -> None:
     settings = default_observer()
     stubborn = replace(settings, same_different=replace(settings.same_different, lapse=0.6))
     with pytest.raises(SessionError, match=r"reaches 75% 'different' at some difference, found .* at none and"):
         truth(jnd_protocol, stubborn)
 
 
-def test_simulated_answers_follow_the_known_curve(tmp_path, jnd_protocol, make_stimuli):
+def test_simulated_answers_follow_the_known_curve(
+    tmp_path: Path, jnd_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     settings = replace(alike(default_observer()), missed=0.0)
     with open_responses(tmp_path) as responses:
         simulate(jnd_protocol, make_stimuli(jnd_protocol), responses, 60, seed=11, settings=settings)
@@ -109,7 +114,9 @@ def test_simulated_answers_follow_the_known_curve(tmp_path, jnd_protocol, make_s
         assert abs((rows["answer"] == "different").mean() - chance) < 3.5 * error, difference
 
 
-def test_simulated_preferences_follow_the_known_ones(tmp_path, toy_protocol, toy_stimuli):
+def test_simulated_preferences_follow_the_known_ones(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
     preference = PreferenceObserver({"fixed": 0.0, "geodesic": 1.0}, order_bias=0.4, lapse=0.1)
     settings = replace(default_observer(), preference=preference)
     with open_responses(tmp_path) as responses:
@@ -123,7 +130,9 @@ def test_simulated_preferences_follow_the_known_ones(tmp_path, toy_protocol, toy
     assert chosen["chose_a"].mean() == pytest.approx(expected, abs=0.09)
 
 
-def test_response_times_are_plausible_and_some_answers_are_missed(tmp_path, toy_protocol, toy_stimuli):
+def test_response_times_are_plausible_and_some_answers_are_missed(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
     settings = replace(default_observer(), missed=0.1)
     with open_responses(tmp_path) as responses:
         simulate(toy_protocol, toy_stimuli, responses, 60, seed=2, settings=settings)
@@ -135,7 +144,9 @@ def test_response_times_are_plausible_and_some_answers_are_missed(tmp_path, toy_
     assert 1.0 < times.median() < 2.0
 
 
-def test_sessions_are_marked_as_simulated_with_their_truth(tmp_path, toy_protocol, toy_stimuli):
+def test_sessions_are_marked_as_simulated_with_their_truth(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
     with open_responses(tmp_path) as responses:
         summary = simulate(toy_protocol, toy_stimuli, responses, 2, seed=3)
         assert (summary.participants, summary.answers, summary.found) == (2, 16, 0)
@@ -149,7 +160,9 @@ def test_sessions_are_marked_as_simulated_with_their_truth(tmp_path, toy_protoco
         assert answers_frame(responses)["simulated"].all()
 
 
-def test_running_again_adds_nothing_and_more_participants_leave_the_first(tmp_path, toy_protocol, toy_stimuli):
+def test_running_again_adds_nothing_and_more_participants_leave_the_first(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
     with open_responses(tmp_path) as responses:
         simulate(toy_protocol, toy_stimuli, responses, 2, seed=3)
         first = timeless(responses)
@@ -165,12 +178,14 @@ class StopHereError(Exception):
 
 
 @pytest.mark.parametrize("after", [1, 7, 8, 9, 20])
-def test_an_interrupted_simulation_ends_as_an_uninterrupted_one(tmp_path, toy_protocol, toy_stimuli, after):
+def test_an_interrupted_simulation_ends_as_an_uninterrupted_one(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli, after: int
+) -> None:
     with open_responses(tmp_path / "whole.sqlite") as responses:
         simulate(toy_protocol, toy_stimuli, responses, 3, seed=4)
         whole = timeless(responses)
 
-    def stop(done, total):
+    def stop(done, total) -> None:
         assert total == 24
         if done == after:
             raise StopHereError
@@ -199,7 +214,9 @@ simulate(protocol, c.FakeStimuli(c.pairs_of(protocol)), open_responses(sys.argv[
 """
 
 
-def test_a_killed_simulation_is_finished_by_running_it_again(tmp_path, repository, jnd_protocol, make_stimuli):
+def test_a_killed_simulation_is_finished_by_running_it_again(
+    tmp_path: Path, repository: Path, jnd_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     """SIGKILL at several moments; in the end the answers are those of a run that was let alone."""
     stimuli = make_stimuli(jnd_protocol)
     with open_responses(tmp_path / "whole.sqlite") as responses:
@@ -224,7 +241,9 @@ def test_a_killed_simulation_is_finished_by_running_it_again(tmp_path, repositor
         pd.testing.assert_frame_equal(timeless(responses), whole)
 
 
-def test_another_observer_or_seed_does_not_continue_a_session(tmp_path, toy_protocol, toy_stimuli):
+def test_another_observer_or_seed_does_not_continue_a_session(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
     with open_responses(tmp_path) as responses:
         simulate(toy_protocol, toy_stimuli, responses, 1, seed=3)
         with pytest.raises(SessionError, match="Expected the observer and seed under which 'sim-001' was begun"):
@@ -233,14 +252,16 @@ def test_another_observer_or_seed_does_not_continue_a_session(tmp_path, toy_prot
             simulate(toy_protocol, toy_stimuli, responses, 0)
 
 
-def test_a_person_is_the_same_whatever_else_is_drawn():
+def test_a_person_is_the_same_whatever_else_is_drawn() -> None:
     settings = default_observer()
     assert person(settings, "sim-002", 5) == person(settings, "sim-002", 5)
     assert person(settings, "sim-002", 5).settings != person(settings, "sim-003", 5).settings
     assert person(settings, "sim-002", 5).settings != person(settings, "sim-002", 6).settings
 
 
-def test_ratings_stay_on_their_scale_and_follow_utility(tmp_path, rating_protocol, make_stimuli):
+def test_ratings_stay_on_their_scale_and_follow_utility(
+    tmp_path: Path, rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     with open_responses(tmp_path) as responses:
         simulate(rating_protocol, make_stimuli(rating_protocol), responses, 30, seed=1)
         table = answers_frame(responses)
@@ -252,7 +273,9 @@ def test_ratings_stay_on_their_scale_and_follow_utility(tmp_path, rating_protoco
     assert means["geodesic"] > means["cut"] + 0.5
 
 
-def test_rated_pairs_are_compared_second_with_first(tmp_path, pair_rating_protocol, make_stimuli):
+def test_rated_pairs_are_compared_second_with_first(
+    tmp_path: Path, pair_rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     """Turned by order, the answers have the mean that the truth names; as given, they lean either way."""
     with open_responses(tmp_path) as responses:
         simulate(pair_rating_protocol, make_stimuli(pair_rating_protocol), responses, 100, seed=1)
@@ -270,7 +293,7 @@ def test_rated_pairs_are_compared_second_with_first(tmp_path, pair_rating_protoc
     assert by_person.mean() == pytest.approx(expected, abs=4 * by_person.std() / 10)
 
 
-def test_front_ends_and_simulation_drive_the_same_session(toy_protocol, toy_stimuli):
+def test_front_ends_and_simulation_drive_the_same_session(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> None:
     """What a simulated participant is asked is what the session asks: by hand the same trials come."""
     from study.experiment.observers import respond
     from study.experiment.plan import draw_plan
@@ -284,7 +307,9 @@ def test_front_ends_and_simulation_drive_the_same_session(toy_protocol, toy_stim
     assert [a.value for a in asked] == [None if pd.isna(value) else value for value in table["answer"]]
 
 
-def test_showings_that_stall_come_again_and_bear_it(tmp_path, toy_protocol, toy_stimuli):
+def test_showings_that_stall_come_again_and_bear_it(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
     with open_responses(tmp_path) as responses:
         settings = replace(default_observer(), badly_shown=0.3)
         made = simulate(toy_protocol, toy_stimuli, responses, 40, seed=3, settings=settings).answers
@@ -297,7 +322,9 @@ def test_showings_that_stall_come_again_and_bear_it(tmp_path, toy_protocol, toy_
     assert 1 - last["shown_well"].mean() == pytest.approx(0.09, abs=0.064)
 
 
-def test_the_careless_answer_at_random_and_are_found_by_the_rules(tmp_path, toy_protocol, make_stimuli):
+def test_the_careless_answer_at_random_and_are_found_by_the_rules(
+    tmp_path: Path, toy_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     from study.analysis.exclusions import Rules, exclude
 
     text = toy_protocol.text.replace('order = "both"', 'order = "both"\nrepeats = 3\nattention_checks = 6')
@@ -315,19 +342,21 @@ def test_the_careless_answer_at_random_and_are_found_by_the_rules(tmp_path, toy_
     assert len(left_out.participants) >= len(careless) - 1
 
 
-def test_shares_of_what_goes_wrong_are_from_0_to_1():
+def test_shares_of_what_goes_wrong_are_from_0_to_1() -> None:
     with pytest.raises(SessionError, match=r"Expected badly_shown as a share from 0 to 1, found 1\.5"):
         replace(default_observer(), badly_shown=1.5)
 
 
 @pytest.mark.parametrize("after", [3, 9, 20])
-def test_a_simulation_with_stalls_goes_on_as_it_would_have(tmp_path, toy_protocol, toy_stimuli, after):
+def test_a_simulation_with_stalls_goes_on_as_it_would_have(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli, after: int
+) -> None:
     settings = replace(default_observer(), badly_shown=0.4, missed=0.2, careless=0.2)
     with open_responses(tmp_path / "whole.sqlite") as responses:
         simulate(toy_protocol, toy_stimuli, responses, 3, seed=4, settings=settings)
         whole = timeless(responses)
 
-    def stop(done, _total):
+    def stop(done, _total) -> None:
         if done == after:
             raise StopHereError
 

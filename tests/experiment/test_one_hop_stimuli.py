@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -127,5 +129,5 @@ def test_the_published_protocol_has_fifteen_transitions_at_60_fps() -> None:
 
 
 @pytest.mark.mocap
-def test_the_published_protocol_can_be_shown_on_captured_dance(mocap) -> None:
+def test_the_published_protocol_can_be_shown_on_captured_dance(mocap: Path) -> None:
     assert check(load_protocol(find_protocol("one_hop_vs_direct")), open_library(mocap / "cmu")) == []

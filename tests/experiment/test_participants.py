@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
-from toys import keep_answer
+from toys import FakeStimuli, keep_answer
 
 from study.experiment.plan import draw_plan
+from study.experiment.protocol.whole import Protocol
 from study.experiment.store import participants as people
 from study.experiment.store.answers import (
     Presentation,
@@ -19,7 +22,7 @@ from study.experiment.store.answers import (
     stored_answers,
     stored_form,
 )
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import session_by_id
 from study.experiment.store.tables import answers, metadata, presentations, sessions, withdrawals
 from study.tasks.answer import Answer
@@ -28,16 +31,16 @@ NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 @pytest.fixture
-def responses(database):
+def responses(database) -> Iterator[Responses]:
     with open_responses(database) as opened:
         yield opened
 
 
 @pytest.fixture
-def enrol(responses, toy_protocol, toy_stimuli):
+def enrol(responses: Responses, toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Any:
     """`enrol(name)`: a participant who arrived, in the group that has the fewest."""
 
-    def enrol(name, groups=1, at=NOW, **more):
+    def enrol(name, groups: int = 1, at=NOW, **more) -> Any:
         newcomer = people.Newcomer(name, f"token {name}", **more)
         places = people.Places(groups, dropped_after=timedelta(days=1))
         draw = lambda group: draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group)  # noqa: E731
@@ -47,11 +50,11 @@ def enrol(responses, toy_protocol, toy_stimuli):
     return enrol
 
 
-def code_of(responses, name):
+def code_of(responses: Responses, name) -> Any:
     return people.find_by_token(responses, f"token {name}").withdrawal_code
 
 
-def everything(responses):
+def everything(responses: Responses) -> Any:
     """All that a database gives away: for SQLite the bytes of its file, for PostgreSQL the rows of all tables."""
     if responses.engine.dialect.name == "sqlite":
         responses.close()
@@ -60,7 +63,7 @@ def everything(responses):
         return repr([connection.execute(sa.select(table)).all() for table in metadata.sorted_tables]).encode()
 
 
-def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol):
+def test_a_participant_is_known_by_token_and_no_token_is_stored(responses: Responses, enrol) -> None:
     record = enrol("p1", parameters={"PROLIFIC_PID": "abc"}, identifying={"PROLIFIC_PID": "abc"})
     found = people.find_by_token(responses, "token p1")
     assert (found.session_id, found.group, found.parameters) == (record.id, 0, {"PROLIFIC_PID": "abc"})
@@ -72,7 +75,7 @@ def test_a_participant_is_known_by_token_and_no_token_is_stored(responses, enrol
     assert b"token p1" not in everything(responses)
 
 
-def test_tokens_and_codes_do_not_repeat():
+def test_tokens_and_codes_do_not_repeat() -> None:
     assert len({people.new_token() for _ in range(1000)}) == 1000
     assert len(people.new_token()) == 43
     codes = {people.Participant(1, str(secret), 0, {}).withdrawal_code for secret in range(1000)}
@@ -80,7 +83,7 @@ def test_tokens_and_codes_do_not_repeat():
     assert all(re.fullmatch(r"([a-z2-9]{4}-){3}[a-z2-9]{4}", code) for code in codes)
 
 
-def test_groups_count_who_is_there_and_give_back_who_is_gone(responses, enrol):
+def test_groups_count_who_is_there_and_give_back_who_is_gone(responses: Responses, enrol) -> None:
     finished, gone, here, declined = (
         enrol("a", 4),
         enrol("b", 4),
@@ -97,8 +100,10 @@ def test_groups_count_who_is_there_and_give_back_who_is_gone(responses, enrol):
     assert here.id
 
 
-def test_a_newcomer_is_turned_away_where_there_is_no_place_or_the_name_is_known(responses, toy_protocol, toy_stimuli):
-    def arrive(name, token, places, **identifying):
+def test_a_newcomer_is_turned_away_where_there_is_no_place_or_the_name_is_known(
+    responses: Responses, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
+    def arrive(name, token, places, **identifying) -> Any:
         draw = lambda group: draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group)  # noqa: E731
         newcomer = people.Newcomer(name, token, identifying, identifying)
         return people.admit(responses, toy_protocol, newcomer, places, draw)
@@ -112,7 +117,7 @@ def test_a_newcomer_is_turned_away_where_there_is_no_place_or_the_name_is_known(
     assert people.filled_groups(responses, roomy) == [1, 1]
 
 
-def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol):
+def test_withdrawing_deletes_everything_and_leaves_a_line(responses: Responses, enrol) -> None:
     stays, leaves = enrol("stays"), enrol("leaves")
     for record in (stays, leaves):
         shown = Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True, {"mark": f"mark of {record.participant}"})
@@ -132,7 +137,7 @@ def test_withdrawing_deletes_everything_and_leaves_a_line(responses, enrol):
     assert b"mark of leaves" not in whole
 
 
-def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(responses, enrol):
+def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(responses: Responses, enrol) -> None:
     stays, leaves = enrol("stays"), enrol("leaves")
     keep_answer(responses, stays, Answer(1, "", 1, "same", 1.0))
     people.withdraw(responses, code_of(responses, "leaves"))

@@ -6,21 +6,27 @@ import json
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
+from toys import FakeStimuli
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan, groups_of, plan_from_json
-from study.experiment.protocol.whole import parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.tasks.trial import Trial
 
 
-def real(plan):
+def real(plan) -> list[Any]:
     """The trials that count."""
     return [trial for trial in plan.trials if trial.role == "trial"]
 
 
-def test_the_jnd_study_has_42_pairs_in_both_orders(jnd_protocol, make_stimuli):
+def test_the_jnd_study_has_42_pairs_in_both_orders(
+    jnd_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     """2004 section 4.2: 7 lengths x 2 orders x 3 motions."""
     plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p01")
     assert [trial.role for trial in plan.trials] == ["practice"] * 4 + ["trial"] * 42
@@ -37,7 +43,9 @@ def test_the_jnd_study_has_42_pairs_in_both_orders(jnd_protocol, make_stimuli):
             assert trial.stimuli[0] != trial.stimuli[1]
 
 
-def test_pairs_and_orders_are_randomised(jnd_protocol, make_stimuli):
+def test_pairs_and_orders_are_randomised(
+    jnd_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     pairs = make_stimuli(jnd_protocol).pairs
     plans = [draw_plan(jnd_protocol, pairs, f"p{number:02d}") for number in range(40)]
     assert len({tuple(trial.pair for trial in real(plan)) for plan in plans}) == 40
@@ -53,14 +61,16 @@ def test_pairs_and_orders_are_randomised(jnd_protocol, make_stimuli):
     assert len({real(plan)[0].pair for plan in plans}) > 10
 
 
-def test_the_same_seed_and_participant_give_the_same_plan(toy_protocol, toy_stimuli):
+def test_the_same_seed_and_participant_give_the_same_plan(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> None:
     plan = draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
     assert draw_plan(toy_protocol, toy_stimuli.pairs, "p01") == plan
     assert draw_plan(toy_protocol, toy_stimuli.pairs, "p02").trials != plan.trials
     assert draw_plan(toy_protocol, toy_stimuli.pairs, "p01", seed=6).trials != plan.trials
 
 
-def test_another_process_draws_the_same_plan(jnd_protocol, make_stimuli, repository):
+def test_another_process_draws_the_same_plan(
+    jnd_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli], repository: Path
+) -> None:
     """Nothing hangs on hash randomisation, on the clock or on anything else outside seed and name."""
     code = (
         "import sys; sys.path.insert(0, 'tests/experiment');"
@@ -75,7 +85,7 @@ def test_another_process_draws_the_same_plan(jnd_protocol, make_stimuli, reposit
     assert plan_from_json(run.stdout) == plan
 
 
-def test_a_known_plan_never_changes(jnd_protocol, make_stimuli):
+def test_a_known_plan_never_changes(jnd_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]) -> None:
     """A change here means that stored seeds no longer give the plans that participants saw."""
     plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p01", seed=1)
     assert [(trial.motion[:4], trial.difference_frames, trial.a_first) for trial in real(plan)[:6]] == KNOWN
@@ -91,7 +101,7 @@ KNOWN = [
 ]
 
 
-def test_studies_come_in_order_and_repeats_one_after_another(toy_protocol, toy_stimuli):
+def test_studies_come_in_order_and_repeats_one_after_another(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> None:
     plan = draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
     assert [trial.study for trial in plan.trials] == ["jnd"] * 6 + ["liking"] * 2
     studies = tuple(s.model_copy(update={"repeats": 3}) for s in toy_protocol.studies)
@@ -99,7 +109,7 @@ def test_studies_come_in_order_and_repeats_one_after_another(toy_protocol, toy_s
     assert [trial.repeat for trial in thrice.trials] == [1] * 6 + [2] * 6 + [3] * 6 + [1, 1, 2, 2, 3, 3]
 
 
-def test_random_study_order_keeps_studies_whole(toy_protocol, toy_stimuli):
+def test_random_study_order_keeps_studies_whole(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> None:
     mixed = toy_protocol.model_copy(update={"study_order": "random"})
     orders = {
         tuple(dict.fromkeys(trial.study for trial in draw_plan(mixed, toy_stimuli.pairs, f"p{n}").trials))
@@ -108,7 +118,7 @@ def test_random_study_order_keeps_studies_whole(toy_protocol, toy_stimuli):
     assert orders == {("jnd", "liking"), ("liking", "jnd")}
 
 
-def test_balanced_order_shows_half_each_way(toy_protocol, toy_stimuli):
+def test_balanced_order_shows_half_each_way(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> None:
     studies = (toy_protocol.studies[0], toy_protocol.studies[1].model_copy(update={"order": "balanced"}))
     balanced = toy_protocol.model_copy(update={"studies": studies})
     for number in range(8):
@@ -116,7 +126,9 @@ def test_balanced_order_shows_half_each_way(toy_protocol, toy_stimuli):
         assert sorted(trial.a_first for trial in plan.trials[6:]) == [False, True]
 
 
-def test_the_odd_pair_of_a_balanced_order_goes_either_way(toy_protocol, make_stimuli):
+def test_the_odd_pair_of_a_balanced_order_goes_either_way(
+    toy_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     """Three pairs: one way is shown twice, and which way is drawn anew for every participant."""
     third = """
 [[transitions]]
@@ -140,7 +152,7 @@ destination = "slow"
     assert min(first.values()) > 15  # 30 expected, standard deviation 3.9
 
 
-def test_preference_trials_say_which_method_is_first(toy_protocol, toy_stimuli):
+def test_preference_trials_say_which_method_is_first(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> None:
     for number in range(8):
         for trial in draw_plan(toy_protocol, toy_stimuli.pairs, f"p{number}").trials[6:]:
             assert trial.methods == ("geodesic", "fixed")
@@ -149,7 +161,9 @@ def test_preference_trials_say_which_method_is_first(toy_protocol, toy_stimuli):
             assert trial.members == ((0, 1) if trial.a_first else (1, 0))
 
 
-def test_rating_trials_rotate_by_group(rating_protocol, make_stimuli):
+def test_rating_trials_rotate_by_group(
+    rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     """2003 section 4.2: two groups, each shown the stimuli in its own order."""
     pairs = make_stimuli(rating_protocol).pairs
     rated = [pair.stimuli[0] for pair in pairs if pair.study == "rating"]
@@ -160,7 +174,9 @@ def test_rating_trials_rotate_by_group(rating_protocol, make_stimuli):
         assert all(len(trial.stimuli) == 1 for trial in trials if trial.study == "rating")
 
 
-def test_rated_pairs_say_which_method_is_first(pair_rating_protocol, make_stimuli):
+def test_rated_pairs_say_which_method_is_first(
+    pair_rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     """2003 section 4.2: half the participants see the original first, half the optimised one."""
     pairs = make_stimuli(pair_rating_protocol).pairs
     own = {pair.motion: pair for pair in pairs if pair.study == "compared"}
@@ -176,7 +192,7 @@ def test_rated_pairs_say_which_method_is_first(pair_rating_protocol, make_stimul
             assert trial.stimuli == ((a, b) if group == 0 else (b, a))
 
 
-def test_a_plan_survives_its_json(rating_protocol, make_stimuli):
+def test_a_plan_survives_its_json(rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]) -> None:
     plan = draw_plan(rating_protocol, make_stimuli(rating_protocol).pairs, "p01")
     assert plan_from_json(plan.to_json()) == plan
 
@@ -203,7 +219,7 @@ def test_a_plan_of_version_1_is_read() -> None:
     assert (trials[2].stimuli, trials[2].members, trials[2].methods) == (("a",), (0,), ("geodesic",))
 
 
-def test_what_is_no_plan_is_refused(toy_protocol, toy_stimuli):
+def test_what_is_no_plan_is_refused(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> None:
     with pytest.raises(SessionError, match="Expected a participant's name, found none"):
         draw_plan(toy_protocol, toy_stimuli.pairs, " ")
     with pytest.raises(SessionError, match="Expected pairs for the study 'liking', found none"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from toys import ToyLibrary
 
 from study.errors import ProtocolError, StimulusError
 from study.experiment.protocol.whole import parse_protocol
@@ -47,7 +48,7 @@ question = "How good?"
 """
 
 
-def test_a_time_warped_blend_stands_beside_the_geodesic_one(toy_library):
+def test_a_time_warped_blend_stands_beside_the_geodesic_one(toy_library: ToyLibrary) -> None:
     prepared = prepare(parse_protocol(HEAD + WARPED), toy_library)
     (pair,) = prepared.pairs
     plain, warped = (prepared.stimulus(name).record for name in pair.stimuli)
@@ -65,13 +66,13 @@ def test_a_time_warped_blend_stands_beside_the_geodesic_one(toy_library):
     assert warped.frames == 30 + warped.blend_frames
 
 
-def test_a_warp_that_no_point_has_is_explained(toy_library):
+def test_a_warp_that_no_point_has_is_explained(toy_library: ToyLibrary) -> None:
     protocol = parse_protocol(HEAD.replace('"quick"', '"slow"') + WARPED.replace("= 4", "= 60"))
     (problem,) = check(protocol, toy_library)
     assert "warped by less than 60 frames" in problem
 
 
-def test_each_cut_stands_at_its_own_metrics_least(toy_library):
+def test_each_cut_stands_at_its_own_metrics_least(toy_library: ToyLibrary) -> None:
     prepared = prepare(parse_protocol(HEAD + CUTS), toy_library)
     points = {pair.methods[0]: prepared.stimulus(pair.stimuli[0]).record for pair in prepared.pairs}
     assert set(points) == {"cut-lee2002", "cut-pointcloud"}
@@ -82,7 +83,7 @@ def test_each_cut_stands_at_its_own_metrics_least(toy_library):
     )
 
 
-def test_cuts_at_one_place_are_refused(toy_library):
+def test_cuts_at_one_place_are_refused(toy_library: ToyLibrary) -> None:
     still = HEAD.replace('"slow"', '"still"').replace('"quick"', '"still"')
     same = still + CUTS.replace("cut-pointcloud", "cut-wang2003")
     with pytest.raises(StimulusError, match="to cut at different points, found both from frame"):
@@ -103,7 +104,7 @@ def test_cuts_at_one_place_are_refused(toy_library):
         ),
     ],
 )
-def test_what_does_not_go_together_is_refused(change, words):
+def test_what_does_not_go_together_is_refused(change: tuple[str, ...], words: str) -> None:
     text = HEAD + CUTS.replace(*change)
     if "same-different" in text:
         text = text[: text.index("[[studies.items]]")]

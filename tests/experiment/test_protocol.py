@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import ProtocolError
-from study.experiment.protocol.whole import find_protocol, load_protocol, parse_protocol, protocols_folder
+from study.experiment.protocol.whole import Protocol, find_protocol, load_protocol, parse_protocol, protocols_folder
 from study.tasks.registry import task_of
 
 GOOD = Path(__file__).parents[2].joinpath("protocols", "demo.toml").read_text()
@@ -22,7 +22,7 @@ def refused(old: str, new: str, base: str = GOOD) -> str:
     return str(caught.value)
 
 
-def test_the_exact_text_and_its_hash_are_kept(tmp_path):
+def test_the_exact_text_and_its_hash_are_kept(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_bytes(GOOD.encode() + b"# a comment with \xc3\xa4\r\n")
     protocol = load_protocol(path)
@@ -48,13 +48,13 @@ def test_the_exact_text_and_its_hash_are_kept(tmp_path):
         ),
     ],
 )
-def test_one_bad_key_is_the_only_thing_that_is_said(old, new, said):
+def test_one_bad_key_is_the_only_thing_that_is_said(old: str, new: str, said: str) -> None:
     found = refused(old, new)
     assert len(found.splitlines()) == 1, found
     assert re.search(said, found), found
 
 
-def test_a_mistake_in_the_only_study_does_not_make_it_missing():
+def test_a_mistake_in_the_only_study_does_not_make_it_missing() -> None:
     head, _, _ = GOOD.partition("[[studies]]")
     one = head + '[[studies]]\nname = "x"\ntask = "preferance"\n'
     with pytest.raises(ProtocolError) as caught:
@@ -65,7 +65,7 @@ def test_a_mistake_in_the_only_study_does_not_make_it_missing():
         parse_protocol("studies = []\n" + head)
 
 
-def test_nothing_can_be_changed_afterwards():
+def test_nothing_can_be_changed_afterwards() -> None:
     protocol = parse_protocol(GOOD)
     with pytest.raises(Exception, match="frozen"):
         protocol.seed = 3
@@ -116,29 +116,29 @@ def test_nothing_can_be_changed_afterwards():
         ("[stimuli]", '[stimuli.colours]\nleft = "red"\n[stimuli]', r"colours.left: expected a colour such as #20305a"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_place(old, new, message):
+def test_what_is_wrong_is_said_with_its_place(old: str, new: str, message: str) -> None:
     text = refused(old, new)
     assert re.search(message, text), text
 
 
-def test_a_slip_in_toml_names_its_line():
+def test_a_slip_in_toml_names_its_line() -> None:
     assert "line 8" in refused("seed = 7", "seed = = 7")
 
 
-def test_all_problems_are_named_at_once():
+def test_all_problems_are_named_at_once() -> None:
     text = refused("answer_s = 5.0", "answer = 5.0", GOOD.replace("seed = 7", 'seed = "x"'))
     assert len(text.splitlines()) == 2
     assert "timing.answer" in text
     assert "seed: expected a whole number" in text
 
 
-def test_the_line_is_the_line_of_the_key():
+def test_the_line_is_the_line_of_the_key() -> None:
     text = refused('task = "preference"', 'task = "preferance"')
     line = int(text.split(":")[1])
     assert GOOD.splitlines()[line - 1] == 'task = "preference"'
 
 
-def test_rating_studies_have_items_and_single_stimuli(rating_protocol):
+def test_rating_studies_have_items_and_single_stimuli(rating_protocol: Protocol) -> None:
     study = rating_protocol.study("rating")
     assert [item.name for item in study.items] == ["natural", "noticeable"]
     base = rating_protocol.text
@@ -146,7 +146,9 @@ def test_rating_studies_have_items_and_single_stimuli(rating_protocol):
     assert "shown singly" in refused('order = "by-group"', 'order = "both"', base)
 
 
-def test_ratings_of_pairs_compare_two_methods_in_any_order(pair_rating_protocol, rating_protocol):
+def test_ratings_of_pairs_compare_two_methods_in_any_order(
+    pair_rating_protocol: Protocol, rating_protocol: Protocol
+) -> None:
     study, single = pair_rating_protocol.study("compared"), rating_protocol.study("rating")
     assert (task_of(study).slots, task_of(single).slots) == (2, 1)
     base = pair_rating_protocol.text
@@ -160,7 +162,7 @@ def test_ratings_of_pairs_compare_two_methods_in_any_order(pair_rating_protocol,
     assert "expected show in rating studies only; remove it from the preference study 'liking'" in said
 
 
-def test_a_sitting_may_hold_the_four_studies_of_2004():
+def test_a_sitting_may_hold_the_four_studies_of_2004() -> None:
     """Section 4.1: all in a single session; 42 + 8 + 8 + 8 pairs (here with the methods that there are)."""
     text = GOOD.split("[[transitions]]")[0]
     for number in range(11):
@@ -179,7 +181,7 @@ def test_a_sitting_may_hold_the_four_studies_of_2004():
     assert [len(protocol.transitions_of(study)) for study in protocol.studies] == [3, 8, 8, 8]
 
 
-def test_nearer_conditions_win():
+def test_nearer_conditions_win() -> None:
     text = GOOD.replace(
         'order = "random"\n', 'order = "random"\npoints = { longest_frames = 20, avoid_within_frames = 2 }\n', 1
     )
@@ -191,7 +193,7 @@ def test_nearer_conditions_win():
     assert protocol.points_for(protocol.study("jnd"), protocol.transition("walking")).longest_frames == 35
 
 
-def test_protocols_are_found_by_name_and_by_path(tmp_path):
+def test_protocols_are_found_by_name_and_by_path(tmp_path: Path) -> None:
     assert find_protocol("demo") == protocols_folder() / "demo.toml"
     assert find_protocol("demo.toml") == protocols_folder() / "demo.toml"
     own = tmp_path / "own.toml"
@@ -203,7 +205,7 @@ def test_protocols_are_found_by_name_and_by_path(tmp_path):
         find_protocol(tmp_path / "demo.toml")
 
 
-def test_files_that_are_no_text_are_refused(tmp_path):
+def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ProtocolError, match="expected a protocol file, found none"):
         load_protocol(tmp_path / "none.toml")
     bad = tmp_path / "bad.toml"
@@ -214,14 +216,14 @@ def test_files_that_are_no_text_are_refused(tmp_path):
         load_protocol(bad)
 
 
-def test_every_key_is_described_and_stands_in_the_documentation(repository):
+def test_every_key_is_described_and_stands_in_the_documentation(repository: Path) -> None:
     from study.experiment.protocol.keys import key_tables
 
     document = (repository / "docs" / "protocols.md").read_text()
     assert key_tables() in document, "run `python -m study.experiment.protocol.keys` and paste its tables"
 
 
-def test_an_installed_package_carries_its_protocols(tmp_path, monkeypatch):
+def test_an_installed_package_carries_its_protocols(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wheel has them in `study/protocols`; the repository beside `study`."""
     import study
 
@@ -235,7 +237,7 @@ def test_an_installed_package_carries_its_protocols(tmp_path, monkeypatch):
     assert find_protocol("demo") == package / "protocols" / "demo.toml"
 
 
-def test_the_study_in_the_documentation_can_be_run(repository):
+def test_the_study_in_the_documentation_can_be_run(repository: Path) -> None:
     """The walk-through's protocol: sound, nothing left to write, and all of it can be shown."""
     from study.experiment.protocol.proofreading import to_do
     from study.experiment.stimuli.prepare import check

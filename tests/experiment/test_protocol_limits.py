@@ -54,7 +54,7 @@ def instructed(words: str) -> Protocol:
         ("participants = inf", "participants: expected a whole number"),
     ],
 )
-def test_toml_past_what_is_meant_is_refused(line, message):
+def test_toml_past_what_is_meant_is_refused(line: str, message: str) -> None:
     assert message in refused(with_line(line))
 
 
@@ -75,28 +75,28 @@ def test_toml_past_what_is_meant_is_refused(line, message):
         ('title = "A', f'title = "{"a" * 30_000}', "title: expected at most 20,000 letters"),
     ],
 )
-def test_values_past_what_is_meant_are_refused(old, new, message):
+def test_values_past_what_is_meant_are_refused(old: str, new: str, message: str) -> None:
     assert old in GOOD
     assert message in refused(GOOD.replace(old, new, 1))
 
 
-def test_a_form_has_no_infinite_number():
+def test_a_form_has_no_infinite_number() -> None:
     field = '[[form]]\nname = "age"\nlabel = "Your age"\nkind = "number"\nleast = -inf\n'
     assert "form[0].least: expected a finite number, found -inf" in refused(f"{GOOD}\n{field}")
 
 
-def test_a_question_named_by_a_list_is_refused():
+def test_a_question_named_by_a_list_is_refused() -> None:
     assert "form[0].name: expected text in quotes" in refused(f"{GOOD}\n[[form]]\nname = []\n")
 
 
-def test_of_thousands_of_mistakes_the_first_are_told():
+def test_of_thousands_of_mistakes_the_first_are_told() -> None:
     lines = refused(with_line("\n".join(f"unknown{k} = 1" for k in range(8000)))).splitlines()
     assert len(lines) == 51
     assert lines[0].startswith("demo.toml:1: unknown0: unknown key")
     assert lines[-1] == "demo.toml: 7,950 more problems; mend these first."
 
 
-def test_thousands_of_transitions_are_checked_in_no_time():
+def test_thousands_of_transitions_are_checked_in_no_time() -> None:
     def more(count: int) -> str:
         one = '[[transitions]]\nname = "t{0}"\ncategory = "c"\nsource = "walk"\ndestination = "run"\n'
         return GOOD + "\n" + "".join(one.format(k) for k in range(count))
@@ -107,7 +107,7 @@ def test_thousands_of_transitions_are_checked_in_no_time():
     assert "transitions: expected at most 1,000 entries, found 7004" in refused(more(7000))
 
 
-def test_more_trials_than_anybody_could_answer_are_refused():
+def test_more_trials_than_anybody_could_answer_are_refused() -> None:
     assert "expected at most 100,000 trials in 'jnd', found" in refused(
         GOOD.replace('name = "jnd"', 'name = "jnd"\nrepeats = 1000', 1).replace(
             "[-15, -10, -5, 0, 5, 10, 20]", str(list(range(-14, 600))), 1
@@ -116,7 +116,7 @@ def test_more_trials_than_anybody_could_answer_are_refused():
 
 
 @pytest.mark.parametrize("words", ["x", "1", "1.", "x ", "five ", "1 ", "{minutes}", "秒", "x\\n", " "])
-def test_texts_are_read_in_a_time_by_their_length(words):
+def test_texts_are_read_in_a_time_by_their_length(words: str) -> None:
     protocol = instructed(words * (19_000 // len(words)))
     started = time.process_time()
     assert to_do(protocol) is not None
@@ -134,17 +134,17 @@ def test_texts_are_read_in_a_time_by_their_length(words):
         ("In 20seconds", "speaks of 20 seconds"),
     ],
 )
-def test_seconds_are_still_found_wherever_they_stand(words, said):
+def test_seconds_are_still_found_wherever_they_stand(words: str, said: str) -> None:
     # No blank stands before or behind the number in Japanese.
     assert any(said in note for note in to_do(instructed(words)))
 
 
-def test_a_mistake_behind_a_line_of_blanks_has_its_line():
+def test_a_mistake_behind_a_line_of_blanks_has_its_line() -> None:
     text = f'source = """\n[{" " * 9000}\n"""\nwrong = 1\n' + re.sub(r"^source = .*$", "", GOOD, flags=re.MULTILINE)
     assert "demo.toml:4: wrong: unknown key" in refused(text)
 
 
-def test_a_file_without_end_is_not_read_to_its_end(tmp_path):
+def test_a_file_without_end_is_not_read_to_its_end(tmp_path: Path) -> None:
     path = tmp_path / "long.toml"
     path.write_text(GOOD + "#" * 3_000_000)
     with pytest.raises(ProtocolError, match="at most 1,000,000 letters"):

@@ -12,6 +12,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from toys import TOY_PROTOCOL, Toy, ToyLibrary
@@ -22,6 +23,7 @@ from study.experiment.stimuli import manifest
 from study.experiment.stimuli.manifest import made_from, read_manifest, record
 from study.experiment.stimuli.prepare import prepare
 from study.experiment.stimuli.rendering import render, rendered_already, rendered_before
+from study.experiment.stimuli.stimulus import StimulusSet
 
 MOTIONS = {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0)}
 
@@ -29,23 +31,23 @@ pytestmark = pytest.mark.gl
 
 
 @pytest.fixture(scope="module")
-def prepared():
+def prepared() -> StimulusSet:
     return prepare(parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS))
 
 
 @pytest.fixture(scope="module")
-def rendered(prepared, tmp_path_factory):
+def rendered(prepared: StimulusSet, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A results folder that is complete; tests copy what they change."""
     folder = tmp_path_factory.mktemp("rendered")
     summary = render(prepared, folder, workers=1)
     return folder, summary
 
 
-def files(folder):
+def files(folder) -> dict[Any, Any]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def pictures(folder):
+def pictures(folder) -> dict[Any, Any]:
     """Hashes of the videos' frames; checks that the files are those of the manifest and nothing else is there.
 
     Files aren't compared byte by byte: the encoder's bytes may differ from run to run where its pictures do not.
@@ -60,21 +62,21 @@ def pictures(folder):
     return {name: video["frames_sha256"] for name, video in manifest.videos.items()}
 
 
-def frames_in(path):
+def frames_in(path) -> Any:
     import av
 
     with av.open(str(path)) as container:
         return sum(1 for _ in container.decode(video=0))
 
 
-def copied(rendered, tmp_path):
+def copied(rendered, tmp_path: Path) -> Any:
     for name, content in files(rendered[0]).items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(content)
     return tmp_path
 
 
-def test_everything_is_rendered_once(prepared, rendered):
+def test_everything_is_rendered_once(prepared: StimulusSet, rendered) -> None:
     folder, summary = rendered
     count = len(prepared.stimuli)
     assert (summary.videos, summary.rendered, summary.reused) == (count, count, 0)
@@ -85,13 +87,13 @@ def test_everything_is_rendered_once(prepared, rendered):
     )
 
 
-def test_the_folder_holds_the_protocol_as_run(prepared, rendered):
+def test_the_folder_holds_the_protocol_as_run(prepared: StimulusSet, rendered) -> None:
     stored = load_protocol(rendered[0] / "protocol.toml")
     assert stored.text == prepared.protocol.text
     assert stored.sha256 == prepared.protocol.sha256
 
 
-def test_the_manifest_says_what_each_stimulus_is(prepared, rendered):
+def test_the_manifest_says_what_each_stimulus_is(prepared: StimulusSet, rendered) -> None:
     folder, _ = rendered
     manifest = read_manifest(folder)
     assert manifest.complete
@@ -111,7 +113,7 @@ def test_the_manifest_says_what_each_stimulus_is(prepared, rendered):
     assert set(data["cameras"]) == {"slow_quick", "still_slow"}
 
 
-def test_videos_hold_their_frames(prepared, rendered):
+def test_videos_hold_their_frames(prepared: StimulusSet, rendered) -> None:
     import av
 
     stimulus = prepared.stimuli[0]
@@ -123,7 +125,7 @@ def test_videos_hold_their_frames(prepared, rendered):
     assert len({int(value) for value in frames[0].ravel()}) > 10
 
 
-def test_running_again_reuses_all(prepared, rendered, tmp_path):
+def test_running_again_reuses_all(prepared: StimulusSet, rendered, tmp_path: Path) -> None:
     folder = copied(rendered, tmp_path)
     before = files(folder)
     summary = render(prepared, folder, workers=1)
@@ -132,7 +134,7 @@ def test_running_again_reuses_all(prepared, rendered, tmp_path):
 
 
 @pytest.mark.parametrize("damage", ["missing", "short", "changed"])
-def test_damaged_videos_are_rendered_again(prepared, rendered, tmp_path, damage):
+def test_damaged_videos_are_rendered_again(prepared: StimulusSet, rendered, tmp_path: Path, damage: str) -> None:
     folder = copied(rendered, tmp_path)
     victim = folder / "stimuli" / f"{prepared.stimuli[1].id}.mp4"
     content = victim.read_bytes()
@@ -147,7 +149,7 @@ def test_damaged_videos_are_rendered_again(prepared, rendered, tmp_path, damage)
     assert pictures(folder) == pictures(rendered[0])
 
 
-def test_recording_makes_the_manifest_without_videos(prepared, tmp_path):
+def test_recording_makes_the_manifest_without_videos(prepared: StimulusSet, tmp_path: Path) -> None:
     assert record(prepared, tmp_path) == {}
     manifest = read_manifest(tmp_path)
     assert not manifest.complete
@@ -156,7 +158,7 @@ def test_recording_makes_the_manifest_without_videos(prepared, tmp_path):
         manifest.video(prepared.stimuli[0].id)
 
 
-def test_progress_tells_what_is_done_and_left(prepared, tmp_path):
+def test_progress_tells_what_is_done_and_left(prepared: StimulusSet, tmp_path: Path) -> None:
     seen = []
     render(prepared, tmp_path, workers=1, progress=seen.append)
     assert [state.videos for state in seen] == list(range(1, len(prepared.stimuli) + 1))
@@ -170,8 +172,10 @@ class StopHereError(Exception):
 
 
 @pytest.mark.parametrize("after", [1, 3])
-def test_an_interrupted_rendering_is_finished_by_running_it_again(prepared, rendered, tmp_path, after):
-    def stop(state):
+def test_an_interrupted_rendering_is_finished_by_running_it_again(
+    prepared: StimulusSet, rendered, tmp_path: Path, after: int
+) -> None:
+    def stop(state) -> None:
         if state.videos == after:
             raise StopHereError
 
@@ -197,7 +201,9 @@ render(prepared, sys.argv[1], 1, lambda state: print(state.videos, flush=True))
 """
 
 
-def test_a_killed_rendering_is_finished_by_running_it_again(prepared, rendered, tmp_path, repository):
+def test_a_killed_rendering_is_finished_by_running_it_again(
+    prepared: StimulusSet, rendered, tmp_path: Path, repository: Path
+) -> None:
     """SIGKILL before the first video and in the midst of others: nothing half written, no doubles."""
     for lines, delay in ((1, 0.02), (2, 0.05)):
         child = subprocess.Popen(
@@ -218,7 +224,7 @@ def test_a_killed_rendering_is_finished_by_running_it_again(prepared, rendered, 
     assert pictures(tmp_path) == pictures(rendered[0])
 
 
-def test_a_folder_of_another_protocol_or_library_is_refused(prepared, rendered):
+def test_a_folder_of_another_protocol_or_library_is_refused(prepared: StimulusSet, rendered) -> None:
     folder = rendered[0]
     other = replace(prepared, protocol=parse_protocol(TOY_PROTOCOL + "# changed\n"))
     with pytest.raises(StimulusError, match=r"expected the results of 'toy' with sha256 \w+, found a\s+protocol.toml"):
@@ -227,7 +233,9 @@ def test_a_folder_of_another_protocol_or_library_is_refused(prepared, rendered):
         render(replace(prepared, library="mine", stimuli=prepared.stimuli[1:]), folder)
 
 
-def test_a_library_may_be_elsewhere_when_its_motions_are_the_same(prepared, rendered, tmp_path):
+def test_a_library_may_be_elsewhere_when_its_motions_are_the_same(
+    prepared: StimulusSet, rendered, tmp_path: Path
+) -> None:
     """On another machine, or under another spelling of the folder."""
     folder = copied(rendered, tmp_path)
     summary = render(replace(prepared, library="elsewhere/toy"), folder)
@@ -235,7 +243,7 @@ def test_a_library_may_be_elsewhere_when_its_motions_are_the_same(prepared, rend
     assert read_manifest(folder).library == "elsewhere/toy"
 
 
-def test_a_folder_that_is_rendered_whole_can_be_shown_without_its_motions(rendered, tmp_path):
+def test_a_folder_that_is_rendered_whole_can_be_shown_without_its_motions(rendered, tmp_path: Path) -> None:
     folder = copied(rendered, tmp_path)
     protocol = parse_protocol(TOY_PROTOCOL)
     assert rendered_before(protocol, folder) == read_manifest(folder)
@@ -246,7 +254,7 @@ def test_a_folder_that_is_rendered_whole_can_be_shown_without_its_motions(render
     assert rendered_before(protocol, folder) is None
 
 
-def test_stimuli_that_were_answered_to_are_not_replaced(prepared, tmp_path):
+def test_stimuli_that_were_answered_to_are_not_replaced(prepared: StimulusSet, tmp_path: Path) -> None:
     """Without answers a folder takes the new stimuli of the same protocol; with answers it keeps the old ones."""
     record(prepared, tmp_path)
     fewer = replace(prepared, stimuli=prepared.stimuli[1:])
@@ -259,7 +267,7 @@ def test_stimuli_that_were_answered_to_are_not_replaced(prepared, tmp_path):
     record(fewer, tmp_path)
 
 
-def test_what_is_no_results_folder_is_refused(prepared, tmp_path):
+def test_what_is_no_results_folder_is_refused(prepared: StimulusSet, tmp_path: Path) -> None:
     with pytest.raises(StimulusError, match="expected the manifest of a results folder, found none; render first"):
         read_manifest(tmp_path)
     (tmp_path / "manifest.json").write_text("{")
@@ -273,7 +281,7 @@ def test_what_is_no_results_folder_is_refused(prepared, tmp_path):
         render(prepared, tmp_path / "file")
 
 
-def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path):
+def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path: Path) -> None:
     folder = copied(rendered, tmp_path)
     protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
     done = rendered_already(protocol, library, folder)
@@ -282,7 +290,7 @@ def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path):
     assert rendered_already(protocol, library, tmp_path / "elsewhere") is None
 
 
-def test_the_program_is_found_wherever_its_modules_stand():
+def test_the_program_is_found_wherever_its_modules_stand() -> None:
     import renderer.window
     import study.motion.clip
 
@@ -290,7 +298,7 @@ def test_the_program_is_found_wherever_its_modules_stand():
     assert {Path(module.__file__).resolve() for module in (manifest, renderer.window, study.motion.clip)} <= found
 
 
-def test_what_python_compiles_meanwhile_changes_nothing():
+def test_what_python_compiles_meanwhile_changes_nothing() -> None:
     protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
     before = made_from(protocol, library)
     compiled = Path(manifest.__file__).parent / "__pycache__" / "manifest.cpython-311.pyc.139872"
@@ -302,7 +310,7 @@ def test_what_python_compiles_meanwhile_changes_nothing():
         compiled.unlink()
 
 
-def test_a_changed_motion_file_or_a_damaged_video_is_noticed(prepared, rendered, tmp_path):
+def test_a_changed_motion_file_or_a_damaged_video_is_noticed(prepared: StimulusSet, rendered, tmp_path: Path) -> None:
     folder = copied(rendered, tmp_path)
     protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
     motion = tmp_path / "walk.bvh"
@@ -316,7 +324,9 @@ def test_a_changed_motion_file_or_a_damaged_video_is_noticed(prepared, rendered,
     assert rendered_already(protocol, ToyLibrary(MOTIONS), folder) is not None
 
 
-def test_a_manifest_that_lacks_a_key_or_holds_something_else_is_refused_by_its_place(prepared, tmp_path):
+def test_a_manifest_that_lacks_a_key_or_holds_something_else_is_refused_by_its_place(
+    prepared: StimulusSet, tmp_path: Path
+) -> None:
     record(prepared, tmp_path)
     path = tmp_path / "manifest.json"
     whole = json.loads(path.read_text())

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -12,7 +14,7 @@ import sqlalchemy as sa
 from toys import FakeStimuli, keep_answer
 
 from study.errors import SessionError
-from study.experiment.plan import draw_plan
+from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
@@ -25,27 +27,29 @@ from study.experiment.store.answers import (
     stored_form,
 )
 from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame, export_csv
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import all_sessions, begin_session, find_session, session_table
 from study.tasks.answer import Answer
 
 
 @pytest.fixture
-def responses(database):
+def responses(database) -> Iterator[Responses]:
     with open_responses(database) as opened:
         yield opened
 
 
 @pytest.fixture
-def plan(toy_protocol, toy_stimuli):
+def plan(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Plan:
     return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
 
 
-def answer(trial, value="same", response_s=1.0, **more):
+def answer(trial, value: str = "same", response_s: float = 1.0, **more) -> Any:
     return Answer(trial, "", more.pop("attempt", 1), value, response_s, **more)
 
 
-def test_a_session_stores_protocol_plan_seed_and_versions(responses, toy_protocol, plan):
+def test_a_session_stores_protocol_plan_seed_and_versions(
+    responses: Responses, toy_protocol: Protocol, plan: Plan
+) -> None:
     record = begin_session(responses, toy_protocol, plan, library="toy", library_synthetic=True)
     assert find_session(responses, "p01") == record
     assert record.plan == plan
@@ -61,7 +65,7 @@ def test_a_session_stores_protocol_plan_seed_and_versions(responses, toy_protoco
     assert stored == toy_protocol.text
 
 
-def test_answers_come_back_as_they_were(responses, toy_protocol, plan):
+def test_answers_come_back_as_they_were(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     record = begin_session(responses, toy_protocol, plan)
     given = (answer(1), answer(2, "different", 0.123), answer(3, None, None), answer(4, shown_well=False))
     assert all(keep_answer(responses, record, one) for one in given)
@@ -92,7 +96,9 @@ def test_the_stimuli_of_earlier_answers_are_listed_when_an_older_database_is_ope
             connection.execute(sa.delete(response_tables.answer_stimuli))
 
 
-def test_an_answer_sent_twice_counts_once_and_another_one_is_refused(responses, toy_protocol, plan):
+def test_an_answer_sent_twice_counts_once_and_another_one_is_refused(
+    responses: Responses, toy_protocol: Protocol, plan: Plan
+) -> None:
     record = begin_session(responses, toy_protocol, plan)
     assert keep_answer(responses, record, answer(1))
     assert not keep_answer(responses, record, answer(1))
@@ -105,7 +111,7 @@ RECORDS = ("answers", "events", "presentations", "form_values", "sessions", "par
 
 
 @pytest.fixture
-def full(responses, toy_protocol, plan):
+def full(responses: Responses, toy_protocol: Protocol, plan: Plan) -> Any:
     """A database with a row in every table, and one session withdrawn."""
     gone = begin_session(responses, toy_protocol, replace(plan, participant="gone"))
     people.erase(responses, gone.id)
@@ -117,7 +123,7 @@ def full(responses, toy_protocol, plan):
 
 
 @pytest.mark.parametrize("table", RECORDS)
-def test_records_can_be_neither_changed_nor_deleted(full, table):
+def test_records_can_be_neither_changed_nor_deleted(full, table: str) -> None:
     column = {"sessions": "id"}.get(table, "session_id")
     statements = [f"DELETE FROM {table}"]
     if table != "participants":  # their tokens change, and when they were last seen
@@ -131,7 +137,7 @@ def test_records_can_be_neither_changed_nor_deleted(full, table):
         assert connection.execute(sa.text(f"SELECT count(*) FROM {table}")).scalar_one() > 0
 
 
-def test_a_withdrawn_session_can_be_deleted_from_every_table(full, plan):
+def test_a_withdrawn_session_can_be_deleted_from_every_table(full, plan: Plan) -> None:
     record = find_session(full, plan.participant)
     people.erase(full, record.id)
     with full.engine.connect() as connection:
@@ -141,7 +147,7 @@ def test_a_withdrawn_session_can_be_deleted_from_every_table(full, plan):
     assert (line.session_id, line.answers) == (record.id, 1)
 
 
-def test_what_no_database_can_store_is_replaced(responses, toy_protocol, plan):
+def test_what_no_database_can_store_is_replaced(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     """PostgreSQL takes no NUL, and half a surrogate pair is no text: a page may send both."""
     record = begin_session(responses, toy_protocol, plan)
     record_form(responses, record, {"remark": "a\0b\ud83dc \U0001f600"})
@@ -149,13 +155,13 @@ def test_what_no_database_can_store_is_replaced(responses, toy_protocol, plan):
     assert stored_form(responses, record.id) == {"remark": "a\ufffdb\ufffdc \U0001f600"}
 
 
-def test_a_seed_that_no_database_can_store_is_refused(responses, toy_protocol, plan):
+def test_a_seed_that_no_database_can_store_is_refused(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     with pytest.raises(SessionError, match="Expected a seed below 2 to the power of 63, found 9223372036854775808"):
         begin_session(responses, toy_protocol, replace(plan, seed=2**63))
     assert begin_session(responses, toy_protocol, replace(plan, seed=2**63 - 1)).plan.seed == 2**63 - 1
 
 
-def test_a_missed_answer_has_no_value(responses, toy_protocol, plan):
+def test_a_missed_answer_has_no_value(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     """The database itself refuses what would contradict itself."""
     record = begin_session(responses, toy_protocol, plan)
     keep_answer(responses, record, answer(1, None, None))
@@ -169,7 +175,7 @@ def test_a_missed_answer_has_no_value(responses, toy_protocol, plan):
         )  # fmt: skip
 
 
-def test_the_table_says_what_each_answer_means(responses, toy_protocol, plan):
+def test_the_table_says_what_each_answer_means(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     record = begin_session(responses, toy_protocol, plan)
     for trial in plan.trials:
         value = "different" if trial.task == "same-different" else "first"
@@ -187,7 +193,7 @@ def test_the_table_says_what_each_answer_means(responses, toy_protocol, plan):
     assert table["answered_at"].str.endswith("+00:00").all()
 
 
-def test_missed_answers_are_neither_right_nor_wrong(responses, toy_protocol, plan):
+def test_missed_answers_are_neither_right_nor_wrong(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     record = begin_session(responses, toy_protocol, plan)
     keep_answer(responses, record, answer(1, None, None))
     row = answers_frame(responses).iloc[0]
@@ -197,7 +203,7 @@ def test_missed_answers_are_neither_right_nor_wrong(responses, toy_protocol, pla
     assert pd.isna(row["response_s"])
 
 
-def test_the_last_showing_counts_and_all_can_be_had(responses, toy_protocol, plan):
+def test_the_last_showing_counts_and_all_can_be_had(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     record = begin_session(responses, toy_protocol, plan)
     keep_answer(responses, record, answer(1, "same", shown_well=False))
     keep_answer(responses, record, answer(1, "different", attempt=2))
@@ -205,13 +211,13 @@ def test_the_last_showing_counts_and_all_can_be_had(responses, toy_protocol, pla
     assert list(answers_frame(responses, all_attempts=True)["answer"]) == ["same", "different"]
 
 
-def test_an_empty_database_gives_an_empty_table(responses):
+def test_an_empty_database_gives_an_empty_table(responses: Responses) -> None:
     assert tuple(answers_frame(responses).columns) == ANSWER_COLUMNS
     assert len(answers_frame(responses)) == 0
     assert len(session_table(responses)) == 0
 
 
-def test_a_session_is_taken_up_not_begun_again(responses, toy_protocol, plan):
+def test_a_session_is_taken_up_not_begun_again(responses: Responses, toy_protocol: Protocol, plan: Plan) -> None:
     first = begin_session(responses, toy_protocol, plan)
     keep_answer(responses, first, answer(1))
     second = begin_session(responses, toy_protocol, plan)
@@ -224,7 +230,9 @@ def test_a_session_is_taken_up_not_begun_again(responses, toy_protocol, plan):
     assert has_event(responses, second, "finished")
 
 
-def test_protocols_are_not_mixed(responses, toy_protocol, toy_stimuli, plan):
+def test_protocols_are_not_mixed(
+    responses: Responses, toy_protocol: Protocol, toy_stimuli: FakeStimuli, plan: Plan
+) -> None:
     begin_session(responses, toy_protocol, plan)
     other = parse_protocol(toy_protocol.text + "# changed\n")
     with pytest.raises(
@@ -233,7 +241,9 @@ def test_protocols_are_not_mixed(responses, toy_protocol, toy_stimuli, plan):
         begin_session(responses, other, draw_plan(other, toy_stimuli.pairs, "p02"))
 
 
-def test_answers_of_merged_protocols_are_not_mixed_silently(responses, toy_protocol, plan):
+def test_answers_of_merged_protocols_are_not_mixed_silently(
+    responses: Responses, toy_protocol: Protocol, plan: Plan
+) -> None:
     record = begin_session(responses, toy_protocol, plan)
     keep_answer(responses, record, answer(1))
     with responses.engine.begin() as connection:
@@ -247,19 +257,23 @@ def test_answers_of_merged_protocols_are_not_mixed_silently(responses, toy_proto
     assert list(answers_frame(responses, protocol_sha256="f" * 64)["participant"]) == ["p02"]
 
 
-def test_a_real_participant_never_becomes_a_simulated_one(responses, toy_protocol, plan):
+def test_a_real_participant_never_becomes_a_simulated_one(
+    responses: Responses, toy_protocol: Protocol, plan: Plan
+) -> None:
     begin_session(responses, toy_protocol, plan)
     with pytest.raises(SessionError, match="Expected a simulated participant 'p01', found a real one"):
         begin_session(responses, toy_protocol, plan, simulated=True)
 
 
-def test_another_plan_for_the_same_participant_is_refused(responses, toy_protocol, toy_stimuli, plan):
+def test_another_plan_for_the_same_participant_is_refused(
+    responses: Responses, toy_protocol: Protocol, toy_stimuli: FakeStimuli, plan: Plan
+) -> None:
     begin_session(responses, toy_protocol, plan)
     with pytest.raises(SessionError, match=r"stored plan of participant 'p01' \(seed 5\), found another \(seed 6\)"):
         begin_session(responses, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01", seed=6))
 
 
-def test_csv_holds_every_showing(responses, toy_protocol, plan, tmp_path):
+def test_csv_holds_every_showing(responses: Responses, toy_protocol: Protocol, plan: Plan, tmp_path: Path) -> None:
     record = begin_session(responses, toy_protocol, plan)
     keep_answer(responses, record, answer(1, "same", shown_well=False))
     keep_answer(responses, record, answer(1, "different", attempt=2))

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import builtins
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
-from postgres_server import PASSWORD, ROLE, without_password
-from toys import keep_answer
+from postgres_server import PASSWORD, ROLE, PostgresServer, without_password
+from toys import FakeStimuli, keep_answer
 
 from study.errors import SessionError
-from study.experiment.plan import draw_plan
+from study.experiment.plan import Plan, draw_plan
+from study.experiment.protocol.whole import Protocol
 from study.experiment.store import databases
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import begin_session, find_session
 from study.tasks.answer import Answer
 
@@ -23,23 +26,23 @@ ANSWER = Answer(1, "", 1, "same", 1.0)
 
 
 @pytest.fixture
-def plan(toy_protocol, toy_stimuli):
+def plan(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Plan:
     return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
 
 
-def scalar(responses, query):
+def scalar(responses: Responses, query) -> Any:
     with responses.engine.connect() as connection:
         return connection.execute(sa.text(query)).scalar_one()
 
 
-def test_sqlite_writes_through(tmp_path):
+def test_sqlite_writes_through(tmp_path: Path) -> None:
     with open_responses(tmp_path) as responses:
         assert scalar(responses, "PRAGMA journal_mode") == "wal"
         assert scalar(responses, "PRAGMA synchronous") == 2
         assert scalar(responses, "PRAGMA foreign_keys") == 1
 
 
-def test_postgresql_writes_through_whatever_its_settings_say(postgres_server):
+def test_postgresql_writes_through_whatever_its_settings_say(postgres_server: PostgresServer) -> None:
     """The server of these tests has synchronous_commit = off."""
     postgres_server.administer(f"CREATE DATABASE hurried OWNER {ROLE}")
     postgres_server.administer("ALTER DATABASE hurried SET default_transaction_isolation = 'serializable'")
@@ -52,14 +55,14 @@ def test_postgresql_writes_through_whatever_its_settings_say(postgres_server):
             assert connection.execute(sa.text("SHOW synchronous_commit")).scalar_one() == "on"
 
 
-def test_a_server_that_waits_for_more_than_its_own_disk_goes_on_doing_so(postgres_server):
+def test_a_server_that_waits_for_more_than_its_own_disk_goes_on_doing_so(postgres_server: PostgresServer) -> None:
     postgres_server.administer(f"CREATE DATABASE doubled OWNER {ROLE}")
     postgres_server.administer("ALTER DATABASE doubled SET synchronous_commit = 'remote_apply'")
     with open_responses(postgres_server.url("doubled")) as responses:
         assert scalar(responses, "SHOW synchronous_commit") == "remote_apply"
 
 
-def test_a_server_that_does_not_write_to_disk_is_refused(postgres_server, postgres_url):
+def test_a_server_that_does_not_write_to_disk_is_refused(postgres_server: PostgresServer, postgres_url: str) -> None:
     with (
         postgres_server.setting("fsync", "off"),
         pytest.raises(SessionError, match="found fsync = off, which may lose"),
@@ -68,7 +71,7 @@ def test_a_server_that_does_not_write_to_disk_is_refused(postgres_server, postgr
     open_responses(postgres_url).close()
 
 
-def test_a_database_in_another_encoding_is_refused(postgres_server):
+def test_a_database_in_another_encoding_is_refused(postgres_server: PostgresServer) -> None:
     postgres_server.administer(f"CREATE DATABASE latin OWNER {ROLE} ENCODING 'LATIN1' TEMPLATE template0")
     with pytest.raises(
         SessionError, match=r"latin at 127\.0\.0\.1, port \d+: expected a database in UTF8, found LATIN1"
@@ -76,7 +79,7 @@ def test_a_database_in_another_encoding_is_refused(postgres_server):
         open_responses(postgres_server.url("latin"))
 
 
-def test_a_database_before_the_first_release_is_refused(database):
+def test_a_database_before_the_first_release_is_refused(database: str) -> None:
     with open_responses(database) as responses, responses.engine.begin() as connection:
         version = response_tables.schema_version.c.version
         connection.execute(sa.delete(response_tables.schema_version).where(version > 6))
@@ -85,7 +88,7 @@ def test_a_database_before_the_first_release_is_refused(database):
         open_responses(database)
 
 
-def test_a_newer_database_is_refused(database):
+def test_a_newer_database_is_refused(database: str) -> None:
     with open_responses(database) as responses, responses.engine.begin() as connection:
         row = {"version": 99, "migration": "from_the_future", "applied_at": datetime.now(UTC)}
         connection.execute(sa.insert(response_tables.schema_version).values(row))
@@ -93,7 +96,7 @@ def test_a_newer_database_is_refused(database):
         open_responses(database)
 
 
-def test_tables_of_another_program_are_left_alone(database):
+def test_tables_of_another_program_are_left_alone(database: str) -> None:
     engine = databases.open_engine(database)
     with engine.begin() as connection:
         connection.execute(sa.text("CREATE TABLE sessions (session_key TEXT)"))
@@ -103,14 +106,14 @@ def test_tables_of_another_program_are_left_alone(database):
     engine.dispose()
 
 
-def test_another_file_is_refused(tmp_path):
+def test_another_file_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "other.sqlite"
     other.write_text("this is no database, but a text that is long enough to have a header" * 9)
     with pytest.raises(SessionError, match="found one that can't be opened"):
         open_responses(other)
 
 
-def refusal(url):
+def refusal(url) -> str:
     with pytest.raises(SessionError) as refused:
         open_responses(url)
     return str(refused.value)
@@ -126,7 +129,9 @@ def refusal(url):
         ({"username": "postgres", "database": "postgres"}, "authentication failed"),
     ],
 )
-def test_what_is_wrong_with_a_connection_is_said_without_the_password(postgres_url, change, expected):
+def test_what_is_wrong_with_a_connection_is_said_without_the_password(
+    postgres_url: str, change: dict[str, int] | dict[str, str], expected: str
+) -> None:
     import re
 
     url = sa.make_url(postgres_url).set(**change)
@@ -136,7 +141,7 @@ def test_what_is_wrong_with_a_connection_is_said_without_the_password(postgres_u
     assert "***" in said
 
 
-def test_a_role_that_may_not_make_tables_is_told_so(postgres_server):
+def test_a_role_that_may_not_make_tables_is_told_so(postgres_server: PostgresServer) -> None:
     postgres_server.administer("CREATE DATABASE of_somebody_else")
     said = refusal(postgres_server.url("of_somebody_else"))
     assert "permission denied for schema public" in said
@@ -144,8 +149,8 @@ def test_a_role_that_may_not_make_tables_is_told_so(postgres_server):
 
 
 def test_a_role_that_owns_nothing_runs_sessions_and_cannot_take_the_guard_away(
-    postgres_server, postgres_url, toy_protocol, plan
-):
+    postgres_server: PostgresServer, postgres_url: str, toy_protocol: Protocol, plan: Plan
+) -> None:
     """As `docs/serving.md` says: the owner makes the tables, another role writes to them."""
     open_responses(postgres_url).close()
     postgres_server.administer("DROP ROLE IF EXISTS writer; CREATE ROLE writer LOGIN PASSWORD 'w'")
@@ -173,7 +178,7 @@ def test_a_role_that_owns_nothing_runs_sessions_and_cannot_take_the_guard_away(
         assert find_session(responses, "p01") is None
 
 
-def test_a_password_is_hidden_wherever_it_stands(postgres_server, postgres_url):
+def test_a_password_is_hidden_wherever_it_stands(postgres_server: PostgresServer, postgres_url: str) -> None:
     in_query = sa.make_url(without_password(postgres_url)).update_query_dict({"password": PASSWORD})
     with open_responses(in_query.render_as_string(hide_password=False)) as responses:
         assert "wombat" not in responses.place
@@ -183,7 +188,7 @@ def test_a_password_is_hidden_wherever_it_stands(postgres_server, postgres_url):
     assert "write @ as %40" in said
 
 
-def test_the_driver_may_be_left_out_and_others_are_refused(postgres_url):
+def test_the_driver_may_be_left_out_and_others_are_refused(postgres_url: str) -> None:
     for name in ("postgresql", "postgres"):
         with open_responses(postgres_url.replace("postgresql+psycopg", name)) as responses:
             assert responses.engine.driver == "psycopg"
@@ -192,10 +197,10 @@ def test_the_driver_may_be_left_out_and_others_are_refused(postgres_url):
         assert "which Segue does not know; use one of these" in refusal(url)
 
 
-def test_without_psycopg_it_is_said_how_to_install_it(monkeypatch):
+def test_without_psycopg_it_is_said_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.__import__
 
-    def without(name, *arguments, **more):
+    def without(name, *arguments, **more) -> Any:
         if name.split(".")[0] == "psycopg":
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
         return real(name, *arguments, **more)
@@ -206,7 +211,9 @@ def test_without_psycopg_it_is_said_how_to_install_it(monkeypatch):
     assert "secret" not in said
 
 
-def test_a_connection_that_the_server_cut_is_made_anew(postgres_server, postgres_url, toy_protocol, plan):
+def test_a_connection_that_the_server_cut_is_made_anew(
+    postgres_server: PostgresServer, postgres_url: str, toy_protocol: Protocol, plan: Plan
+) -> None:
     with open_responses(postgres_url) as responses:
         record = begin_session(responses, toy_protocol, plan)
         postgres_server.administer(f"SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE usename = '{ROLE}'")

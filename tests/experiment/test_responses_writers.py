@@ -9,23 +9,27 @@ import subprocess
 import sys
 import threading
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
-from toys import keep_answer
+from toys import FakeStimuli, keep_answer
 
 from study.errors import SessionError
-from study.experiment.plan import draw_plan
+from study.experiment.plan import Plan, draw_plan
+from study.experiment.protocol.whole import Protocol
 from study.experiment.store import participants as people
 from study.experiment.store import tables as response_tables
 from study.experiment.store.answers import stored_answers
 from study.experiment.store.databases import alone, patiently
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.migrations import FIRST_VERSION, MIGRATIONS, VERSION
-from study.experiment.store.responses import open_responses
+from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import begin_session
 from study.tasks.answer import Answer
 
@@ -52,7 +56,7 @@ for number in itertools.count(int(sys.argv[2])):
 
 
 @pytest.mark.parametrize("kills", [3, pytest.param(200, marks=pytest.mark.slow)])
-def test_every_acknowledged_answer_survives_kills(database, repository, kills):
+def test_every_acknowledged_answer_survives_kills(database: str, repository: Path, kills: int) -> None:
     """The writer is killed at a random moment and taken up again where it stopped."""
     dice = random.Random(7)
     acknowledged: list[tuple[str, int]] = []
@@ -112,7 +116,7 @@ for number in range(newcomers):
 """
 
 
-def test_several_programs_fill_groups_evenly_and_keep_the_cap(database, repository):
+def test_several_programs_fill_groups_evenly_and_keep_the_cap(database: str, repository: Path) -> None:
     """They open an empty database, and admit and record as fast as they can, all at one time."""
     children = []
     for program in range(PROGRAMS):
@@ -144,24 +148,24 @@ def test_several_programs_fill_groups_evenly_and_keep_the_cap(database, reposito
 
 
 @pytest.fixture
-def two(database):
+def two(database) -> Iterator[Any]:
     """Two programs' connections to one database."""
     with open_responses(database) as one, open_responses(database) as other:
         yield one, other
 
 
 @pytest.fixture
-def plan(toy_protocol, toy_stimuli):
+def plan(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Plan:
     return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
 
 
-def test_two_connections_that_record_the_same_answer_record_it_once(two, toy_protocol, plan):
+def test_two_connections_that_record_the_same_answer_record_it_once(two, toy_protocol: Protocol, plan: Plan) -> None:
     record = begin_session(two[0], toy_protocol, plan)
     with ThreadPoolExecutor(2) as threads:
         for trial in range(1, 9):
             together = threading.Barrier(2)
 
-            def send(responses, trial=trial, together=together):
+            def send(responses: Responses, trial=trial, together=together) -> Any:
                 together.wait()
                 return keep_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
 
@@ -169,14 +173,14 @@ def test_two_connections_that_record_the_same_answer_record_it_once(two, toy_pro
     assert len(stored_answers(two[0], record.id)) == 8
 
 
-def test_of_two_different_answers_to_one_question_the_first_stands(two, toy_protocol, plan):
+def test_of_two_different_answers_to_one_question_the_first_stands(two, toy_protocol: Protocol, plan: Plan) -> None:
     record = begin_session(two[0], toy_protocol, plan)
     values = ("same", "different")
     with ThreadPoolExecutor(2) as threads:
         for trial in range(1, 9):
             together = threading.Barrier(2)
 
-            def send(number, trial=trial, together=together):
+            def send(number, trial=trial, together=together) -> Any:
                 together.wait()
                 try:
                     return keep_answer(two[number], record, Answer(trial, "", 1, values[number], 1.0))
@@ -189,12 +193,12 @@ def test_of_two_different_answers_to_one_question_the_first_stands(two, toy_prot
             assert stored_answers(two[0], record.id)[-1].value == values[outcome.index(True)]
 
 
-def test_what_reads_before_it_writes_runs_alone(two):
+def test_what_reads_before_it_writes_runs_alone(two) -> None:
     """The second one begins when the first one has ended, and sees what it did."""
     count = sa.select(sa.func.count()).select_from(response_tables.withdrawals)
     line = sa.insert(response_tables.withdrawals)
 
-    def add(responses):
+    def add(responses: Responses) -> Any:
         with alone(responses.engine) as connection:
             before = connection.execute(count).scalar_one()
             row = {"session_id": before, "answers": 0, "at": datetime.now(UTC)}
@@ -205,12 +209,14 @@ def test_what_reads_before_it_writes_runs_alone(two):
         assert sorted(threads.map(add, two * 10)) == list(range(20))
 
 
-def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(two, toy_protocol, plan):
+def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(
+    two, toy_protocol: Protocol, plan: Plan
+) -> None:
     for number in range(8):
         record = begin_session(two[0], toy_protocol, replace(plan, participant=f"p{number}"))
         together = threading.Barrier(3)
 
-        def answer_all(record=record, together=together):
+        def answer_all(record=record, together=together) -> str:
             together.wait()
             for trial in range(1, 9):
                 try:
@@ -219,7 +225,7 @@ def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(two, 
                     return str(gone)
             return ""
 
-        def erase(record=record, together=together):
+        def erase(record=record, together=together) -> None:
             together.wait()
             people.erase(two[1], record.id)
 
@@ -232,14 +238,14 @@ def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(two, 
         assert count == {"withdrawals": 8, "schema_version": len(MIGRATIONS)}.get(table.name, 0)
 
 
-def away():
+def away() -> Any:
     return sa.exc.OperationalError("SELECT 1", {}, Exception("connection refused"))
 
 
-def test_a_database_that_comes_back_in_time_was_waited_for():
+def test_a_database_that_comes_back_in_time_was_waited_for() -> None:
     failures, waits = [away(), away(), away()], []
 
-    def work():
+    def work() -> str:
         if failures:
             raise failures.pop()
         return "done"
@@ -248,10 +254,10 @@ def test_a_database_that_comes_back_in_time_was_waited_for():
     assert waits == [0.1, 0.2, 0.4]
 
 
-def test_a_database_that_stays_away_is_told_of_and_other_faults_at_once():
+def test_a_database_that_stays_away_is_told_of_and_other_faults_at_once() -> None:
     waits = []
 
-    def work():
+    def work() -> None:
         raise away()
 
     said = r"there: expected a database that can be written to, found that for 5 s it could not be \(connection refused"

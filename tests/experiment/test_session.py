@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
+from toys import FakeStimuli
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
-from study.experiment.protocol.whole import parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import (
     advanced,
     answered,
@@ -19,13 +23,13 @@ from study.experiment.session import (
 from study.experiment.steps import answer_keys
 
 
-def to_question(session):
+def to_question(session) -> Any:
     while current(session).kind not in ("answer", "done"):
         session = advanced(session)
     return session
 
 
-def run(session, count=None, choose=lambda step: step.legal[0], seen=None):
+def run(session, count=None, choose=lambda step: step.legal[0], seen=None) -> Any:
     """Answer `count` questions (all by default); the session after it and the answers."""
     answers = []
     while current(session).kind != "done" and (count is None or len(answers) < count):
@@ -41,11 +45,11 @@ def run(session, count=None, choose=lambda step: step.legal[0], seen=None):
 
 
 @pytest.fixture
-def opened(toy_protocol, toy_stimuli):
+def opened(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Any:
     return open_session(toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01"))
 
 
-def test_a_trial_is_first_gap_second_answer_pause(opened):
+def test_a_trial_is_first_gap_second_answer_pause(opened) -> None:
     seen = []
     run(opened, seen=seen)
     kinds = [step.place for step in seen]
@@ -65,12 +69,12 @@ def test_a_trial_is_first_gap_second_answer_pause(opened):
     assert [step.text for step in seen if step.kind == "instructions"] == ["Welcome.", "Some pairs are the same."]
 
 
-def test_trials_come_in_the_order_of_the_plan(opened):
+def test_trials_come_in_the_order_of_the_plan(opened) -> None:
     _, answers = run(opened)
     assert [answer.trial for answer in answers] == list(range(1, 9))
 
 
-def test_only_legal_answers_in_the_answer_window_count(opened):
+def test_only_legal_answers_in_the_answer_window_count(opened) -> None:
     session = to_question(opened)
     assert current(session).legal == ("same", "different")
     with pytest.raises(SessionError, match="Expected one of same, different in trial 1, found 'first'"):
@@ -83,7 +87,7 @@ def test_only_legal_answers_in_the_answer_window_count(opened):
     assert (answer.value, answer.response_s, answer.attempt, answer.missed) == ("same", 5.0, 1, False)
 
 
-def test_a_wrong_order_of_calls_is_refused(opened):
+def test_a_wrong_order_of_calls_is_refused(opened) -> None:
     with pytest.raises(SessionError, match="Expected no answer now: the session is at 'instructions'"):
         answered(opened, "same", 1.0)
     with pytest.raises(SessionError, match="Expected no answer now"):
@@ -100,7 +104,7 @@ def test_a_wrong_order_of_calls_is_refused(opened):
         advanced(done)
 
 
-def test_a_missed_answer_is_recorded_and_not_asked_again(opened):
+def test_a_missed_answer_is_recorded_and_not_asked_again(opened) -> None:
     session, answer = missed(to_question(opened))
     assert (answer.value, answer.response_s, answer.missed) == (None, None, True)
     _, rest = run(session)
@@ -108,7 +112,7 @@ def test_a_missed_answer_is_recorded_and_not_asked_again(opened):
 
 
 @pytest.mark.parametrize("done", range(9))
-def test_a_session_is_taken_up_where_it_stopped(opened, done):
+def test_a_session_is_taken_up_where_it_stopped(opened, done: int) -> None:
     """Whatever was answered before, the rest is the rest, in the same order."""
     _, whole = run(opened)
     _, before = run(opened, done)
@@ -118,7 +122,7 @@ def test_a_session_is_taken_up_where_it_stopped(opened, done):
     assert before + after == whole
 
 
-def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opened):
+def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opened) -> None:
     _, before = run(opened, 2)
     seen = []
     run(open_session(opened.protocol, opened.plan, before), seen=seen)
@@ -127,7 +131,7 @@ def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opene
     assert seen[1].trial == 3
 
 
-def test_a_badly_shown_trial_comes_again_at_the_end_of_its_study(opened):
+def test_a_badly_shown_trial_comes_again_at_the_end_of_its_study(opened) -> None:
     session, faulty = answered(to_question(opened), "same", 1.0, shown_well=False)
     _, rest = run(session)
     assert [(a.trial, a.attempt) for a in rest][4:] == [(6, 1), (1, 2), (7, 1), (8, 1)]
@@ -137,7 +141,7 @@ def test_a_badly_shown_trial_comes_again_at_the_end_of_its_study(opened):
         assert [faulty, *rest] == before + after
 
 
-def test_a_trial_is_not_repeated_for_ever(opened):
+def test_a_trial_is_not_repeated_for_ever(opened) -> None:
     session = opened
     answers = []
     while current(session := to_question(session)).kind != "done":
@@ -148,7 +152,9 @@ def test_a_trial_is_not_repeated_for_ever(opened):
     assert current(open_session(opened.protocol, opened.plan, answers)).kind == "debrief"
 
 
-def test_a_rated_pair_shows_both_and_then_asks_every_item(pair_rating_protocol, make_stimuli):
+def test_a_rated_pair_shows_both_and_then_asks_every_item(
+    pair_rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     plan = draw_plan(pair_rating_protocol, make_stimuli(pair_rating_protocol).pairs, "p01")
     seen = []
     run(open_session(pair_rating_protocol, plan), choose=lambda step: step.legal[-1], seen=seen)
@@ -162,7 +168,9 @@ def test_a_rated_pair_shows_both_and_then_asks_every_item(pair_rating_protocol, 
     assert (steps[0].stimulus, steps[2].stimulus) == trial.stimuli
 
 
-def test_rating_asks_every_item_without_time_limit(rating_protocol, make_stimuli):
+def test_rating_asks_every_item_without_time_limit(
+    rating_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
     plan = draw_plan(rating_protocol, make_stimuli(rating_protocol).pairs, "p01")
     seen = []
     _, answers = run(open_session(rating_protocol, plan), choose=lambda step: step.legal[-1], seen=seen)
@@ -180,7 +188,9 @@ def test_rating_asks_every_item_without_time_limit(rating_protocol, make_stimuli
 
 
 @pytest.mark.parametrize(("every", "expected"), [(3, [3, 6]), (4, [4]), (2, [2, 4, 6]), (8, []), (1, [*range(1, 8)])])
-def test_breaks_come_after_so_many_of_eight_trials_and_never_after_the_last(toy_protocol, toy_stimuli, every, expected):
+def test_breaks_come_after_so_many_of_eight_trials_and_never_after_the_last(
+    toy_protocol: Protocol, toy_stimuli: FakeStimuli, every: int, expected: list[int]
+) -> None:
     text = toy_protocol.text.replace("[points]", f"[timing]\nbreak_after = {every}\n\n[points]").replace(
         "[texts]", '[texts]\nbreak_text = "Rest."'
     )
@@ -192,7 +202,7 @@ def test_breaks_come_after_so_many_of_eight_trials_and_never_after_the_last(toy_
     assert before == expected
 
 
-def test_another_protocol_or_stray_answers_are_refused(opened):
+def test_another_protocol_or_stray_answers_are_refused(opened) -> None:
     other = parse_protocol(opened.protocol.text + "# changed\n")
     with pytest.raises(SessionError, match="Expected the protocol under which the plan was drawn"):
         open_session(other, opened.plan)
@@ -224,7 +234,7 @@ choices = ["good", "poor"]
 
 
 @pytest.fixture
-def with_people(toy_protocol, toy_stimuli):
+def with_people(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Any:
     text = toy_protocol.text.replace("[stimuli]", PEOPLE.lstrip(), 1).replace(
         'order = "both"', 'order = "both"\npractice = 4\nattention_checks = 2'
     )
@@ -232,7 +242,7 @@ def with_people(toy_protocol, toy_stimuli):
     return protocol, draw_plan(protocol, toy_stimuli.pairs, "p01")
 
 
-def test_consent_and_form_come_first_and_once(with_people):
+def test_consent_and_form_come_first_and_once(with_people) -> None:
     protocol, plan = with_people
     session = open_session(protocol, plan)
     assert (current(session).kind, current(session).text) == ("consent", "Do you agree?")
@@ -258,7 +268,7 @@ def test_consent_and_form_come_first_and_once(with_people):
     assert current(open_session(protocol, plan, passed=("consent", "form"))).kind == "instructions"
 
 
-def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people):
+def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people) -> None:
     protocol, plan = with_people
     assert [trial.role for trial in plan.trials[:4]] == ["practice"] * 4
     assert sorted(bool(trial.difference_frames) for trial in plan.trials[:4]) == [False, False, True, True]
@@ -276,16 +286,16 @@ def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people):
     assert "10" not in answer_keys(protocol, [str(i) for i in range(11)])
 
 
-def test_practice_and_checks_leave_the_trials_as_they_are(with_people, opened):
+def test_practice_and_checks_leave_the_trials_as_they_are(with_people, opened) -> None:
     from dataclasses import replace
 
-    def trials(plan):
+    def trials(plan) -> list[Any]:
         return [replace(trial, trial=0) for trial in plan.trials if trial.role == "trial"]
 
     assert trials(with_people[1]) == trials(opened.plan)
 
 
-def test_practice_is_not_repeated(with_people):
+def test_practice_is_not_repeated(with_people) -> None:
     protocol, plan = with_people
     session = open_session(protocol, plan, passed=("consent", "form"))
     _, answer = answered(to_question(session), "same", 1.0, shown_well=False)
@@ -300,12 +310,12 @@ PRACTISING = (
 
 
 @pytest.fixture
-def practising(toy_protocol, make_stimuli):
+def practising(toy_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]) -> Any:
     protocol = parse_protocol(toy_protocol.text.replace(*PRACTISING))
     return open_session(protocol, draw_plan(protocol, make_stimuli(protocol).pairs, "p01"))
 
 
-def test_the_end_of_practice_is_said_once(practising):
+def test_the_end_of_practice_is_said_once(practising) -> None:
     seen = []
     run(practising, seen=seen)
     over = [i for i, step in enumerate(seen) if step.text == practising.protocol.texts.practice_over]
@@ -318,7 +328,7 @@ def test_the_end_of_practice_is_said_once(practising):
         assert any(step.text == practising.protocol.texts.practice_over for step in again.steps) == said
 
 
-def test_practice_and_example_show_transitions_of_their_own(practising):
+def test_practice_and_example_show_transitions_of_their_own(practising) -> None:
     plan = practising.plan
     assert [trial.motion for trial in plan.trials if trial.role == "practice"] == ["still_slow"] * 2
     assert {trial.motion for trial in plan.trials if trial.study == "jnd" and trial.role == "trial"} == {"slow_quick"}

@@ -5,15 +5,17 @@ Participants miss, films stall, programs are killed at any step, in a sitting wi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
-from toys import TOY_PROTOCOL, TOY_RATING
+from toys import TOY_PROTOCOL, TOY_RATING, FakeStimuli
 
 from study.errors import SessionError
 from study.experiment.plan import draw_plan
-from study.experiment.protocol.whole import parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import (
     Answer,
     Session,
@@ -31,7 +33,7 @@ WALKS = 40
 SHOW_AGAIN = (0, 1, 3)
 
 
-def full_protocol(show_again: int):
+def full_protocol(show_again: int) -> Any:
     """Consent, form, practice, checks, breaks, three tasks."""
     text = TOY_PROTOCOL + TOY_RATING
     text = text.replace('order = "both"', 'order = "both"\npractice = 2\nattention_checks = 2')
@@ -93,7 +95,7 @@ def walk(protocol, plan, walker: Walker) -> list[Answer]:
 
 
 @pytest.fixture(params=SHOW_AGAIN)
-def whole(request, make_stimuli):
+def whole(request: pytest.FixtureRequest, make_stimuli: Callable[[Protocol], FakeStimuli]) -> Any:
     protocol = full_protocol(request.param)
     return protocol, make_stimuli(protocol).pairs
 
@@ -102,7 +104,7 @@ def asked_of(protocol, trial) -> set[str]:
     return {""} if trial.role == "check" else {item.name for item in protocol.study(trial.study).items} or {""}
 
 
-def test_every_walk_ends_with_every_question_answered_and_none_twice(whole):
+def test_every_walk_ends_with_every_question_answered_and_none_twice(whole: int) -> None:
     protocol, pairs = whole
     for number in range(WALKS):
         rng = np.random.default_rng([number, 1])
@@ -126,7 +128,7 @@ def test_every_walk_ends_with_every_question_answered_and_none_twice(whole):
                 assert not badly or attempt < attempts[-1] or attempt == most
 
 
-def test_an_interruption_changes_nothing_of_what_follows(whole):
+def test_an_interruption_changes_nothing_of_what_follows(whole: int) -> None:
     """After a kill at any answer the questions that are left are those, in the order, that were left before."""
     protocol, pairs = whole
     for number in range(6):
@@ -149,7 +151,7 @@ def test_an_interruption_changes_nothing_of_what_follows(whole):
                 session = advanced(session)
 
 
-def test_a_machine_on_which_everything_stalls_lets_the_participant_go(whole):
+def test_a_machine_on_which_everything_stalls_lets_the_participant_go(whole: int) -> None:
     protocol, pairs = whole
     plan = draw_plan(protocol, pairs, "p1")
     stored = walk(protocol, plan, Walker(np.random.default_rng(3), stalls=1.0, misses=0.0, dies=0.0))
@@ -158,19 +160,19 @@ def test_a_machine_on_which_everything_stalls_lets_the_participant_go(whole):
     assert len(stored) == practice + (1 + protocol.timing.show_again) * (once - practice)
 
 
-def test_the_same_seed_gives_the_same_answers_however_often_it_is_killed(whole):
+def test_the_same_seed_gives_the_same_answers_however_often_it_is_killed(whole: int) -> None:
     """The walker's own draws belong to the question, so that a kill changes no answer."""
     protocol, pairs = whole
     plan = draw_plan(protocol, pairs, "p1")
 
-    def answer_of(session):
+    def answer_of(session) -> Any:
         step = current(session)
         rng = np.random.default_rng([step.trial, step.attempt, len(step.item)])
         if rng.random() < 0.2:
             return missed(session, shown_well=rng.random() < 0.6)
         return answered(session, str(rng.choice(step.legal)), rng.uniform(0, 5), shown_well=rng.random() < 0.6)
 
-    def run(kills):
+    def run(kills) -> Any:
         stored: list[Answer] = []
         session = open_session(protocol, plan, passed={"consent", "form"})
         while current(session).kind != "done":
@@ -184,7 +186,7 @@ def test_the_same_seed_gives_the_same_answers_however_often_it_is_killed(whole):
         return stored
 
     class Never:
-        def random(self):
+        def random(self) -> float:
             return 1.0
 
     alone = run(Never())
@@ -192,7 +194,9 @@ def test_the_same_seed_gives_the_same_answers_however_often_it_is_killed(whole):
         assert run(np.random.default_rng(seed)) == alone
 
 
-def test_an_item_after_a_bad_showing_keeps_the_whole_trial_to_be_shown_again(make_stimuli):
+def test_an_item_after_a_bad_showing_keeps_the_whole_trial_to_be_shown_again(
+    make_stimuli: Callable[[Protocol], FakeStimuli],
+) -> None:
     """The first item says that the film stalled; killed, shown well, and the second answered: it comes again."""
     protocol = full_protocol(1)
     plan = draw_plan(protocol, make_stimuli(protocol).pairs, "p1")
@@ -214,7 +218,7 @@ def test_an_item_after_a_bad_showing_keeps_the_whole_trial_to_be_shown_again(mak
 
 
 @pytest.mark.parametrize("response_s", [float("nan"), float("inf"), -0.001])
-def test_times_that_are_none_are_refused(make_stimuli, response_s):
+def test_times_that_are_none_are_refused(make_stimuli: Callable[[Protocol], FakeStimuli], response_s: float) -> None:
     protocol = full_protocol(0)
     session = open_session(
         protocol, draw_plan(protocol, make_stimuli(protocol).pairs, "p1"), passed={"consent", "form"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from toys import TOY_PROTOCOL, Toy, ToyLibrary
 from renderer.camera import project
 from study.errors import StimulusError
 from study.experiment.plan import draw_plan
-from study.experiment.protocol.whole import parse_protocol
+from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.stimuli.prepare import check, prepare
+from study.experiment.stimuli.stimulus import StimulusSet
 from study.transitions.blend_length import blend_length
 
 
-def changed(*pairs: tuple[str, str], base: str = TOY_PROTOCOL):
+def changed(*pairs: tuple[str, str], base: str = TOY_PROTOCOL) -> Any:
     text = base
     for old, new in pairs:
         assert old in text, old
@@ -25,18 +27,18 @@ def changed(*pairs: tuple[str, str], base: str = TOY_PROTOCOL):
 
 
 @pytest.fixture(scope="module")
-def toys():
+def toys() -> ToyLibrary:
     return ToyLibrary(
         {"slow": Toy(0.8, 1.4), "quick": Toy(1.6, 0.9), "still": Toy(0.0, 3.0), "short": Toy(1.0, 1.0, seconds=2.0)}
     )
 
 
 @pytest.fixture(scope="module")
-def prepared(toys):
+def prepared(toys: ToyLibrary) -> StimulusSet:
     return prepare(parse_protocol(TOY_PROTOCOL), toys)
 
 
-def test_every_pair_has_its_stimuli(prepared):
+def test_every_pair_has_its_stimuli(prepared: StimulusSet) -> None:
     assert [pair.name for pair in prepared.pairs] == [
         "jnd/slow_quick/-3",
         "jnd/slow_quick/+0",
@@ -50,7 +52,7 @@ def test_every_pair_has_its_stimuli(prepared):
     draw_plan(prepared.protocol, prepared.pairs, "p01")
 
 
-def test_practice_has_the_plainest_levels_of_a_transition_of_its_own(toys):
+def test_practice_has_the_plainest_levels_of_a_transition_of_its_own(toys: ToyLibrary) -> None:
     old = "differences_frames = [-3, 0, 5]\n"
     new = 'differences_frames = [-3, 0, 2, 5]\npractice = 2\npractice_transitions = ["still_slow"]\n'
     prepared = prepare(parse_protocol(TOY_PROTOCOL.replace(old, new)), toys)
@@ -61,7 +63,7 @@ def test_practice_has_the_plainest_levels_of_a_transition_of_its_own(toys):
     assert levels == {"slow_quick": [-3, 0, 2, 5], "still_slow": [-3, 0, 5]}
 
 
-def test_levels_are_the_optimal_length_and_what_was_added(prepared):
+def test_levels_are_the_optimal_length_and_what_was_added(prepared: StimulusSet) -> None:
     for pair in prepared.pairs[:3]:
         reference, comparison = prepared.stimulus(pair.stimuli[0]).record, prepared.stimulus(pair.stimuli[1]).record
         assert reference.blend_frames == reference.optimal_frames
@@ -73,13 +75,13 @@ def test_levels_are_the_optimal_length_and_what_was_added(prepared):
         assert pair.methods[1] == "fixed"
 
 
-def test_no_difference_is_the_very_same_stimulus(prepared):
+def test_no_difference_is_the_very_same_stimulus(prepared: StimulusSet) -> None:
     same = prepared.pairs[1]
     assert same.difference_frames == 0
     assert same.stimuli[0] == same.stimuli[1]
 
 
-def test_identical_stimuli_are_there_once_and_studies_share_them(prepared):
+def test_identical_stimuli_are_there_once_and_studies_share_them(prepared: StimulusSet) -> None:
     ids = [stimulus.id for stimulus in prepared.stimuli]
     assert len(set(ids)) == len(ids)
     # The preference study's geodesic stimulus is the reference of the other study: same transition and conditions.
@@ -87,7 +89,7 @@ def test_identical_stimuli_are_there_once_and_studies_share_them(prepared):
     assert len(ids) == 3 + 1 + 2
 
 
-def test_entries_are_the_same_for_all_lengths_but_for_the_feet(toys):
+def test_entries_are_the_same_for_all_lengths_but_for_the_feet(toys: ToyLibrary) -> None:
     """Up to the blend all lengths show the same frames in the same place."""
     made = prepare(changed(("exit_s = 0.3", "exit_s = 0.3\nclean_feet = false")), toys)
     entries = [made.stimulus(pair.stimuli[1]).positions[:9] for pair in made.pairs[:3]]
@@ -95,7 +97,7 @@ def test_entries_are_the_same_for_all_lengths_but_for_the_feet(toys):
         np.testing.assert_array_equal(entry, entries[0])
 
 
-def test_transitions_start_over_the_origin_along_z(prepared):
+def test_transitions_start_over_the_origin_along_z(prepared: StimulusSet) -> None:
     for stimulus in prepared.stimuli:
         hips = stimulus.positions[:, 0]
         # Where the blend begins, the first blended frame is one step on from the origin at most.
@@ -104,7 +106,7 @@ def test_transitions_start_over_the_origin_along_z(prepared):
         assert abs(np.arctan2(way[0], way[2])) < np.radians(15)
 
 
-def test_nothing_leaves_the_frame_and_a_group_shares_its_camera(prepared):
+def test_nothing_leaves_the_frame_and_a_group_shares_its_camera(prepared: StimulusSet) -> None:
     cameras = {}
     for stimulus in prepared.stimuli:
         pixels, _ = project(stimulus.camera, stimulus.positions)
@@ -116,19 +118,19 @@ def test_nothing_leaves_the_frame_and_a_group_shares_its_camera(prepared):
 
 
 @pytest.mark.parametrize(("group", "cameras"), [("study", 1), ("category", 2), ("transition", 2)])
-def test_the_protocol_says_what_shares_a_camera(toys, group, cameras):
+def test_the_protocol_says_what_shares_a_camera(toys: ToyLibrary, group: str, cameras: int) -> None:
     made = prepare(changed(("exit_s", f'camera_group = "{group}"\nexit_s')), toys)
     assert len({id(stimulus.camera) for stimulus in made.stimuli}) == cameras
 
 
-def test_the_same_protocol_gives_the_same_stimuli(prepared, toys):
+def test_the_same_protocol_gives_the_same_stimuli(prepared: StimulusSet, toys: ToyLibrary) -> None:
     again = prepare(parse_protocol(TOY_PROTOCOL), toys)
     assert [stimulus.id for stimulus in again.stimuli] == [stimulus.id for stimulus in prepared.stimuli]
     assert again.pairs == prepared.pairs
     assert again.records == prepared.records
 
 
-def test_points_do_not_hang_on_the_order_of_transitions(prepared, toys):
+def test_points_do_not_hang_on_the_order_of_transitions(prepared: StimulusSet, toys: ToyLibrary) -> None:
     first, rest = TOY_PROTOCOL.split("[[transitions]]", 1)
     one, two = rest.split("[[transitions]]", 1)
     two, studies = two.split("[[studies]]", 1)
@@ -150,13 +152,15 @@ def test_points_do_not_hang_on_the_order_of_transitions(prepared, toys):
         ("fps = 30", "fps = 60", False),
     ],
 )
-def test_names_follow_what_is_seen_and_nothing_else(prepared, toys, old, new, same):
+def test_names_follow_what_is_seen_and_nothing_else(
+    prepared: StimulusSet, toys: ToyLibrary, old: str, new: str, same: bool
+) -> None:
     ids = {stimulus.id for stimulus in prepared.stimuli}
     others = {stimulus.id for stimulus in prepare(changed((old, new)), toys).stimuli}
     assert (others == ids) if same else not (others & ids)
 
 
-def test_lengths_are_those_of_the_methods(prepared, toys):
+def test_lengths_are_those_of_the_methods(prepared: StimulusSet, toys: ToyLibrary) -> None:
     """What the record says is what `blend_length` gives at the recorded points."""
     for pair in prepared.pairs:
         record = prepared.stimulus(pair.stimuli[0]).record
@@ -170,7 +174,7 @@ def test_lengths_are_those_of_the_methods(prepared, toys):
         assert 4 <= found.blend_frames <= 30
 
 
-def test_conditions_are_kept(toys):
+def test_conditions_are_kept(toys: ToyLibrary) -> None:
     text = TOY_PROTOCOL.replace(
         "longest_frames = 30", "longest_frames = 30\navoid_frames = 10\navoid_within_frames = 5"
     )
@@ -180,20 +184,20 @@ def test_conditions_are_kept(toys):
         assert all(4 <= length <= 30 and abs(length - 10) > 5 for length in lengths)
 
 
-def test_given_points_are_taken(toys):
+def test_given_points_are_taken(toys: ToyLibrary) -> None:
     given = 'points = { choose = "given", source_s = 1.0, destination_frame = 77 }'
     made = prepare(changed(('destination = "quick"', f'destination = "quick"\n{given}')), toys)
     record = made.stimulus(made.pairs[0].stimuli[0]).record
     assert (record.source.frame, record.destination.frame) == (30, 77)
 
 
-def test_a_cut_has_no_blend(toys):
+def test_a_cut_has_no_blend(toys: ToyLibrary) -> None:
     made = prepare(changed(('comparison = "fixed"', 'comparison = "cut"')), toys)
     record = made.stimulus(made.pairs[3].stimuli[1]).record
     assert (record.blend_frames, record.frames, record.method) == (0, 18, "cut")
 
 
-def test_rating_pairs_hold_one_stimulus_each(rating_protocol, toys):
+def test_rating_pairs_hold_one_stimulus_each(rating_protocol: Protocol, toys: ToyLibrary) -> None:
     made = prepare(rating_protocol, toys)
     rated = [pair for pair in made.pairs if pair.study == "rating"]
     assert [(pair.name, pair.methods, len(pair.stimuli)) for pair in rated] == [
@@ -204,7 +208,7 @@ def test_rating_pairs_hold_one_stimulus_each(rating_protocol, toys):
     ]
 
 
-def test_rated_pairs_hold_both_methods(pair_rating_protocol, toys):
+def test_rated_pairs_hold_both_methods(pair_rating_protocol: Protocol, toys: ToyLibrary) -> None:
     made = prepare(pair_rating_protocol, toys)
     rated = [pair for pair in made.pairs if pair.study == "compared"]
     assert [(pair.name, *pair.methods) for pair in rated] == [
@@ -218,7 +222,7 @@ def test_rated_pairs_hold_both_methods(pair_rating_protocol, toys):
 # --- refusals ------------------------------------------------------------------------------------------------------
 
 
-def test_a_clip_that_is_too_short_says_how_many_frames_are_missing(toys):
+def test_a_clip_that_is_too_short_says_how_many_frames_are_missing(toys: ToyLibrary) -> None:
     """Two seconds are 60 frames; 60 of entry and blends of up to 35 need 95."""
     protocol = changed(('source = "slow"', 'source = "short"'), ("entry_s = 0.3", "entry_s = 2.0"))
     message = check(protocol, toys)[0]
@@ -230,7 +234,7 @@ def test_a_clip_that_is_too_short_says_how_many_frames_are_missing(toys):
         prepare(protocol, toys)
 
 
-def test_a_clip_that_is_just_long_enough_is_taken():
+def test_a_clip_that_is_just_long_enough_is_taken() -> None:
     for frames, enough in ((94, False), (95, True)):
         library = ToyLibrary({"slow": Toy(0.8, 1.4, seconds=frames / 30), "quick": Toy(1.6, 0.9), "still": Toy(0, 3.0)})
         protocol = changed(("entry_s = 0.3", "entry_s = 2.0"), ('["slow_quick"]', '["slow_quick"]\npoints = {}'))
@@ -238,7 +242,7 @@ def test_a_clip_that_is_just_long_enough_is_taken():
         assert (not problems) == enough, problems
 
 
-def test_a_level_below_one_frame_is_refused(toys):
+def test_a_level_below_one_frame_is_refused(toys: ToyLibrary) -> None:
     """The given points make a blend of some length k; a difference of -k leaves nothing."""
     given = 'points = { choose = "given", source_s = 1.0, destination_frame = 77 }'
     at = ('destination = "quick"', f'destination = "quick"\n{given}')
@@ -250,7 +254,7 @@ def test_a_level_below_one_frame_is_refused(toys):
     assert f"the difference {-length} leaves 0" in problem
 
 
-def test_given_points_without_room_are_refused(toys):
+def test_given_points_without_room_are_refused(toys: ToyLibrary) -> None:
     def problems(source_s: str) -> str:
         given = f'points = {{ choose = "given", source_s = {source_s}, destination_s = 2 }}'
         return "\n".join(check(changed(('destination = "quick"', f'destination = "quick"\n{given}')), toys))
@@ -260,7 +264,7 @@ def test_given_points_without_room_are_refused(toys):
     assert "found 2970; choose another point" in problems("99")
 
 
-def test_conditions_that_nothing_meets_are_refused_with_what_was_found(toys):
+def test_conditions_that_nothing_meets_are_refused_with_what_was_found(toys: ToyLibrary) -> None:
     protocol = changed(("shortest_frames = 4\nlongest_frames = 30", "shortest_frames = 58\nlongest_frames = 58"))
     problems = check(protocol, toys)
     assert len(problems) == 3
@@ -270,12 +274,12 @@ def test_conditions_that_nothing_meets_are_refused_with_what_was_found(toys):
     assert "shorter than 58 frames" in problems[0]
 
 
-def test_a_motion_that_is_missing_is_named_once(toys):
+def test_a_motion_that_is_missing_is_named_once(toys: ToyLibrary) -> None:
     problems = check(changed(('source = "slow"', 'source = "slwo"')), toys)
     assert problems == ["motion 'slwo': Expected a motion of toy, found 'slwo'. It has slow, quick, still, short."]
 
 
-def test_all_problems_are_named_at_once(toys):
+def test_all_problems_are_named_at_once(toys: ToyLibrary) -> None:
     protocol = changed(('source = "slow"', 'source = "slwo"'), ('source = "still"', 'source = "stil"'))
     assert len(check(protocol, toys)) == 2
     with pytest.raises(StimulusError) as caught:
@@ -283,20 +287,20 @@ def test_all_problems_are_named_at_once(toys):
     assert str(caught.value).splitlines() == check(protocol, toys)
 
 
-def test_what_can_be_shown_has_no_problems(toys):
+def test_what_can_be_shown_has_no_problems(toys: ToyLibrary) -> None:
     assert check(parse_protocol(TOY_PROTOCOL), toys) == []
 
 
-def test_an_unknown_stimulus_is_refused(prepared):
+def test_an_unknown_stimulus_is_refused(prepared: StimulusSet) -> None:
     with pytest.raises(StimulusError, match="Expected the id of a stimulus of 'toy', found 'nothing'"):
         prepared.stimulus("nothing")
 
 
-def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypatch):
+def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypatch: pytest.MonkeyPatch) -> None:
     """A clip that walks but is too short is continued by cycles; points stay within what was captured."""
 
     class Captured(ToyLibrary):
-        def entry(self, name):
+        def entry(self, name) -> Any:
             return replace(super().entry(name), start="gait", end="gait")
 
     library = Captured(
@@ -306,7 +310,7 @@ def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypat
     calls = []
     from study.motion import cycles
 
-    def extend(clip, *, frames_before=0, frames_after=0):
+    def extend(clip, *, frames_before: int = 0, frames_after: int = 0) -> Any:
         calls.append((clip.name, frames_before, frames_after))
         path = np.arange(-frames_before, clip.frames + frames_after) % clip.frames
         speed = clip.root_positions[1, 2] - clip.root_positions[0, 2]

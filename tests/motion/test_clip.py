@@ -180,7 +180,7 @@ def test_retargeting_scales_the_path_by_leg_length(clip: Clip) -> None:
         retarget(clip, renamed)
 
 
-def test_a_frame_is_found_in_the_clips_own_file():
+def test_a_frame_is_found_in_the_clips_own_file() -> None:
     """Frame 10 at 30 fps, of a clip cut at frame 8 of a file of 120 fps, is frame 8 + 40 of the file."""
     rotations = np.tile(quat.IDENTITY, (200, 1, 1))
     skeleton = Skeleton(("Hips",), np.array([-1]), np.zeros((1, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))

@@ -77,16 +77,18 @@ def tree(
         ({"row": "1e400"}, r"one.bvh:10:1: Expected a number in frame 0"),
     ],
 )
-def test_numbers_past_what_is_meant_are_refused_with_their_place(tmp_path, parts, message):
+def test_numbers_past_what_is_meant_are_refused_with_their_place(
+    tmp_path: Path, parts: dict[str, str], message: str
+) -> None:
     with pytest.raises(MotionFileError, match=message):
         read_bvh(one(tmp_path, **parts))
 
 
-def test_a_frame_time_of_thousands_of_digits_is_read(tmp_path):
+def test_a_frame_time_of_thousands_of_digits_is_read(tmp_path: Path) -> None:
     assert read_bvh(one(tmp_path, time="0.0333333333" + "3" * 5000)).fps == pytest.approx(30.0)
 
 
-def test_the_largest_numbers_are_read_and_overflow_nothing(tmp_path):
+def test_the_largest_numbers_are_read_and_overflow_nothing(tmp_path: Path) -> None:
     clip = read_clip(
         one(tmp_path, offset="1e9 1e9 1e9", channels="3 Xposition Yposition Xrotation", row="1e9 -1e9 1e9")
     )
@@ -95,7 +97,7 @@ def test_the_largest_numbers_are_read_and_overflow_nothing(tmp_path):
 
 
 @pytest.mark.parametrize(("shape", "most"), [("deep", MOST_JOINTS), ("wide", MOST_JOINTS)])
-def test_as_many_joints_as_are_taken_are_read_and_written_in_no_time(tmp_path, shape, most):
+def test_as_many_joints_as_are_taken_are_read_and_written_in_no_time(tmp_path: Path, shape: str, most: int) -> None:
     depths = [k if shape == "deep" else min(k, 1) for k in range(most)]
     path = tree(tmp_path / "many.bvh", depths, [f"j{k}" for k in range(most)])
     started = time.process_time()
@@ -112,7 +114,7 @@ def test_as_many_joints_as_are_taken_are_read_and_written_in_no_time(tmp_path, s
 
 
 @pytest.mark.parametrize("most", [5000, 20_000])
-def test_more_joints_are_refused_where_the_first_too_many_stands(tmp_path, most):
+def test_more_joints_are_refused_where_the_first_too_many_stands(tmp_path: Path, most: int) -> None:
     path = tree(tmp_path / "many.bvh", [min(k, 1) for k in range(most)], [f"j{k}" for k in range(most)])
     started = time.process_time()
     # Each joint takes five lines, the root's brace closes last.
@@ -123,7 +125,7 @@ def test_more_joints_are_refused_where_the_first_too_many_stands(tmp_path, most)
     assert time.process_time() - started < SECONDS
 
 
-def test_thousands_of_joints_of_one_name_are_numbered_in_no_time(tmp_path):
+def test_thousands_of_joints_of_one_name_are_numbered_in_no_time(tmp_path: Path) -> None:
     path = tree(tmp_path / "same.bvh", [min(k, 1) for k in range(MOST_JOINTS)], ["same"] * MOST_JOINTS)
     started = time.process_time()
     with warnings.catch_warnings(record=True) as said:
@@ -136,19 +138,19 @@ def test_thousands_of_joints_of_one_name_are_numbered_in_no_time(tmp_path):
     assert any(f"{MOST_JOINTS - 4} more joints have the name of another" in each for each in told)
 
 
-def test_a_numbered_name_that_is_there_already_is_not_taken_twice(tmp_path):
+def test_a_numbered_name_that_is_there_already_is_not_taken_twice(tmp_path: Path) -> None:
     path = tree(tmp_path / "names.bvh", [0, 1, 1, 1, 1], ["a", "a_2", "a", "a_2", "a"])
     with pytest.warns(MotionWarning, match="two joints are called"):
         clip = read_bvh(path)
     assert clip.skeleton.names == ("a", "a_2", "a_3", "a_2_2", "a_4")
 
 
-def test_a_name_of_thousands_of_letters_is_refused(tmp_path):
+def test_a_name_of_thousands_of_letters_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MotionFileError, match=r"names.bvh:6:1: Expected a name of at most 1000 letters, found 5000"):
         read_bvh(tree(tmp_path / "names.bvh", [0, 1], ["a", "b" * 5000]))
 
 
-def test_few_numbers_can_not_ask_for_a_large_clip(tmp_path):
+def test_few_numbers_can_not_ask_for_a_large_clip(tmp_path: Path) -> None:
     path = tree(tmp_path / "few.bvh", [min(k, 1) for k in range(400)], [f"j{k}" for k in range(400)], channels="")
     path.write_text(path.read_text().replace("Frames: 2", "") + "1\n" * 60_000)
     with pytest.raises(
@@ -157,7 +159,7 @@ def test_few_numbers_can_not_ask_for_a_large_clip(tmp_path):
         read_bvh(path)
 
 
-def test_resampling_is_refused_where_the_memory_would_not_do():
+def test_resampling_is_refused_where_the_memory_would_not_do() -> None:
     skeleton = Skeleton(("a",), np.array([-1]), np.zeros((1, 3)), np.array([], dtype=int), np.zeros((0, 3)))
     clip = Clip(skeleton, np.zeros((100, 3)), np.tile([1.0, 0, 0, 0], (100, 1, 1)), 0.01, name="slow")
     with pytest.raises(MotionError, match=f"at most {MOST_POSES:,} frames times joints in slow at 30000 fps"):
@@ -165,19 +167,19 @@ def test_resampling_is_refused_where_the_memory_would_not_do():
 
 
 @pytest.mark.parametrize("option", [{"fps": 1e308}, {"fps": 1e-320}, {"metres_per_unit": 1e300}, {"fps": float("nan")}])
-def test_options_past_what_is_meant_are_refused(tmp_path, option):
+def test_options_past_what_is_meant_are_refused(tmp_path: Path, option: dict[str, float]) -> None:
     with pytest.raises(MotionError, match=f"Expected {next(iter(option))} above 0, from"):
         read_clip(one(tmp_path), **option)
 
 
-def test_a_clip_that_moves_too_far_is_not_written(tmp_path):
+def test_a_clip_that_moves_too_far_is_not_written(tmp_path: Path) -> None:
     clip = read_clip(one(tmp_path, channels="1 Xposition", row="1e9"), metres_per_unit=1.0)
     with pytest.raises(MotionFileError, match=r"Expected to write no number above 1e\+09"):
         write_bvh(clip, tmp_path / "far.bvh", metres_per_unit=0.01)
     assert not (tmp_path / "far.bvh").exists()
 
 
-def test_long_words_that_are_no_numbers_take_no_time():
+def test_long_words_that_are_no_numbers_take_no_time() -> None:
     started = time.process_time()
     for word in (b"9" * 300_000 + b"x", b"." * 300_000, b"1e" + b"9" * 300_000 + b"x", b"-" * 300_000):
         assert NUMBER.fullmatch(word) is None
@@ -212,12 +214,14 @@ def acclaim(folder: Path, frames: str, order: str = "TX RX", bones: str = "", ch
         ),
     ],
 )
-def test_acclaim_files_past_what_is_meant_are_refused_with_their_place(tmp_path, frames, parts, message):
+def test_acclaim_files_past_what_is_meant_are_refused_with_their_place(
+    tmp_path: Path, frames: str, parts: dict[str, str], message: str
+) -> None:
     with pytest.raises(MotionFileError, match=message):
         read_amc(acclaim(tmp_path, frames, **parts))
 
 
-def test_more_bones_are_refused_in_no_time(tmp_path):
+def test_more_bones_are_refused_in_no_time(tmp_path: Path) -> None:
     bones = "".join(f"begin\nname b{k}\ndirection 0 1 0\nlength 1\nend\n" for k in range(15_000))
     children = " ".join(f"b{k}" for k in range(15_000))
     started = time.process_time()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,30 +25,30 @@ ALL = tuple(sorted(path.stem for path in protocols_folder().glob("*.toml")))
 
 
 @pytest.fixture(scope="module")
-def synthetic():
+def synthetic() -> Any:
     return open_library("synthetic")
 
 
 @pytest.fixture(scope="module")
-def cmu(mocap):
+def cmu(mocap: Path) -> Any:
     return open_library(mocap / "cmu")
 
 
-def published(name):
+def published(name) -> Any:
     return load_protocol(find_protocol(name))
 
 
-def test_the_published_protocols_are_there():
+def test_the_published_protocols_are_there() -> None:
     assert {*PUBLISHED, "demo"} <= set(ALL)
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_every_protocol_loads_and_bears_the_name_of_its_file(name):
+def test_every_protocol_loads_and_bears_the_name_of_its_file(name: str) -> None:
     assert published(name).name == name
 
 
 @pytest.mark.parametrize("name", [name for name in ALL if name != "demo"])
-def test_every_study_can_be_run_once_somebody_signs_for_it(name):
+def test_every_study_can_be_run_once_somebody_signs_for_it(name: str) -> None:
     """Consent, form, practice and debriefing are there; what is left to write is who runs it."""
     protocol = published(name)
     (left,) = to_do(protocol)
@@ -62,14 +64,14 @@ def test_every_study_can_be_run_once_somebody_signs_for_it(name):
     assert protocol.participants in (26, 35)  # 2003 section 4.2; 2004 section 4.1
 
 
-def test_attention_checks_are_used_and_have_a_rule():
+def test_attention_checks_are_used_and_have_a_rule() -> None:
     protocol = published("one_hop_vs_direct")
     assert [study.attention_checks for study in protocol.studies] == [2, 2]
     assert protocol.analysis.exclusions.most_failed_checks == 0.5
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_what_all_studies_of_2004_have_in_common(name):
+def test_what_all_studies_of_2004_have_in_common(name: str) -> None:
     """30 fps; two seconds of entry and of exit (4.2); five seconds to answer (4.2, 4.3); alpha .01 (5.2)."""
     protocol = published(name)
     assert protocol.fps == 30.0
@@ -81,7 +83,7 @@ def test_what_all_studies_of_2004_have_in_common(name):
     assert "2004" in protocol.source
 
 
-def test_study_one_is_as_printed():
+def test_study_one_is_as_printed() -> None:
     """Section 4.2: k - 15, k - 10, k - 5, k, k + 5, k + 10, k + 20; three types of motion; threshold 75%."""
     protocol = published("blend_length_jnd")
     (study,) = protocol.studies
@@ -93,7 +95,7 @@ def test_study_one_is_as_printed():
 
 
 @pytest.mark.parametrize(("name", "method"), [("geodesic_vs_fixed", "geodesic"), ("velocity_vs_fixed", "velocity")])
-def test_studies_two_and_three_are_as_printed(name, method):
+def test_studies_two_and_three_are_as_printed(name: str, method: str) -> None:
     """Sections 4.3, 4.4: eight transitions, against 10 frames, optimal lengths from 5 to 35 frames, not close to 10."""
     protocol = published(name)
     (study,) = protocol.studies
@@ -106,7 +108,7 @@ def test_studies_two_and_three_are_as_printed(name, method):
         assert points.avoid_within_frames >= 1
 
 
-def test_study_two_shows_locomotion_and_study_three_does_not():
+def test_study_two_shows_locomotion_and_study_three_does_not() -> None:
     """4.3: standing and idling to walking or running, walking to running, turning; 4.4: boxing, dancing, tai-chi."""
     two, three = (published(name) for name in ("geodesic_vs_fixed", "velocity_vs_fixed"))
     locomotion = {"standing to walking", "standing to running", "walking to running", "turning"}
@@ -114,7 +116,7 @@ def test_study_two_shows_locomotion_and_study_three_does_not():
     assert {t.category for t in three.transitions_of(three.studies[0])} == {"boxing", "dancing", "tai-chi"}
 
 
-def shown_on(name, library):
+def shown_on(name, library) -> Any:
     """Check and build a protocol's stimuli on a library; what must hold on any."""
     protocol = published(name)
     assert check(protocol, library) == []
@@ -130,7 +132,7 @@ def shown_on(name, library):
     return prepared, plan
 
 
-def trials_and_pairs(prepared, plan):
+def trials_and_pairs(prepared, plan) -> Any:
     """What the study shows, practice apart, which shows other transitions."""
     trials = [trial for trial in plan.trials if trial.role == "trial"]
     shown = {trial.motion for trial in trials}
@@ -138,7 +140,7 @@ def trials_and_pairs(prepared, plan):
     return trials, [pair for pair in prepared.pairs if pair.motion in shown]
 
 
-def assert_study_one(prepared, plan):
+def assert_study_one(prepared, plan) -> None:
     trials, pairs = trials_and_pairs(prepared, plan)
     assert len(trials) == 42
     assert set(Counter((t.motion, t.difference_frames, t.a_first) for t in trials).values()) == {1}
@@ -149,7 +151,7 @@ def assert_study_one(prepared, plan):
         assert comparison.blend_frames == reference.blend_frames + pair.difference_frames
 
 
-def assert_study_two_or_three(prepared, plan):
+def assert_study_two_or_three(prepared, plan) -> None:
     trials, pairs = trials_and_pairs(prepared, plan)
     assert len(trials) == len(pairs) == 8
     for pair in pairs:
@@ -163,12 +165,12 @@ def assert_study_two_or_three(prepared, plan):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_published_protocols_are_shown_on_the_synthetic_library(name, synthetic):
+def test_published_protocols_are_shown_on_the_synthetic_library(name: str, synthetic) -> None:
     found = shown_on(name, synthetic)
     (assert_study_one if name == "blend_length_jnd" else assert_study_two_or_three)(*found)
 
 
-def test_the_demo_is_short_on_the_synthetic_library(synthetic):
+def test_the_demo_is_short_on_the_synthetic_library(synthetic) -> None:
     prepared, plan = shown_on("demo", synthetic)
     assert len(plan.trials) == 17
     assert sum(record.frames for record in prepared.records) < 1500
@@ -178,7 +180,7 @@ def test_the_demo_is_short_on_the_synthetic_library(synthetic):
 @pytest.mark.mocap
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_published_protocols_are_shown_on_cmu_clips(name, cmu):
+def test_published_protocols_are_shown_on_cmu_clips(name: str, cmu) -> None:
     prepared, plan = shown_on(name, cmu)
     (assert_study_one if name == "blend_length_jnd" else assert_study_two_or_three)(prepared, plan)
     assert "EIA-0196217" in prepared.acknowledgement
@@ -192,13 +194,13 @@ def test_published_protocols_are_shown_on_cmu_clips(name, cmu):
 
 
 @pytest.mark.mocap
-def test_the_demo_is_shown_on_cmu_clips(cmu):
+def test_the_demo_is_shown_on_cmu_clips(cmu) -> None:
     prepared, plan = shown_on("demo", cmu)
     assert len(plan.trials) == 17
     assert not prepared.synthetic
 
 
-def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path, synthetic):
+def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path: Path, synthetic) -> None:
     """35 participants as in the paper; at each level the proportion is the truth's within its sampling error."""
     from study.models.population import population_different
 

@@ -19,7 +19,7 @@ NO_ENDS = (np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
 RIG = Skeleton(NAMES, np.array(PARENTS), np.full((14, 3), 0.1), *NO_ENDS)
 
 
-def test_2003_table_1():
+def test_2003_table_1() -> None:
     weights = joint_weights(RIG, "wang2003")
     expected = {"hip": 1.0000, "knee": 0.0901, "shoulder": 0.7884, "elbow": 0.0247}
     for part, weight in expected.items():
@@ -28,14 +28,14 @@ def test_2003_table_1():
     assert np.count_nonzero(weights) == 8
 
 
-def test_2003_section_3_original_weights():
+def test_2003_section_3_original_weights() -> None:
     weights = joint_weights(RIG, "lee2002", with_root=True)
     ones = {f"{part}.{side}" for part in ("shoulder", "elbow", "hip", "knee") for side in "LR"} | {"pelvis", "spine"}
     assert {role for role, joint in RIG.roles.items() if weights[joint] == 1.0 and role in ones} == ones
     assert weights.sum() == 10
 
 
-def test_2004_table_1_the_right_shoulder_has_the_largest_difference():
+def test_2004_table_1_the_right_shoulder_has_the_largest_difference() -> None:
     table = {
         "hip.R": 0.0352,
         "knee.R": 0.0481,
@@ -66,18 +66,18 @@ def test_2004_table_1_the_right_shoulder_has_the_largest_difference():
     assert found.blend_frames == 9
 
 
-def test_2004_section_3_range_and_fixed_length():
+def test_2004_section_3_range_and_fixed_length() -> None:
     assert [default_frames(30.0, seconds) for seconds in (SHORTEST_S, FIXED_S, LONGEST_S)] == [1, 10, 60]
 
 
-def test_2004_eq_2_pairs_source_i_to_i_b_1_with_destination_j_b_1_to_j():
+def test_2004_eq_2_pairs_source_i_to_i_b_1_with_destination_j_b_1_to_j() -> None:
     """`i-t-1` in print; `i+t-1` is meant, as Eqs. 5 and 6 have it (t = 1 meets frame i, t = b meets frame j)."""
     span = window(100, 200, 10)
     assert (span.source_start, span.source_stop - 1) == (100, 109)
     assert (span.destination_start, span.destination_stop - 1) == (191, 200)
 
 
-def test_2004_eqs_1_and_2_by_hand():
+def test_2004_eqs_1_and_2_by_hand() -> None:
     """One hip turned by a fixed angle from frame to frame: the cost of length b is known in closed form."""
     step = 0.02
     hip = RIG.role("hip.L")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,17 +27,17 @@ LIBRARIES = ["synthetic", pytest.param("cmu", marks=pytest.mark.mocap)]
 
 
 @pytest.fixture
-def library(request):
+def library(request: pytest.FixtureRequest) -> Any:
     if request.param == "synthetic":
         return open_library("synthetic")
     return open_library(request.getfixturevalue("mocap") / "cmu")
 
 
-def published(name):
+def published(name) -> Any:
     return load_protocol(find_protocol(name))
 
 
-def test_the_sitting_of_2004_is_as_printed():
+def test_the_sitting_of_2004_is_as_printed() -> None:
     """Sections 4.1 to 4.5: four studies in one session; the first three as their own protocols have them."""
     session = published("wang2004_session")
     one, two, three, four = session.studies
@@ -58,7 +60,7 @@ def test_the_sitting_of_2004_is_as_printed():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("library", LIBRARIES, indirect=True)
-def test_the_sitting_of_2004_has_42_and_three_times_8_pairs(library, tmp_path):
+def test_the_sitting_of_2004_has_42_and_three_times_8_pairs(library: str, tmp_path: Path) -> None:
     protocol = published("wang2004_session")
     assert check(protocol, library) == []
     prepared = prepare(protocol, library)
@@ -90,7 +92,7 @@ def test_the_sitting_of_2004_has_42_and_three_times_8_pairs(library, tmp_path):
         assert favoured[study] == pytest.approx(percent, abs=within), study
 
 
-def test_the_study_of_2003_is_as_printed():
+def test_the_study_of_2003_is_as_printed() -> None:
     """Section 4.2: two groups by order, six items on a scale from 0 to 4, original against optimised weights."""
     protocol = published("transition_points")
     study, compared = protocol.studies
@@ -105,7 +107,7 @@ def test_the_study_of_2003_is_as_printed():
 
 
 @pytest.mark.parametrize("library", LIBRARIES, indirect=True)
-def test_the_study_of_2003_cuts_where_each_metric_is_least(library, tmp_path):
+def test_the_study_of_2003_cuts_where_each_metric_is_least(library: str, tmp_path: Path) -> None:
     """Six seconds with a cut at three; the F of the published analysis has 1 and 48 degrees of freedom."""
     protocol = published("transition_points")
     assert check(protocol, library) == []

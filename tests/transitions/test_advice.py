@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from study.errors import TransitionError
-from study.motion.clip import sample
+from study.motion.clip import Clip, sample
 from study.motion.library import open_library
 from study.transitions.advice import advise, is_cyclic, just_noticeable, own_time
 from study.transitions.blend_length import blend_length
@@ -17,7 +18,7 @@ CYCLIC += ("walk_turn_left", "walk_turn_right", "run_turn_left", "run_turn_right
 FREE = ("box", "box_combination", "dance", "dance_modern", "dance_turns", "tai_chi", "tai_chi_slow", "stand", "idle")
 
 
-def test_differences_in_just_noticeable_ones():
+def test_differences_in_just_noticeable_ones() -> None:
     """2004 section 5.1: 7 frames longer, 8 frames shorter, at 30 fps."""
     assert just_noticeable(7 / 30) == pytest.approx(1.0)
     assert just_noticeable(-8 / 30) == pytest.approx(1.0)
@@ -26,30 +27,30 @@ def test_differences_in_just_noticeable_ones():
 
 
 @pytest.mark.parametrize("name", CYCLIC)
-def test_gait_is_cyclic(name):
+def test_gait_is_cyclic(name: str) -> None:
     assert is_cyclic(open_library("synthetic").clip(name, fps=60.0))
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_what_has_no_gait_is_not(name):
+def test_what_has_no_gait_is_not(name: str) -> None:
     assert not is_cyclic(open_library("synthetic").clip(name, fps=60.0))
 
 
 @pytest.mark.mocap
-def test_captured_motions_are_told_apart(mocap: Path):
+def test_captured_motions_are_told_apart(mocap: Path) -> None:
     library = open_library(mocap)
     there = set(library.names())
     assert [name for name in CYCLIC if name in there and not is_cyclic(library.clip(name))] == []
     assert [name for name in FREE if name in there and is_cyclic(library.clip(name))] == []
 
 
-def test_the_own_time_of_a_swing_is_a_sixth_of_its_cycle(make_walk):
+def test_the_own_time_of_a_swing_is_a_sixth_of_its_cycle(make_walk: Callable[..., Clip]) -> None:
     assert own_time(make_walk(150, cadence=1.0)) == pytest.approx(30 / (2 * np.pi), rel=0.1)
     assert own_time(make_walk(150, cadence=0.5)) == pytest.approx(60 / (2 * np.pi), rel=0.1)
     assert own_time(sample(make_walk(5), [0.0] * 20)) == 0.0
 
 
-def test_advice_is_the_methods_own_length_at_its_point(make_walk):
+def test_advice_is_the_methods_own_length_at_its_point(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(150, name="slow"), make_walk(150, phase=1.0, cadence=1.5, swing=0.7, name="quick")
     for cyclic, method in (((True, False), "geodesic"), ((False, False), "velocity")):
         found = advise(source, destination, cyclic=cyclic)
@@ -66,14 +67,14 @@ def test_advice_is_the_methods_own_length_at_its_point(make_walk):
         assert found.end_frame < 120
 
 
-def test_two_walks_out_of_phase_are_joined_in_phase(make_walk):
+def test_two_walks_out_of_phase_are_joined_in_phase(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(150), make_walk(150, phase=2.0)
     found = advise(source, destination)
     assert found.why == "both motions are cyclic"
     assert found.cost < 0.02 * np.mean(blend_length(source, destination, 60, 89).costs)
 
 
-def test_short_clips_say_so(make_walk):
+def test_short_clips_say_so(make_walk: Callable[..., Clip]) -> None:
     short = make_walk(45, name="short")
     found = advise(short, short, cyclic=(True, True))
     assert "the clips supply blends of up to 24 frames; 60 were asked for" in found.note

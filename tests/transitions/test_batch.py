@@ -1,14 +1,18 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
 from study.errors import TransitionError
+from study.motion.clip import Clip
 from study.transitions.batch import geodesic_lengths, velocity_lengths
 from study.transitions.blend_length import blend_length
 
 
-def test_many_at_once_are_what_they_are_one_by_one(make_walk):
+def test_many_at_once_are_what_they_are_one_by_one(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(200, phase=0.3), make_walk(180, phase=2.0, cadence=1.3, swing=0.7)
     rng = np.random.default_rng(5)
     starts, ends = rng.integers(0, 141, 60), rng.integers(59, 180, 60)
@@ -20,7 +24,7 @@ def test_many_at_once_are_what_they_are_one_by_one(make_walk):
         assert cost == pytest.approx(one.cost, abs=1e-13)
 
 
-def test_a_range_of_lengths_is_kept(make_walk):
+def test_a_range_of_lengths_is_kept(make_walk: Callable[..., Clip]) -> None:
     walk, other = make_walk(100), make_walk(100, phase=2.0)
     lengths, costs = geodesic_lengths(walk, other, [10, 20], [80, 90], shortest=5, longest=12)
     for k, (i, j) in enumerate([(10, 80), (20, 90)]):
@@ -42,12 +46,14 @@ def test_a_range_of_lengths_is_kept(make_walk):
         ([0, 1], [60], r"as many start frames as end frames.*\(2,\) and \(1,\)"),
     ],
 )
-def test_frames_that_are_not_there_are_counted(make_walk, starts, ends, message):
+def test_frames_that_are_not_there_are_counted(
+    make_walk: Callable[..., Clip], starts: list[int], ends: list[int], message: str
+) -> None:
     with pytest.raises(TransitionError, match=message):
         geodesic_lengths(make_walk(100), make_walk(100), starts, ends, shortest=60)
 
 
-def test_velocity_lengths_are_those_found_one_by_one(make_walk):
+def test_velocity_lengths_are_those_found_one_by_one(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
     rng = np.random.default_rng(2)
     starts, ends = rng.integers(0, 60, 40), rng.integers(29, 80, 40)
@@ -59,7 +65,9 @@ def test_velocity_lengths_are_those_found_one_by_one(make_walk):
 
 
 @pytest.mark.parametrize(("method", "find"), [("geodesic", geodesic_lengths), ("velocity", velocity_lengths)])
-def test_near_the_ends_of_clips_lengths_are_held_as_they_are_one_by_one(make_walk, method, find):
+def test_near_the_ends_of_clips_lengths_are_held_as_they_are_one_by_one(
+    make_walk: Callable[..., Clip], method: str, find: Callable[..., Any]
+) -> None:
     source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
     rng = np.random.default_rng(7)
     starts, ends = rng.integers(0, 90, 80), rng.integers(0, 80, 80)

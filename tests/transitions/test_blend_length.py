@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from study.transitions.weights import joint_weights
 from study.transitions.windows import SPECIFICATIONS, longest_available, shortfall, window
 
 
-def test_costs_are_those_of_the_plain_equations(make_walk, oracle):
+def test_costs_are_those_of_the_plain_equations(make_walk: Callable[..., Clip], oracle) -> None:
     source, destination = make_walk(60, phase=0.4), make_walk(60, phase=2.1, cadence=1.3, swing=0.7)
     weights = joint_weights(source.skeleton)
     fast = geodesic_costs(source, destination, 7, 50, 40, weights)
@@ -23,7 +25,7 @@ def test_costs_are_those_of_the_plain_equations(make_walk, oracle):
 
 
 @pytest.mark.parametrize("specification", SPECIFICATIONS)
-def test_every_specification_averages_over_its_own_window(make_walk, specification):
+def test_every_specification_averages_over_its_own_window(make_walk: Callable[..., Clip], specification: str) -> None:
     source, destination = make_walk(80, phase=0.4), make_walk(80, phase=2.1, swing=0.7)
     weights = joint_weights(source.skeleton)
     costs = geodesic_costs(source, destination, 30, 40, 31, weights, specification)
@@ -34,7 +36,7 @@ def test_every_specification_averages_over_its_own_window(make_walk, specificati
         assert costs[length - 1] == pytest.approx(float(np.mean(frame_distance(a, b, weights))), rel=1e-12)
 
 
-def test_one_cycle_in_phase_is_found(make_walk):
+def test_one_cycle_in_phase_is_found(make_walk: Callable[..., Clip]) -> None:
     """Destination and source are one motion, shifted: the length that brings them into phase costs nothing."""
     walk = make_walk(150, cadence=1.0)
     found = blend_length(walk, walk, 40, 60)
@@ -47,7 +49,7 @@ def test_one_cycle_in_phase_is_found(make_walk):
     assert found.blend_s == found.blend_frames / 30
 
 
-def test_joint_costs_add_up_to_the_cost(make_walk):
+def test_joint_costs_add_up_to_the_cost(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(80), make_walk(80, phase=2.0)
     weights = joint_weights(source.skeleton)
     each = joint_costs(source, destination, 10, 70, 60, np.arange(source.skeleton.joints))
@@ -55,7 +57,7 @@ def test_joint_costs_add_up_to_the_cost(make_walk):
     np.testing.assert_allclose(weights @ each, geodesic_costs(source, destination, 10, 70, 60, weights), rtol=1e-12)
 
 
-def test_lengths_do_not_depend_on_where_the_clips_stand(make_walk):
+def test_lengths_do_not_depend_on_where_the_clips_stand(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     turned = moved(destination, np.radians(170), np.array([5.0, 0.0, 2.0]))
     for method in ("fixed", "geodesic", "velocity"):
@@ -63,7 +65,7 @@ def test_lengths_do_not_depend_on_where_the_clips_stand(make_walk):
         assert (plain.blend_frames, plain.cost) == (moved_one.blend_frames, moved_one.cost)
 
 
-def test_the_range_is_in_seconds_at_any_frame_rate(make_walk):
+def test_the_range_is_in_seconds_at_any_frame_rate(make_walk: Callable[..., Clip]) -> None:
     walk = make_walk(600, fps=120.0)
     at_60 = blend_length(resample(walk, 60), resample(walk, 60), 150, 150)
     assert at_60.lengths is not None
@@ -72,7 +74,7 @@ def test_the_range_is_in_seconds_at_any_frame_rate(make_walk):
     assert blend_length(resample(walk, 30), resample(walk, 30), 75, 75, method="fixed").blend_frames == 10
 
 
-def test_geodesic_and_velocity_give_the_same_seconds_at_twice_the_rate(make_walk):
+def test_geodesic_and_velocity_give_the_same_seconds_at_twice_the_rate(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(600, fps=60.0), make_walk(600, fps=60.0, phase=2.0)
     for method in ("geodesic", "velocity"):
         fine = blend_length(source, destination, 200, 400, method=method)
@@ -80,7 +82,7 @@ def test_geodesic_and_velocity_give_the_same_seconds_at_twice_the_rate(make_walk
         assert coarse.blend_s == pytest.approx(fine.blend_s, abs=1.5 / 30)
 
 
-def test_velocity_divides_the_largest_difference_by_that_joints_mean_speed(make_walk):
+def test_velocity_divides_the_largest_difference_by_that_joints_mean_speed(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(100, phase=0.2), make_walk(100, phase=2.5, swing=0.8)
     found = blend_length(source, destination, 30, 70, method="velocity")
     assert found.joint == max(found.differences, key=lambda role: found.differences[role])
@@ -91,7 +93,7 @@ def test_velocity_divides_the_largest_difference_by_that_joints_mean_speed(make_
     assert found.blend_frames == round(found.unclipped_s * 30)
 
 
-def test_joint_speed_is_half_the_angular_speed(make_walk):
+def test_joint_speed_is_half_the_angular_speed(make_walk: Callable[..., Clip]) -> None:
     walk = make_walk(301, fps=300.0, cadence=0.5, swing=0.4)
     hip = walk.skeleton.role("hip.L")
     for frame in (0, 150, 300):
@@ -100,7 +102,7 @@ def test_joint_speed_is_half_the_angular_speed(make_walk):
         assert joint_speed(walk, frame, hip) == pytest.approx(expected, abs=2e-3)
 
 
-def test_joints_that_stand_still_clip_the_velocity_method_and_it_says_so(make_walk):
+def test_joints_that_stand_still_clip_the_velocity_method_and_it_says_so(make_walk: Callable[..., Clip]) -> None:
     walk = make_walk(100)
     still = Clip(
         walk.skeleton, np.tile(walk.root_positions[:1], (100, 1)), np.tile(walk.rotations[:1], (100, 1, 1)), 30
@@ -128,7 +130,9 @@ def test_joints_that_stand_still_clip_the_velocity_method_and_it_says_so(make_wa
     ],
 )
 @pytest.mark.parametrize("method", ["geodesic", "fixed"])
-def test_what_the_clips_cannot_supply_is_counted(make_walk, frames, message, method):
+def test_what_the_clips_cannot_supply_is_counted(
+    make_walk: Callable[..., Clip], frames: tuple[int, ...], message: str, method: str
+) -> None:
     with pytest.raises(TransitionError, match=message):
         blend_length(
             make_walk(100, name="short"),
@@ -140,7 +144,7 @@ def test_what_the_clips_cannot_supply_is_counted(make_walk, frames, message, met
         )
 
 
-def test_candidates_are_held_to_what_there_is(make_walk):
+def test_candidates_are_held_to_what_there_is(make_walk: Callable[..., Clip]) -> None:
     walk = make_walk(100)
     found = blend_length(walk, walk, 80, 90)
     assert found.lengths is not None
@@ -155,7 +159,7 @@ def test_candidates_are_held_to_what_there_is(make_walk):
         blend_length(walk, walk, 80, 90, shortest=30)
 
 
-def test_the_velocity_methods_length_is_held_too_and_says_what_it_gave(make_walk):
+def test_the_velocity_methods_length_is_held_too_and_says_what_it_gave(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     free = blend_length(source, destination, 40, 67, method="velocity")
     assert 5 < free.blend_frames < 60
@@ -167,13 +171,15 @@ def test_the_velocity_methods_length_is_held_too_and_says_what_it_gave(make_walk
 
 
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
-def test_the_fixed_length_is_a_third_of_a_second_at_any_rate(make_walk, fps):
+def test_the_fixed_length_is_a_third_of_a_second_at_any_rate(make_walk: Callable[..., Clip], fps: float) -> None:
     walk = make_walk(400, fps)
     assert blend_length(walk, walk, 100, 300, method="fixed").blend_frames == round(fps / 3)
 
 
 @pytest.mark.parametrize("specification", SPECIFICATIONS)
-def test_the_longest_available_is_the_longest_without_shortfall(make_walk, specification):
+def test_the_longest_available_is_the_longest_without_shortfall(
+    make_walk: Callable[..., Clip], specification: str
+) -> None:
     source, destination = make_walk(30), make_walk(40)
     for i, j in ((0, 0), (5, 33), (29, 39), (14, 20), (0, 39)):
         longest = longest_available(source, destination, i, j, specification)
@@ -191,13 +197,15 @@ def test_the_longest_available_is_the_longest_without_shortfall(make_walk, speci
         ({"method": "fixed", "fixed_frames": 0}, "at least 1 frame, got 0"),
     ],
 )
-def test_options_that_are_not_known_are_refused(make_walk, options, message):
+def test_options_that_are_not_known_are_refused(
+    make_walk: Callable[..., Clip], options: dict[str, int | str] | dict[str, int] | dict[str, str], message: str
+) -> None:
     walk = make_walk(150)
     with pytest.raises(TransitionError, match=message):
         blend_length(walk, walk, 70, 80, **options)
 
 
-def test_trimming_away_unused_frames_changes_nothing(make_walk):
+def test_trimming_away_unused_frames_changes_nothing(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(150), make_walk(150, phase=2.0)
     whole = blend_length(source, destination, 50, 100)
     part = blend_length(trim(source, 50, 110), trim(destination, 41, 101), 0, 59)

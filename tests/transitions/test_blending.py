@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,27 +15,27 @@ from study.transitions.blending import blend, blend_weights, cut, facing, slerp_
 from study.transitions.windows import SPECIFICATIONS
 
 
-def speeds(clip):
+def speeds(clip) -> Any:
     """Floor speed of the root between frames, m/s."""
     return np.linalg.norm(np.diff(clip.root_positions[:, [0, 2]], axis=0), axis=1) * clip.fps
 
 
 @pytest.mark.parametrize("weight", ["linear", "sigmoid"])
 @pytest.mark.parametrize("count", [1, 2, 9, 60])
-def test_weights_are_symmetric_and_rise_between_zero_and_one(weight, count):
+def test_weights_are_symmetric_and_rise_between_zero_and_one(weight: str, count: int) -> None:
     share = blend_weights(count, weight)
     assert share.shape == (count,)
     np.testing.assert_allclose(share + share[::-1], 1.0, atol=1e-15)
     assert np.all(np.diff(np.concatenate([[0.0], share, [1.0]])) > 0)
 
 
-def test_linear_weights_go_in_equal_steps_from_the_frame_before_to_the_frame_after():
+def test_linear_weights_go_in_equal_steps_from_the_frame_before_to_the_frame_after() -> None:
     np.testing.assert_allclose(np.diff(np.concatenate([[0.0], blend_weights(4), [1.0]])), 0.2)
     with pytest.raises(TransitionError, match="'linear' or 'sigmoid', got 'cubic'"):
         blend_weights(4, "cubic")
 
 
-def test_facing_follows_a_turn_and_not_the_counter_rotation(make_walk):
+def test_facing_follows_a_turn_and_not_the_counter_rotation(make_walk: Callable[..., Clip]) -> None:
     walk = make_walk(90, heading=0.3)
     assert np.max(np.abs(facing(walk) - 0.3)) < 0.05
     np.testing.assert_allclose(facing(moved(walk, 1.0, np.zeros(3))) - facing(walk), 1.0, atol=1e-12)
@@ -44,7 +46,9 @@ def test_facing_follows_a_turn_and_not_the_counter_rotation(make_walk):
 
 @pytest.mark.parametrize("blend_frames", [1, 2, 10, 45, 60])
 @pytest.mark.parametrize("weight", ["linear", "sigmoid"])
-def test_blending_a_clip_with_itself_in_phase_gives_the_clip(make_walk, blend_frames, weight):
+def test_blending_a_clip_with_itself_in_phase_gives_the_clip(
+    make_walk: Callable[..., Clip], blend_frames: int, weight: str
+) -> None:
     walk = make_walk(150, turn_rate=0.4)
     result = blend(walk, walk, 45, 45 + blend_frames - 1, blend_frames, weight=weight)
     assert result.clip.frames == walk.frames
@@ -54,7 +58,7 @@ def test_blending_a_clip_with_itself_in_phase_gives_the_clip(make_walk, blend_fr
 
 
 @pytest.mark.parametrize("specification", SPECIFICATIONS)
-def test_frames_outside_the_blend_are_the_clips_own(make_walk, specification):
+def test_frames_outside_the_blend_are_the_clips_own(make_walk: Callable[..., Clip], specification: str) -> None:
     source, destination = make_walk(120, speed=1.0), make_walk(140, phase=2.0, speed=2.5, heading=2.0)
     result = blend(source, destination, 50, 70, 20, specification=specification)
     first, last = result.source_frames[0], result.destination_frames[1]
@@ -69,7 +73,7 @@ def test_frames_outside_the_blend_are_the_clips_own(make_walk, specification):
     assert result.alignment.translation[1] == 0.0
 
 
-def test_start_and_end_frames_say_where_the_blend_starts_and_ends(make_walk):
+def test_start_and_end_frames_say_where_the_blend_starts_and_ends(make_walk: Callable[..., Clip]) -> None:
     result = blend(make_walk(100), make_walk(100, phase=2.0), 40, 60, 15)
     assert (result.blend_start, result.blend_stop) == (40, 55)
     assert result.source_frames == (40, 55)
@@ -77,7 +81,9 @@ def test_start_and_end_frames_say_where_the_blend_starts_and_ends(make_walk):
 
 
 @pytest.mark.parametrize("blend_frames", [1, 2, 7, 30, 60])
-def test_the_root_runs_over_from_one_speed_to_the_other_without_a_jump(make_walk, blend_frames):
+def test_the_root_runs_over_from_one_speed_to_the_other_without_a_jump(
+    make_walk: Callable[..., Clip], blend_frames: int
+) -> None:
     slow, fast = make_walk(150, speed=1.0), make_walk(150, speed=3.0, phase=1.0, heading=-2.5)
     result = blend(slow, fast, 70, 80, blend_frames)
     speed = speeds(result.clip)
@@ -89,7 +95,7 @@ def test_the_root_runs_over_from_one_speed_to_the_other_without_a_jump(make_walk
     assert speed[-10:] == pytest.approx(3.0)
 
 
-def test_straight_ahead_stays_straight_ahead(make_walk):
+def test_straight_ahead_stays_straight_ahead(make_walk: Callable[..., Clip]) -> None:
     """Two straight walks: the blended root leaves the source's line by no more than the bodies sway."""
     source, destination = make_walk(150, speed=1.0, heading=0.7), make_walk(150, speed=2.5, phase=2.0, heading=-2.0)
     result = blend(source, destination, 60, 90, 30)
@@ -100,7 +106,7 @@ def test_straight_ahead_stays_straight_ahead(make_walk):
     assert np.max(np.abs(velocity)) < 0.15
 
 
-def test_a_turning_destination_goes_on_turning(make_walk):
+def test_a_turning_destination_goes_on_turning(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(150, speed=2.0), make_walk(150, speed=2.0, turn_rate=1.5, heading=1.0)
     result = blend(source, destination, 60, 90, 30)
     rate = np.diff(facing(result.clip)) * 30
@@ -111,7 +117,7 @@ def test_a_turning_destination_goes_on_turning(make_walk):
 
 
 @pytest.mark.parametrize("angle", [0.4, 2 * np.pi / 3, np.radians(170), -3.0])
-def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(make_walk, angle):
+def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(make_walk: Callable[..., Clip], angle) -> None:
     source, destination = make_walk(120, turn_rate=0.5), make_walk(120, phase=2.0, speed=2.0)
     shift = np.array([3.0, 0.0, -7.0])
     plain = joint_positions(blend(source, destination, 50, 80, 25).clip)
@@ -122,7 +128,7 @@ def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(make_walk, an
     np.testing.assert_allclose(joint_positions(with_source.clip), expected, atol=1e-12)
 
 
-def test_joints_move_no_faster_than_clips_and_ramp_together_allow(make_walk):
+def test_joints_move_no_faster_than_clips_and_ramp_together_allow(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(120), make_walk(120, phase=2.0, cadence=1.4, swing=0.8)
     count = 20
     result = blend(source, destination, 50, 80, count)
@@ -134,7 +140,7 @@ def test_joints_move_no_faster_than_clips_and_ramp_together_allow(make_walk):
     assert np.all(steps[:, 1:] <= (np.maximum(*own) + apart / (count + 1))[1:] + 1e-9)
 
 
-def test_reversing_time_and_roles_reverses_the_pose_blend(make_walk):
+def test_reversing_time_and_roles_reverses_the_pose_blend(make_walk: Callable[..., Clip]) -> None:
     """Symmetric weights: destination to source, backwards, is the same blend of the joints."""
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     there = blend(source, destination, 40, 60, 15)
@@ -152,7 +158,7 @@ def test_reversing_time_and_roles_reverses_the_pose_blend(make_walk):
     np.testing.assert_allclose(quat.half_angle_between(a, b), 0.0, atol=1e-7)
 
 
-def test_slerp_keeps_its_way_round_where_the_shorter_way_would_swap():
+def test_slerp_keeps_its_way_round_where_the_shorter_way_would_swap() -> None:
     angle = np.linspace(0.9 * np.pi, 1.02 * np.pi, 12)  # crosses half a turn apart
     a = np.tile(quat.IDENTITY, (12, 1, 1))
     b = quat.from_axis_angle([0.0, 0.0, 1.0], angle)[:, None]
@@ -161,7 +167,7 @@ def test_slerp_keeps_its_way_round_where_the_shorter_way_would_swap():
     np.testing.assert_allclose(2 * quat.half_angle_between(mixed[:, 0], a[:, 0]), angle / 2, atol=1e-9)
 
 
-def test_slerp_agrees_with_the_shorter_way_where_there_is_no_doubt():
+def test_slerp_agrees_with_the_shorter_way_where_there_is_no_doubt() -> None:
     rng = np.random.default_rng(3)
     a = quat.normalise(np.array([1.0, 0, 0, 0]) + 0.15 * rng.normal(size=(6, 4, 4)))
     b = quat.normalise(np.array([1.0, 0, 0, 0]) + 0.15 * rng.normal(size=(6, 4, 4)))
@@ -171,7 +177,7 @@ def test_slerp_agrees_with_the_shorter_way_where_there_is_no_doubt():
     np.testing.assert_array_equal(slerp_one_way(same, -same, share[:, None]), same)
 
 
-def test_blends_reach_to_the_very_ends_of_the_clips(make_walk):
+def test_blends_reach_to_the_very_ends_of_the_clips(make_walk: Callable[..., Clip]) -> None:
     """No frame before the source's window, none after the destination's, none on the far side of either."""
     source, destination = make_walk(20), make_walk(20, phase=1.0)
     whole = blend(source, destination, 0, 19, 20)
@@ -183,7 +189,7 @@ def test_blends_reach_to_the_very_ends_of_the_clips(make_walk):
     assert np.max(np.abs(np.diff(speeds(left.clip)))) < 0.05
 
 
-def test_joints_may_blend_for_less_long_than_the_figure(make_walk):
+def test_joints_may_blend_for_less_long_than_the_figure(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     shoulder, hip = (source.skeleton.role(role) for role in ("shoulder.L", "hip.L"))
     whole = blend(source, destination, 40, 60, 20).clip.rotations[40:60]
@@ -198,7 +204,7 @@ def test_joints_may_blend_for_less_long_than_the_figure(make_walk):
         blend(source, destination, 40, 60, 20, joint_frames={"knee.R": 21})
 
 
-def test_a_cut_matches_facing_and_floor_position(make_walk):
+def test_a_cut_matches_facing_and_floor_position(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(100, heading=1.0), make_walk(100, phase=2.0, heading=-2.0)
     result = cut(source, destination, 40, 60)
     assert (result.blend_start, result.blend_stop, result.blend_frames) == (40, 40, 0)
@@ -210,13 +216,13 @@ def test_a_cut_matches_facing_and_floor_position(make_walk):
     np.testing.assert_allclose(same.root_positions, source.root_positions, atol=1e-12)
 
 
-def test_the_destination_is_put_on_the_sources_skeleton(make_walk):
+def test_the_destination_is_put_on_the_sources_skeleton(make_walk: Callable[..., Clip]) -> None:
     result = blend(make_walk(100), make_walk(100, scale=1.5, speed=3.0), 40, 60, 10)
     assert result.clip.skeleton.leg_length == pytest.approx(0.84)
     assert speeds(result.clip)[-1] == pytest.approx(2.0)
 
 
-def test_rigs_that_differ_in_leaf_joints_alone_are_blended(make_walk):
+def test_rigs_that_differ_in_leaf_joints_alone_are_blended(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(100), make_walk(100, toes=False)
     result = blend(source, destination, 40, 60, 10).clip
     np.testing.assert_allclose(result.rotations, blend(source, make_walk(100), 40, 60, 10).clip.rotations, atol=1e-12)
@@ -226,7 +232,7 @@ def test_rigs_that_differ_in_leaf_joints_alone_are_blended(make_walk):
     assert "removed joints LeftToe, RightToe" in " ".join(back.history)
 
 
-def test_what_was_done_is_on_record(make_walk):
+def test_what_was_done_is_on_record(make_walk: Callable[..., Clip]) -> None:
     source, destination = (
         make_walk(100, name="walk").noting("mended"),
         replace(make_walk(100, name="run"), synthetic=True),
@@ -248,13 +254,15 @@ def test_what_was_done_is_on_record(make_walk):
         ((40, 100, 1), "end frame from 0 to 99"),
     ],
 )
-def test_frames_that_are_not_there_are_refused(make_walk, frames, message):
+def test_frames_that_are_not_there_are_refused(
+    make_walk: Callable[..., Clip], frames: tuple[int, ...], message: str
+) -> None:
     walk = make_walk(100, name="walk")
     with pytest.raises(TransitionError, match=message):
         blend(walk, walk, *frames)
 
 
-def test_a_figure_without_hips_or_shoulders_has_no_facing():
+def test_a_figure_without_hips_or_shoulders_has_no_facing() -> None:
     rope = Skeleton(("a", "b"), np.array([-1, 0]), np.ones((2, 3)), np.zeros(0, dtype=int), np.zeros((0, 3)))
     with pytest.raises(MotionError, match="role 'hip"):
         facing(Clip(rope, np.zeros((5, 3)), np.tile([1.0, 0, 0, 0], (5, 2, 1)), 30.0))

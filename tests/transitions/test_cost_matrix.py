@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,7 +55,7 @@ def plain_cost(
 
 
 @pytest.fixture(scope="module")
-def pair(make_walk):
+def pair(make_walk: Callable[..., Clip]) -> Any:
     return (
         make_walk(40, phase=0.3, turn_rate=0.4, heading=1.0),
         make_walk(50, phase=2.0, swing=0.8, speed=2.0, cadence=1.4),
@@ -63,7 +65,7 @@ def pair(make_walk):
 @pytest.mark.parametrize("weights", ["wang2003", "lee2002"])
 @pytest.mark.parametrize("root", cm.ROOTS)
 @pytest.mark.parametrize("nu", [0.0, 1.0, 10.0])
-def test_agrees_with_the_equations_by_scipy(pair, weights, root, nu):
+def test_agrees_with_the_equations_by_scipy(pair, weights: str, root: str, nu: float) -> None:
     source, destination = pair
     by_role = dict(WANG2003 if weights == "wang2003" else LEE2002)
     found = cm.cost_matrix(source, destination, weights=weights, nu=nu, root=root)
@@ -74,14 +76,14 @@ def test_agrees_with_the_equations_by_scipy(pair, weights, root, nu):
         )
 
 
-def test_single_precision_is_good_to_a_millionth(pair):
+def test_single_precision_is_good_to_a_millionth(pair) -> None:
     exact = cm.cost_matrix(*pair, weights="lee2002")
     single = cm.cost_matrix(*pair, weights="lee2002", precision="single")
     assert single.dtype == np.float32
     np.testing.assert_allclose(single, exact, atol=4e-6, rtol=2e-6)
 
 
-def test_without_velocity_and_root_it_is_the_difference_of_2004(pair):
+def test_without_velocity_and_root_it_is_the_difference_of_2004(pair) -> None:
     weights = joint_weights(pair[0].skeleton)
     np.testing.assert_allclose(
         cm.cost_matrix(*pair, nu=0.0, root="none"), distance_matrix(*pair, weights), atol=1e-13, rtol=1e-12
@@ -90,7 +92,7 @@ def test_without_velocity_and_root_it_is_the_difference_of_2004(pair):
 
 @pytest.mark.parametrize("degrees", [120.0, 170.0, -75.0])
 @pytest.mark.parametrize("weights", ["wang2003", "lee2002"])
-def test_turning_and_moving_either_clip_changes_nothing(pair, degrees, weights):
+def test_turning_and_moving_either_clip_changes_nothing(pair, degrees: float, weights: str) -> None:
     source, destination = pair
     expected = cm.cost_matrix(source, destination, weights=weights)
     there = moved(destination, np.radians(degrees), np.array([30.0, 0.0, -20.0]))
@@ -100,23 +102,23 @@ def test_turning_and_moving_either_clip_changes_nothing(pair, degrees, weights):
     )
 
 
-def test_a_root_in_the_world_counts_where_the_figure_is(pair):
+def test_a_root_in_the_world_counts_where_the_figure_is(pair) -> None:
     source, destination = pair
     far = moved(destination, 0.0, np.array([3.0, 0.0, 4.0]))
     assert cm.cost_matrix(source, far, root="world").min() > cm.cost_matrix(source, far, root="matched").min() + 1.0
 
 
-def test_a_clip_costs_nothing_to_itself(pair):
+def test_a_clip_costs_nothing_to_itself(pair) -> None:
     np.testing.assert_allclose(np.diag(cm.cost_matrix(pair[0], pair[0], weights="lee2002")), 0.0, atol=1e-12)
 
 
-def test_velocities_mean_the_same_at_another_frame_rate(make_walk):
+def test_velocities_mean_the_same_at_another_frame_rate(make_walk: Callable[..., Clip]) -> None:
     slow, fast = make_walk(40), make_walk(160, fps=120.0)
     joints = np.flatnonzero(joint_weights(slow.skeleton))
     np.testing.assert_allclose(cm.velocities(fast, joints)[4:150:4], cm.velocities(slow, joints)[1:38], atol=2e-3)
 
 
-def test_blocks_are_rows_of_the_matrix_in_order(make_walk):
+def test_blocks_are_rows_of_the_matrix_in_order(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(600), make_walk(90, phase=1.0)
     whole = cm.cost_matrix(source, destination, precision="single")
     at = 0
@@ -130,7 +132,7 @@ def test_blocks_are_rows_of_the_matrix_in_order(make_walk):
     assert (found.min, found.max, found.shape) == (float(whole.min()), float(whole.max()), whole.shape)
 
 
-def test_the_least_cost_is_where_the_same_pose_comes_again(make_walk):
+def test_the_least_cost_is_where_the_same_pose_comes_again(make_walk: Callable[..., Clip]) -> None:
     walk = make_walk(150, phase=0.3)
     later = sample(walk, np.arange(40, 120))
     found = cm.extremes(cm.joint_blocks(walk, later, precision="double"))
@@ -138,7 +140,7 @@ def test_the_least_cost_is_where_the_same_pose_comes_again(make_walk):
     assert (found.argmin[0] - found.argmin[1] - 40) % 30 == 0, "the walk repeats each 30 frames"
 
 
-def test_point_clouds_come_in_blocks_too(make_walk):
+def test_point_clouds_come_in_blocks_too(make_walk: Callable[..., Clip]) -> None:
     from study.transitions.point_cloud import point_cloud, window_distances
 
     source, destination = make_walk(300), make_walk(80, phase=1.0)
@@ -149,7 +151,7 @@ def test_point_clouds_come_in_blocks_too(make_walk):
     assert cm.extremes(cm.pointcloud_blocks(source, destination, window=5)).shape == (296, 76)
 
 
-def test_what_can_not_be_compared_is_refused(pair):
+def test_what_can_not_be_compared_is_refused(pair) -> None:
     source, destination = pair
     with pytest.raises(TransitionError, match="matched, world, none"):
         cm.cost_matrix(source, destination, root="floor")

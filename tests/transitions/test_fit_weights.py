@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,7 +58,7 @@ def cuts_from(clips, weights, *, good: int = 5, bad: int = 60, seed: int = 0) ->
     return cuts
 
 
-def test_a_is_the_cost_per_unit_of_weight(clips):
+def test_a_is_the_cost_per_unit_of_weight(clips) -> None:
     cuts = [LabelledCut(clips[0], clips[1], i, j, 0.0) for i, j in ((5, 90), (40, 11), (100, 140))]
     groups = weight_groups(clips[0].skeleton)
     assert {role for group in groups for role in group} == set(clips[0].skeleton.roles)
@@ -69,7 +70,7 @@ def test_a_is_the_cost_per_unit_of_weight(clips):
             np.testing.assert_allclose(cost_terms(cuts, groups, nu) @ by_group, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_labels_from_known_weights_give_them_back(clips):
+def test_labels_from_known_weights_give_them_back(clips) -> None:
     """2003 Eq. 3: bad transitions at one cost, good ones near none, drawn from Table 1's weights."""
     found = fit_weights(cuts_from(clips, WANG2003))
     assert max(found.weights.values()) == 1.0
@@ -80,7 +81,7 @@ def test_labels_from_known_weights_give_them_back(clips):
         assert found.weights[f"{part}.L"] == found.weights[f"{part}.R"], "symmetric"
 
 
-def test_labels_that_are_the_cost_itself_give_the_weights_exactly(clips):
+def test_labels_that_are_the_cost_itself_give_the_weights_exactly(clips) -> None:
     rng = np.random.default_rng(1)
     weights = {"hip.L": 1.0, "hip.R": 1.0, "chest": 0.25, "wrist.L": 0.5, "wrist.R": 0.5}
     costs = cost_matrix(clips[0], clips[1], weights=weights, root="none")
@@ -95,7 +96,7 @@ def test_labels_that_are_the_cost_itself_give_the_weights_exactly(clips):
         assert value == pytest.approx(weights.get(role, 0.0), abs=1e-8)
 
 
-def test_leaving_one_out_moves_the_best_transition_by_less_than_a_frame(clips):
+def test_leaving_one_out_moves_the_best_transition_by_less_than_a_frame(clips) -> None:
     cuts = cuts_from(clips, WANG2003, good=4, bad=6)
     seen = []
     found = cross_validate(cuts, transfer=(clips[0], clips[2]), progress=lambda done, of: seen.append((done, of)))
@@ -106,7 +107,7 @@ def test_leaving_one_out_moves_the_best_transition_by_less_than_a_frame(clips):
     assert seen[-1] == (len(cuts), len(cuts))
 
 
-def test_the_best_transition_within_a_clip_is_not_to_the_next_frame(clips):
+def test_the_best_transition_within_a_clip_is_not_to_the_next_frame(clips) -> None:
     i, j = best_transition(clips[0], clips[0], WANG2003)
     assert abs(i - j) >= 15
     short = replace(clips[0], root_positions=clips[0].root_positions[:10], rotations=clips[0].rotations[:10])
@@ -114,7 +115,7 @@ def test_the_best_transition_within_a_clip_is_not_to_the_next_frame(clips):
         best_transition(short, short, WANG2003)
 
 
-def test_labels_that_can_not_be_fitted_are_refused(clips):
+def test_labels_that_can_not_be_fitted_are_refused(clips) -> None:
     good = LabelledCut(clips[0], clips[1], 3, 4, 0.0)
     with pytest.raises(TransitionError, match="both good and bad"):
         fit_weights([good, good])
@@ -125,7 +126,7 @@ def test_labels_that_can_not_be_fitted_are_refused(clips):
         fit_weights([good, still])
 
 
-def test_labels_are_kept_one_by_one(tmp_path):
+def test_labels_are_kept_one_by_one(tmp_path: Path) -> None:
     path = tmp_path / "labels.csv"
     first, second = (
         Label("walk", "run", 10, 20, "good", found="best lee2002"),
@@ -140,7 +141,7 @@ def test_labels_are_kept_one_by_one(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["labels.csv"]
 
 
-def test_labels_from_elsewhere_keep_their_columns(tmp_path):
+def test_labels_from_elsewhere_keep_their_columns(tmp_path: Path) -> None:
     path = tmp_path / "labels.csv"
     path.write_text("who,label,source,destination,source_frame,destination_frame\nann,Good,a,b,1,2", encoding="utf-8")
     append_label(path, Label("a", "b", 3, 4, "bad"))
@@ -172,14 +173,14 @@ def test_labels_from_elsewhere_keep_their_columns(tmp_path):
         ),
     ],
 )
-def test_faulty_tables_are_refused_with_their_line(tmp_path, text, words):
+def test_faulty_tables_are_refused_with_their_line(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "labels.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(TransitionError, match=words):
         read_labels(path)
 
 
-def test_candidates_hold_the_best_and_the_worst_of_each_metric(clips):
+def test_candidates_hold_the_best_and_the_worst_of_each_metric(clips) -> None:
     found = candidates(clips[0], clips[1], np.random.default_rng(0), best=1, worst=1, at_random=3)
     by_kind = {part: one for one in found for part in one.found.split(", ")}
     costs = cost_matrix(clips[0], clips[1], weights="lee2002")[15:-1, 1:-15]
@@ -191,6 +192,6 @@ def test_candidates_hold_the_best_and_the_worst_of_each_metric(clips):
     assert found == again, "a seed gives the same cuts in the same order, so that labelling goes on where it stopped"
 
 
-def test_candidates_within_one_clip_are_apart(clips):
+def test_candidates_within_one_clip_are_apart(clips) -> None:
     for one in candidates(clips[0], clips[0], np.random.default_rng(0), at_random=0):
         assert abs(one.source_frame - one.destination_frame) >= 12

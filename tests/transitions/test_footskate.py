@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import global_rotations, joint_positions, moved
+from study.motion.clip import Clip, global_rotations, joint_positions, moved
 from study.motion.legs import reach
 from study.motion.synthetic import synthesize
 from study.transitions.blending import blend, cut
@@ -23,7 +25,7 @@ from study.transitions.timewarp import warped_blend
 
 
 @pytest.fixture(scope="module")
-def slider(make_walk):
+def slider(make_walk: Callable[..., Clip]) -> Clip:
     """Ninety frames of bent legs that glide along at 0.2 m/s without lifting the feet."""
     walk = make_walk(90, speed=0.2, swing=0.0)
     rotations = walk.rotations.copy()
@@ -36,7 +38,7 @@ def slider(make_walk):
     return replace(walk, root_positions=positions, rotations=rotations)
 
 
-def knee_bend(clip, side):
+def knee_bend(clip, side) -> Any:
     """Signed angle of the knee, radians, positive where it bends the way knees do (about the line of the hips)."""
     positions = joint_positions(clip)
     hip, knee, ankle = (positions[:, clip.skeleton.role(f"{part}.{side}")] for part in ("hip", "knee", "ankle"))
@@ -48,7 +50,7 @@ def knee_bend(clip, side):
     )
 
 
-def test_contacts_start_low_and_slow_and_last_while_fairly_so(slider):
+def test_contacts_start_low_and_slow_and_last_while_fairly_so(slider: Clip) -> None:
     speed = np.zeros(90)
     speed[20:30], speed[30:40], speed[40:] = 0.2, 0.5, 0.9  # m/s: planted, held, swinging
     positions = slider.root_positions.copy()
@@ -62,7 +64,7 @@ def test_contacts_start_low_and_slow_and_last_while_fairly_so(slider):
     assert not find_contacts(replace(slider, root_positions=positions)).any()
 
 
-def test_a_foot_that_is_high_is_not_planted(slider):
+def test_a_foot_that_is_high_is_not_planted(slider: Clip) -> None:
     rotations = slider.rotations.copy()
     raised = slice(40, 60)
     rotations[raised, slider.skeleton.role("hip.L")] = quat.from_axis_angle([1.0, 0.0, 0.0], -1.0)
@@ -71,7 +73,7 @@ def test_a_foot_that_is_high_is_not_planted(slider):
     assert contacts[raised, 1].all()
 
 
-def test_slide_is_the_way_that_planted_feet_go(slider):
+def test_slide_is_the_way_that_planted_feet_go(slider: Clip) -> None:
     contacts = np.ones((90, 2), dtype=bool)
     slide, seconds = foot_slide(slider, contacts)
     assert slide == pytest.approx(2 * 89 * 0.2 / 30)
@@ -80,7 +82,7 @@ def test_slide_is_the_way_that_planted_feet_go(slider):
     assert foot_slide(slider, contacts)[0] == pytest.approx(2 * 87 * 0.2 / 30)
 
 
-def test_planted_feet_stand_still_and_nothing_pops(slider):
+def test_planted_feet_stand_still_and_nothing_pops(slider: Clip) -> None:
     contacts = np.zeros((90, 2), dtype=bool)
     contacts[20:50, 0] = contacts[45:70, 1] = True
     result = remove_foot_slide(slider, contacts)
@@ -102,7 +104,7 @@ def test_planted_feet_stand_still_and_nothing_pops(slider):
     assert "foot slide reduced from" in result.clip.history[-1]
 
 
-def test_the_foot_keeps_its_rotation_in_the_world(slider):
+def test_the_foot_keeps_its_rotation_in_the_world(slider: Clip) -> None:
     shifts = np.zeros((90, 2, 3))
     shifts[30:40, 0] = [0.02, 0.0, 0.05]
     done = reach(slider, shifts)
@@ -116,7 +118,9 @@ def test_the_foot_keeps_its_rotation_in_the_world(slider):
 
 @pytest.mark.parametrize("distance", [0.1, 0.3, 0.6, 3.0])
 @pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.0, 0.5, 0.0)])
-def test_knees_are_neither_inverted_nor_overstretched(slider, distance, direction):
+def test_knees_are_neither_inverted_nor_overstretched(
+    slider: Clip, distance: float, direction: tuple[float, ...]
+) -> None:
     shifts = np.zeros((90, 2, 3))
     shifts[:, 0] = distance * np.array(direction) * np.sin(np.linspace(0, np.pi, 90))[:, None]
     done = reach(slider, shifts)
@@ -129,7 +133,7 @@ def test_knees_are_neither_inverted_nor_overstretched(slider, distance, directio
     assert root_drop.max() <= 0.03 + 1e-12
 
 
-def test_a_straight_leg_bends_forward_at_the_knee(make_walk):
+def test_a_straight_leg_bends_forward_at_the_knee(make_walk: Callable[..., Clip]) -> None:
     """Knees that are straight in every frame have no plane of their own; the line of the hips gives the axis."""
     still = make_walk(40, speed=0.0, swing=0.0)
     shifts = np.zeros((40, 2, 3))
@@ -143,7 +147,7 @@ def test_a_straight_leg_bends_forward_at_the_knee(make_walk):
     )
 
 
-def test_a_transition_keeps_the_feet_where_source_and_destination_had_them(make_walk):
+def test_a_transition_keeps_the_feet_where_source_and_destination_had_them(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(120, speed=0.9), make_walk(120, speed=1.4, phase=1.0)
     raw = blend(source, destination, 50, 80, 20)
     planted, result = plant_feet(raw, source, destination)
@@ -161,7 +165,7 @@ def test_a_transition_keeps_the_feet_where_source_and_destination_had_them(make_
 
 
 @pytest.mark.parametrize("lengths", [(12, 24), (24, 12)])
-def test_a_time_warped_blend_knows_its_clips_contacts(make_walk, lengths):
+def test_a_time_warped_blend_knows_its_clips_contacts(make_walk: Callable[..., Clip], lengths: tuple[int, ...]) -> None:
     source, destination = make_walk(120, speed=0.9), make_walk(120, speed=0.9, phase=1.0)
     raw = warped_blend(source, destination, 50, 80, *lengths)
     contacts = transition_contacts(raw, source, destination)
@@ -173,7 +177,7 @@ def test_a_time_warped_blend_knows_its_clips_contacts(make_walk, lengths):
     assert planted.source_frames == (50, 50 + lengths[0])
 
 
-def test_feet_planted_before_the_region_stay_and_the_frames_before_it_are_untouched(slider):
+def test_feet_planted_before_the_region_stay_and_the_frames_before_it_are_untouched(slider: Clip) -> None:
     contacts = np.zeros((90, 2), dtype=bool)
     contacts[10:50, 0] = True
     result = remove_foot_slide(slider, contacts, (30, 60))
@@ -189,7 +193,7 @@ def test_feet_planted_before_the_region_stay_and_the_frames_before_it_are_untouc
     np.testing.assert_allclose(points[40:60, [0, 2]], np.tile(points[60, [0, 2]], (20, 1)), atol=2e-5)
 
 
-def test_a_foot_that_comes_down_just_after_the_start_stays_where_it_came_down(slider):
+def test_a_foot_that_comes_down_just_after_the_start_stays_where_it_came_down(slider: Clip) -> None:
     contacts = np.zeros((90, 2), dtype=bool)
     contacts[32:70, 0] = True
     result = remove_foot_slide(slider, contacts, (30, 60))
@@ -199,7 +203,7 @@ def test_a_foot_that_comes_down_just_after_the_start_stays_where_it_came_down(sl
     assert np.max(np.abs(np.diff(points[:, 2]))) * 30 < 3.0
 
 
-def test_where_the_clip_stands_does_not_matter(slider):
+def test_where_the_clip_stands_does_not_matter(slider: Clip) -> None:
     contacts = np.zeros((90, 2), dtype=bool)
     contacts[20:50, 0] = True
     here = remove_foot_slide(slider, contacts)
@@ -208,7 +212,7 @@ def test_where_the_clip_stands_does_not_matter(slider):
     np.testing.assert_allclose(joint_positions(there.clip), joint_positions(expected), atol=1e-9)
 
 
-def test_what_cannot_be_planted_is_refused(slider):
+def test_what_cannot_be_planted_is_refused(slider: Clip) -> None:
     with pytest.raises(MotionError, match=r"shape \(90, 2\), got \(10, 2\)"):
         remove_foot_slide(slider, np.zeros((10, 2), dtype=bool))
     with pytest.raises(MotionError, match="region within frames 0 to 90, got 60 to 95"):
@@ -217,7 +221,7 @@ def test_what_cannot_be_planted_is_refused(slider):
         plant_feet(cut(slider, slider, 20, 40), slider, slider)
 
 
-def test_a_foot_that_no_leg_can_hold_takes_a_step():
+def test_a_foot_that_no_leg_can_hold_takes_a_step() -> None:
     """From standing into a walk over a long blend: the body is away before the feet of the stance may lift."""
     source, destination = synthesize("stand", seconds=4.0), synthesize("walk", seconds=6.0)
     joined = blend(source, destination, 40, 96, 40)

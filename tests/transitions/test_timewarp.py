@@ -1,18 +1,21 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
 from study.errors import TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import moved, sample
+from study.motion.clip import Clip, moved, sample
 from study.transitions.blend_length import geodesic_costs
 from study.transitions.blending import blend
 from study.transitions.timewarp import warp_costs, warp_length, warped_blend
 from study.transitions.weights import joint_weights
 
 
-def plain_cost(source, destination, i, j, b_from, b_to, weights):
+def plain_cost(source, destination, i, j, b_from, b_to, weights) -> Any:
     """2004 Eqs. 5 and 6 as printed, pose by pose, with slerp between frames; the sum, not the mean."""
     total = 0.0
     for t in range(1, max(b_from, b_to) + 1):
@@ -29,12 +32,12 @@ def plain_cost(source, destination, i, j, b_from, b_to, weights):
 
 
 @pytest.fixture(scope="module")
-def pair(make_walk):
+def pair(make_walk: Callable[..., Clip]) -> Any:
     return make_walk(60, phase=0.4), make_walk(60, phase=2.1, cadence=1.4, swing=0.7)
 
 
 @pytest.mark.parametrize("average", [True, False])
-def test_costs_are_those_of_the_plain_equations(pair, average):
+def test_costs_are_those_of_the_plain_equations(pair, average: bool) -> None:
     weights = joint_weights(pair[0].skeleton)
     costs = warp_costs(*pair, 20, 40, 9, weights, average=average)
     for b_from in range(1, 10):
@@ -44,7 +47,7 @@ def test_costs_are_those_of_the_plain_equations(pair, average):
             assert costs[b_from - 1, b_to - 1] == pytest.approx(expected, rel=1e-11, abs=1e-14), (b_from, b_to)
 
 
-def test_long_windows_agree_at_a_sample_of_lengths(make_walk):
+def test_long_windows_agree_at_a_sample_of_lengths(make_walk: Callable[..., Clip]) -> None:
     pair = make_walk(90, phase=0.4), make_walk(90, phase=2.1, cadence=1.4)
     weights = joint_weights(pair[0].skeleton)
     costs = warp_costs(*pair, 25, 70, 60, weights, average=False)
@@ -52,13 +55,13 @@ def test_long_windows_agree_at_a_sample_of_lengths(make_walk):
         assert costs[b_from - 1, b_to - 1] == pytest.approx(plain_cost(*pair, 25, 70, b_from, b_to, weights), rel=1e-11)
 
 
-def test_equal_lengths_cost_what_the_geodesic_method_says(pair):
+def test_equal_lengths_cost_what_the_geodesic_method_says(pair) -> None:
     weights = joint_weights(pair[0].skeleton)
     warped = np.diag(warp_costs(*pair, 15, 45, 30, weights))
     np.testing.assert_allclose(warped, geodesic_costs(*pair, 15, 45, 30, weights), rtol=1e-12, atol=1e-15)
 
 
-def test_another_tempo_of_the_same_motion_is_found(make_walk):
+def test_another_tempo_of_the_same_motion_is_found(make_walk: Callable[..., Clip]) -> None:
     """The destination is the source at two thirds of its tempo: two source frames to three of the destination."""
     source, destination = make_walk(150, cadence=1.2), make_walk(150, cadence=0.8)
     # Source frame i - 1 + s is at phase 1.2 (i - 1 + s), destination frame j - b + t at 0.8 (j - b + t): equal for
@@ -69,19 +72,19 @@ def test_another_tempo_of_the_same_motion_is_found(make_walk):
     assert (found.blend_frames, found.blend_s) == (45, 1.5)
 
 
-def test_the_printed_sum_favours_short_blends(pair):
+def test_the_printed_sum_favours_short_blends(pair) -> None:
     mean = warp_length(*pair, 20, 40, longest=15)
     printed = warp_length(*pair, 20, 40, longest=15, average=False)
     assert printed.blend_frames <= mean.blend_frames
     assert printed.cost <= mean.cost * mean.blend_frames
 
 
-def test_where_the_clips_stand_changes_nothing(pair):
+def test_where_the_clips_stand_changes_nothing(pair) -> None:
     turned = moved(pair[1], np.radians(170), np.array([1.0, 0.0, 2.0]))
     assert warp_length(*pair, 20, 40, longest=12).cost == warp_length(pair[0], turned, 20, 40, longest=12).cost
 
 
-def test_equal_lengths_blend_as_without_a_warp(pair):
+def test_equal_lengths_blend_as_without_a_warp(pair) -> None:
     plain, warped = blend(*pair, 20, 40, 12), warped_blend(*pair, 20, 40, 12, 12)
     np.testing.assert_allclose(warped.clip.root_positions, plain.clip.root_positions, atol=1e-12)
     np.testing.assert_allclose(quat.half_angle_between(warped.clip.rotations, plain.clip.rotations), 0, atol=1e-7)
@@ -91,7 +94,9 @@ def test_equal_lengths_blend_as_without_a_warp(pair):
 
 
 @pytest.mark.parametrize(("b_from", "b_to"), [(10, 20), (20, 10), (1, 15), (15, 1), (18, 28)])
-def test_a_warped_blend_takes_the_longer_time_and_keeps_the_rest(make_walk, b_from, b_to):
+def test_a_warped_blend_takes_the_longer_time_and_keeps_the_rest(
+    make_walk: Callable[..., Clip], b_from: int, b_to: int
+) -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     result = warped_blend(source, destination, 40, 60, b_from, b_to, weight="sigmoid")
     assert result.blend_frames == max(b_from, b_to) == result.blend_stop - result.blend_start
@@ -107,7 +112,7 @@ def test_a_warped_blend_takes_the_longer_time_and_keeps_the_rest(make_walk, b_fr
     assert speed.min() > 0
 
 
-def test_frames_that_are_not_there_are_counted(pair):
+def test_frames_that_are_not_there_are_counted(pair) -> None:
     with pytest.raises(TransitionError, match="the source lacks 1 frame before its first"):
         warp_length(*pair, 0, 40, longest=5)
     with pytest.raises(

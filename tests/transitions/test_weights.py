@@ -8,7 +8,7 @@ from study.motion.skeleton import Skeleton
 from study.transitions.weights import joint_weights
 
 
-def test_the_root_weighs_nothing_unless_asked_for(rig):
+def test_the_root_weighs_nothing_unless_asked_for(rig) -> None:
     skeleton = rig()
     weights = joint_weights(skeleton, "lee2002")
     assert weights[skeleton.role("pelvis")] == 0.0
@@ -17,7 +17,7 @@ def test_the_root_weighs_nothing_unless_asked_for(rig):
     assert joint_weights(skeleton, "lee2002", with_root=True)[skeleton.role("pelvis")] == 1.0
 
 
-def test_a_mapping_by_role_is_taken_as_it_is(rig):
+def test_a_mapping_by_role_is_taken_as_it_is(rig) -> None:
     skeleton = rig()
     weights = joint_weights(skeleton, {"wrist.L": 0.25, "head": 2.0, "hip.L": 0.0})
     assert weights[skeleton.role("wrist.L")] == 0.25
@@ -25,7 +25,7 @@ def test_a_mapping_by_role_is_taken_as_it_is(rig):
     assert np.count_nonzero(weights) == 2
 
 
-def test_a_rig_without_a_needed_joint_is_refused_by_role():
+def test_a_rig_without_a_needed_joint_is_refused_by_role() -> None:
     armless = Skeleton(
         ("Hips", "LeftUpLeg", "LeftLeg", "RightUpLeg", "RightLeg"),
         np.array([-1, 0, 1, 0, 3]),
@@ -49,6 +49,6 @@ def test_a_rig_without_a_needed_joint_is_refused_by_role():
         ({"pelvis": 1.0}, "other than the root"),
     ],
 )
-def test_weights_that_make_no_sense_are_refused(rig, weights, message):
+def test_weights_that_make_no_sense_are_refused(rig, weights: dict[str, float] | str, message: str) -> None:
     with pytest.raises(TransitionError, match=message):
         joint_weights(rig(), weights)

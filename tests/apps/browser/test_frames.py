@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
+from devtools import Tab
+from serving import Site
 
 pytestmark = pytest.mark.gl
 
@@ -19,20 +24,20 @@ MEASURED = """(async () => {{
 }})()"""
 
 
-def steady(period_ms=1000 / FPS, leave_out=(), first=0):
+def steady(period_ms=1000 / FPS, leave_out=(), first: int = 0) -> list[Any]:
     return [(i, i + 7, 500 + i * period_ms) for i in range(first, FRAMES) if i not in leave_out]
 
 
-def twice_counted(at, leave_out=()):
+def twice_counted(at, leave_out=()) -> list[Any]:
     return [(i, count + (i >= at), time) for i, count, time in steady(leave_out=leave_out)]
 
 
-def told_twice(at):
+def told_twice(at) -> list[Any]:
     told = steady()
     return [*told[: at + 1], (at, told[at][1] + 1, told[at][2] + 5), *[(i, n + 1, ms) for i, n, ms in told[at + 1 :]]]
 
 
-def jumped():
+def jumped() -> list[Any]:
     """Frame 9 was never presented: the counter goes on by one where the film goes on by two."""
     return [(i, i + 7 - (i > 9), 500 + i * 1000 / FPS) for i in range(FRAMES) if i != 9]
 
@@ -54,7 +59,13 @@ def jumped():
         pytest.param(steady()[:-1], FRAMES - 1, False, id="not to its end"),
     ],
 )
-def test_only_a_film_with_every_frame_at_its_time_counts_as_shown_well(make_site, make_tab, told, presented, well):
+def test_only_a_film_with_every_frame_at_its_time_counts_as_shown_well(
+    make_site: Callable[..., Site],
+    make_tab: Callable[..., Tab],
+    told: list[tuple[float, ...]],
+    presented: int,
+    well: bool,
+) -> None:
     tab = make_tab()
     tab.open(make_site().address)
     found = tab.run(MEASURED.format(frames=FRAMES, fps=FPS, told=[list(one) for one in told]))

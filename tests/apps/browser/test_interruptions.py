@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
+from devtools import Tab
+from serving import Site
 from walking import (
     HURRIED,
     KEPT,
@@ -28,14 +32,14 @@ AWAY_S = 3.5  # longer than the page takes to give a film up that does not go on
 
 
 @contextmanager
-def minimised(tab):
+def minimised(tab) -> Iterator[None]:
     tab.window("minimized")
     yield
     tab.window("normal")
 
 
 @contextmanager
-def behind_another_tab(tab):
+def behind_another_tab(tab) -> Iterator[None]:
     target = tab.browser.call("Target.createTarget", url="about:blank", browserContextId=tab.context)["targetId"]
     tab.wait("document.hidden")
     yield
@@ -43,7 +47,7 @@ def behind_another_tab(tab):
 
 
 @contextmanager
-def frozen(tab):
+def frozen(tab) -> Iterator[None]:
     """As browsers do with pages that nobody looks at, to save power."""
     tab.window("minimized")
     tab.call("Page.setWebLifecycleState", state="frozen")
@@ -53,7 +57,7 @@ def frozen(tab):
 
 
 @contextmanager
-def lid_closed(tab):
+def lid_closed(tab) -> Iterator[None]:
     with tab.browser.stopped():
         yield
 
@@ -68,7 +72,9 @@ AWAY = [
 
 @pytest.mark.parametrize(("away", "why"), AWAY)
 @pytest.mark.parametrize("place", [0, pytest.param(1, marks=pytest.mark.slow)], ids=["first", "second"])
-def test_films_that_nobody_can_have_seen_start_again_and_the_trial_is_queued(make_site, make_tab, away, why, place):
+def test_films_that_nobody_can_have_seen_start_again_and_the_trial_is_queued(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], away: Callable[..., Any], why: str, place: int
+) -> None:
     site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
     to_films(tab, place)
@@ -95,7 +101,7 @@ def test_films_that_nobody_can_have_seen_start_again_and_the_trial_is_queued(mak
     assert happened(site, "fault") == []
 
 
-def test_a_lid_closed_while_a_question_stands(make_site, make_tab):
+def test_a_lid_closed_while_a_question_stands(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     """The time to answer is over when the lid opens: missed, flagged, and so asked again later."""
     site, tab = make_site(HURRIED), make_tab()
     tab.open(site.address)
@@ -111,7 +117,9 @@ def test_a_lid_closed_while_a_question_stands(make_site, make_tab):
     assert not answers(site)["missed"].any()
 
 
-def test_a_window_that_loses_the_focus_flags_the_trial(make_site, make_tab):
+def test_a_window_that_loses_the_focus_flags_the_trial(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     """As in the window: the films go on, for they can be seen, but who knows where the participant looked."""
     site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
@@ -126,7 +134,9 @@ def test_a_window_that_loses_the_focus_flags_the_trial(make_site, make_tab):
 
 
 @pytest.mark.parametrize("closed", [False, True], ids=["reloaded", "closed"])
-def test_an_answer_survives_a_minute_without_network(make_site, make_tab, closed):
+def test_an_answer_survives_a_minute_without_network(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], closed: bool
+) -> None:
     """The page is loaded again, or its tab closed, while there is no network: the answer arrives once there is."""
     site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
@@ -154,7 +164,7 @@ def test_an_answer_survives_a_minute_without_network(make_site, make_tab, closed
     assert not answers(site)["missed"].any()
 
 
-def test_nobodys_answer_is_sent_as_anothers(make_site, make_tab):
+def test_nobodys_answer_is_sent_as_anothers(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     """On a shared computer the next participant begins while the last one's answer still waits."""
     site, tab = make_site(SHORT), make_tab()
     one, other = (f"{site.address}/?PROLIFIC_PID={who}&SESSION_ID={who}-1" for who in ("ann", "bob"))
@@ -175,7 +185,7 @@ def test_nobodys_answer_is_sent_as_anothers(make_site, make_tab):
     assert list(answers(site)["answer"]) == ["same"]
 
 
-def test_going_back_and_forth_loses_nothing(make_site, make_tab):
+def test_going_back_and_forth_loses_nothing(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
     to_question(tab)
@@ -191,7 +201,9 @@ def test_going_back_and_forth_loses_nothing(make_site, make_tab):
     assert not table.duplicated(["trial", "item", "attempt"]).any()
 
 
-def test_a_page_that_is_brought_back_as_it_was_left_starts_again(make_site, make_tab):
+def test_a_page_that_is_brought_back_as_it_was_left_starts_again(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     """Some browsers keep whole pages for the back button; what such a page shows may have long been answered."""
     site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
@@ -202,7 +214,9 @@ def test_a_page_that_is_brought_back_as_it_was_left_starts_again(make_site, make
     assert len(answers(site)) == TRIALS
 
 
-def test_keys_before_the_question_and_keys_held_down_answer_nothing(make_site, make_tab):
+def test_keys_before_the_question_and_keys_held_down_answer_nothing(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     slow = SHORT.replace("entry_s = 0.3", "entry_s = 1.5").replace("exit_s = 0.3", "exit_s = 1.5")
     site, tab = make_site(slow), make_tab()
     tab.open(site.address)
@@ -226,7 +240,7 @@ def test_keys_before_the_question_and_keys_held_down_answer_nothing(make_site, m
     assert list(answers(site)["answer"]) == ["same"]
 
 
-def test_a_double_click_answers_one_question(make_site, make_tab):
+def test_a_double_click_answers_one_question(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     """The next item's buttons stand where the last one's stood."""
     site, tab = make_site(RATED), make_tab()
     tab.open(site.address)
@@ -242,7 +256,7 @@ def test_a_double_click_answers_one_question(make_site, make_tab):
     assert sorted(answers(site)["item"]) == ["natural", "noticeable"]
 
 
-def test_enter_held_down_turns_one_page(make_site, make_tab):
+def test_enter_held_down_turns_one_page(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     site, tab = make_site(), make_tab()
     tab.open(site.address)
     tab.click("I agree")

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
+from devtools import Tab
+from serving import Site
 from walking import END, KEPT, LOOK, PATIENT, QUESTION, SHORT, answers, press, read_on, to_films, to_question
 
 pytestmark = pytest.mark.gl
@@ -57,7 +62,9 @@ def coloured(background: str) -> str:
     ["#dedfe1", pytest.param("#18191c", marks=pytest.mark.slow), pytest.param("#808080", marks=pytest.mark.slow)],
     ids=["light", "dark", "grey"],
 )
-def test_every_page_is_legible_and_fits_a_laptop(make_site, make_tab, background):
+def test_every_page_is_legible_and_fits_a_laptop(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], background: str
+) -> None:
     site = make_site(
         coloured(background).replace("Do you take part?", LONG.replace("\n", "\\n")), completion_code="C0DE"
     )
@@ -83,7 +90,9 @@ def test_every_page_is_legible_and_fits_a_laptop(make_site, make_tab, background
     assert {"question", "form", "Continue"} < seen
 
 
-def test_nothing_flashes_between_films_and_pages(make_site, make_tab, tmp_path):
+def test_nothing_flashes_between_films_and_pages(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], tmp_path: Path
+) -> None:
     """The page has the films' own background, as the browser decodes it: no edge around a film, none in the gap."""
     from PIL import Image
 
@@ -108,7 +117,9 @@ def test_nothing_flashes_between_films_and_pages(make_site, make_tab, tmp_path):
     assert len(set(corners)) == 1
 
 
-def test_a_frame_that_can_not_be_drawn_yet_leaves_the_pages_colour(make_site, make_tab):
+def test_a_frame_that_can_not_be_drawn_yet_leaves_the_pages_colour(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     """As in a busy browser, where a film is ready before its first frame can be drawn."""
     site, tab = make_site(SHORT), make_tab()
     nothing = "CanvasRenderingContext2D.prototype.drawImage = () => { window.asked = true; };"
@@ -122,7 +133,9 @@ def test_a_frame_that_can_not_be_drawn_yet_leaves_the_pages_colour(make_site, ma
     assert colour == f"rgb({red}, {green}, {blue})"
 
 
-def test_reduced_motion_is_told_of_and_hides_no_film(make_site, make_tab):
+def test_reduced_motion_is_told_of_and_hides_no_film(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     site, tab = make_site(), make_tab()
     tab.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
     tab.open(site.address)
@@ -131,12 +144,12 @@ def test_reduced_motion_is_told_of_and_hides_no_film(make_site, make_tab):
     assert tab.run("getComputedStyle(document.querySelector('video.now')).visibility") == "visible"
 
 
-def to_films_through(tab):
+def to_films_through(tab) -> None:
     while not tab.run("document.querySelector('video.now') !== null"):
         read_on(tab)
 
 
-def as_tablet(tab, width, height):
+def as_tablet(tab, width, height) -> None:
     tab.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=2, mobile=True)
     tab.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=5)
 
@@ -144,7 +157,9 @@ def as_tablet(tab, width, height):
 @pytest.mark.parametrize(
     ("width", "height"), [(820, 1180), (1180, 820), (390, 844)], ids=["portrait", "landscape", "phone"]
 )
-def test_touch_where_the_protocol_allows_it(make_site, make_tab, width, height):
+def test_touch_where_the_protocol_allows_it(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], width: int, height: int
+) -> None:
     site, tab = make_site(SHORT.replace("seed = 3", "seed = 3\ntouch = true")), make_tab()
     as_tablet(tab, width, height)
     tab.open(site.address)
@@ -170,7 +185,9 @@ def test_touch_where_the_protocol_allows_it(make_site, make_tab, width, height):
     assert answers(site)["answer"].iloc[0] == "same"
 
 
-def test_touch_is_refused_politely_where_the_protocol_does_not_allow_it(make_site, make_tab):
+def test_touch_is_refused_politely_where_the_protocol_does_not_allow_it(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     site, tab = make_site(SHORT.replace("seed = 3", "seed = 3\ntouch = false")), make_tab()
     as_tablet(tab, 820, 1180)
     tab.open(site.address)
@@ -179,13 +196,15 @@ def test_touch_is_refused_politely_where_the_protocol_does_not_allow_it(make_sit
     assert site.host.sittings == {}
 
 
-def spoken(tab):
+def spoken(tab) -> set[Any]:
     """What a screen reader finds: role and name of all that has a name, and whether it is announced by itself."""
     nodes = tab.call("Accessibility.getFullAXTree")["nodes"]
     return {(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node.get("ignored")}
 
 
-def test_the_keyboard_alone_leads_through_a_session(make_site, make_tab):
+def test_the_keyboard_alone_leads_through_a_session(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     """Tab reaches every control in the order in which it is read, and shows where it is; Enter and Space press."""
     site, tab = make_site(), make_tab()
     tab.open(site.address)

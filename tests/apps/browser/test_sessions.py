@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable
 
 import pytest
 import sqlalchemy as sa
-from serving import PROTOCOL, QUESTIONS, TOKEN
+from devtools import Tab
+from serving import PROTOCOL, QUESTIONS, TOKEN, Site
 from walking import (
     KEPT,
     LOOK,
@@ -39,12 +41,14 @@ TRIALS = 4  # of SHORT
 
 
 @pytest.mark.parametrize("keys", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["keys", "buttons"])
-def test_a_whole_session_of_every_task(make_site, make_tab, keys):
+def test_a_whole_session_of_every_task(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], keys: bool
+) -> None:
     site, tab = make_site(completion_code="C0DE"), make_tab()
     tab.size(1280, 640)
     scrolled = []
 
-    def look():
+    def look() -> None:
         if tab.run("document.documentElement?.scrollHeight > window.innerHeight"):
             scrolled.append(tab.text())
 
@@ -66,7 +70,7 @@ def test_a_whole_session_of_every_task(make_site, make_tab, keys):
     assert happened(site, "finished") == [{}]
 
 
-def test_reloads_lose_nothing(make_site, make_tab):
+def test_reloads_lose_nothing(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
     for number in range(1, 4):
@@ -83,7 +87,9 @@ def test_reloads_lose_nothing(make_site, make_tab):
     assert not table.duplicated(["trial", "item"]).any()
 
 
-def test_staircases_go_on_with_the_trial_that_was_due(make_site, make_tab):
+def test_staircases_go_on_with_the_trial_that_was_due(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     """The page is loaded again, the server started again; every trial is the one that the responses before led to."""
     site, tab = make_site(STAIRCASES), make_tab()
     tab.open(site.address)
@@ -111,7 +117,9 @@ def test_staircases_go_on_with_the_trial_that_was_due(make_site, make_tab):
     assert len(set(answers(site)["difference_frames"])) > 2
 
 
-def test_a_restarted_server_gets_the_answer_that_waited(make_site, make_tab):
+def test_a_restarted_server_gets_the_answer_that_waited(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     site, tab = make_site(SHORT), make_tab()
     tab.open(site.address)
     to_question(tab, 2)
@@ -129,7 +137,9 @@ def test_a_restarted_server_gets_the_answer_that_waited(make_site, make_tab):
 
 
 @pytest.mark.parametrize("fault", ["truncated", pytest.param("stalled", marks=pytest.mark.slow)])
-def test_films_that_fail_are_tried_again_then_said_clearly(make_site, make_tab, fault):
+def test_films_that_fail_are_tried_again_then_said_clearly(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], fault: str
+) -> None:
     site, tab = make_site(), make_tab()
     tab.open(site.address)
     site.film_fault = fault
@@ -145,14 +155,16 @@ def test_films_that_fail_are_tried_again_then_said_clearly(make_site, make_tab, 
     assert len(answers(site)) == QUESTIONS
 
 
-def to_fault(tab):
+def to_fault(tab) -> None:
     end = time.monotonic() + 90
     while "A film could not be shown" not in tab.text():
         assert time.monotonic() < end, tab.text()
         read_on(tab, again=False)  # or the page that is waited for would be passed as it comes
 
 
-def test_a_film_that_can_not_be_shown_can_be_passed_over(make_site, make_tab):
+def test_a_film_that_can_not_be_shown_can_be_passed_over(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     site, tab = make_site(), make_tab()
     tab.open(site.address)
     site.film_fault = "truncated"
@@ -170,7 +182,9 @@ def test_a_film_that_can_not_be_shown_can_be_passed_over(make_site, make_tab):
     assert list(table[table["trial"] == 2]["attempt"]) == [1, 2]
 
 
-def test_a_second_tab_is_refused_and_can_take_over(make_site, make_tab):
+def test_a_second_tab_is_refused_and_can_take_over(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     site, tab = make_site(), make_tab()
     tab.open(site.address)
     tab.wait_text("Do you take part?")
@@ -186,7 +200,7 @@ def test_a_second_tab_is_refused_and_can_take_over(make_site, make_tab):
     assert len(answers(site)) == QUESTIONS
 
 
-def test_a_missed_answer_is_recorded_as_missed(make_site, make_tab):
+def test_a_missed_answer_is_recorded_as_missed(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     site, tab = make_site(PROTOCOL), make_tab()
     tab.open(site.address)
     to_question(tab)
@@ -197,7 +211,7 @@ def test_a_missed_answer_is_recorded_as_missed(make_site, make_tab):
     assert tab.run("document.querySelectorAll('button.answer:not(:disabled)').length") == 0
 
 
-def test_only_legal_keys_count(make_site, make_tab):
+def test_only_legal_keys_count(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     site, tab = make_site(), make_tab()
     tab.open(site.address)
     to_question(tab)
@@ -211,7 +225,7 @@ def test_only_legal_keys_count(make_site, make_tab):
     assert list(answers(site)["answer"]) == ["different"]
 
 
-def test_declining_and_withdrawing(make_site, make_tab):
+def test_declining_and_withdrawing(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     site, tab = make_site(), make_tab()
     tab.open(site.address)
     tab.click("I do not take part")
@@ -231,7 +245,9 @@ def test_declining_and_withdrawing(make_site, make_tab):
     assert len(answers(site)) == 0
 
 
-def test_nothing_that_was_typed_is_run_on_the_researchers_page(make_site, make_tab):
+def test_nothing_that_was_typed_is_run_on_the_researchers_page(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+) -> None:
     site, tab = make_site(), make_tab()
     typed = "<img src=x onerror='document.title=1'><script>document.title=2</script>"
     tab.open(f"{site.address}/?PROLIFIC_PID=%3Cimg%20src%3Dx%20onerror%3D%27document.title%3D1%27%3E")
@@ -252,7 +268,7 @@ def test_nothing_that_was_typed_is_run_on_the_researchers_page(make_site, make_t
     assert researcher.run("document.title") == "Sessions"
 
 
-def test_a_page_for_eyes_and_ears(make_site, make_tab):
+def test_a_page_for_eyes_and_ears(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     """Headings take the focus, so that they are read; buttons have names and keys; status is a live region."""
     site, tab = make_site(), make_tab()
     tab.open(site.address)
@@ -276,7 +292,7 @@ def test_a_page_for_eyes_and_ears(make_site, make_tab):
     assert buttons == {"Same key S", "Different key D"}
 
 
-def test_reaction_times_are_those_of_the_keys(make_site, make_tab):
+def test_reaction_times_are_those_of_the_keys(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     """A page that is busy for a while handles a key late; what is recorded is when the key was pressed."""
     busy_s = 2.0
     busy = (

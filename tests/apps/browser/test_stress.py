@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import random
 import time
+from collections.abc import Callable
 
 import pytest
-from serving import QUESTIONS
+from devtools import Tab
+from serving import QUESTIONS, Site
 from walking import END, LOOK, answers, details, go_on, press, read_on
 
 from study.experiment.store.sessions import all_sessions
@@ -39,13 +41,13 @@ window.fetch = async (address, options) => {
 """
 
 
-def reload(site, tab, chance):
+def reload(site: Site, tab, chance) -> None:
     del site, chance
     tab.reload()
     tab.wait(f"({LOOK}) !== ''")
 
 
-def restart_server(site, tab, chance):
+def restart_server(site: Site, tab, chance) -> None:
     site.stop()
     time.sleep(chance.uniform(0, 2))
     if tab.run(LOOK) == "question":
@@ -53,7 +55,7 @@ def restart_server(site, tab, chance):
     site.start()
 
 
-def cut_network(site, tab, chance):
+def cut_network(site: Site, tab, chance) -> None:
     del site
     tab.offline(True)
     if tab.run(LOOK) == "question":
@@ -62,7 +64,7 @@ def cut_network(site, tab, chance):
     tab.offline(False)
 
 
-def truncate_films(site, tab, chance):
+def truncate_films(site: Site, tab, chance) -> None:
     site.film_fault = "truncated"
     end = time.monotonic() + chance.uniform(0.5, 4)
     while time.monotonic() < end:
@@ -73,14 +75,14 @@ def truncate_films(site, tab, chance):
     site.film_fault = None
 
 
-def hide(site, tab, chance):
+def hide(site: Site, tab, chance) -> None:
     del site
     tab.window("minimized")
     time.sleep(chance.uniform(0, 3))
     tab.window("normal")
 
 
-def close_lid(site, tab, chance):
+def close_lid(site: Site, tab, chance) -> None:
     del site
     with tab.browser.stopped():
         time.sleep(chance.uniform(0, 4))
@@ -90,13 +92,15 @@ DISTURBANCES = (reload, restart_server, cut_network, truncate_films, hide, close
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_session_in_which_everything_goes_wrong(make_site, make_tab, seed):
+def test_a_session_in_which_everything_goes_wrong(
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], seed: int
+) -> None:
     site, tab, chance = make_site(), make_tab(), random.Random(seed)
     tab.call("Page.addScriptToEvaluateOnNewDocument", source=EAVESDROP)
     tab.open(site.address)
     done = []
 
-    def disturb():
+    def disturb() -> None:
         if len(done) < 15 and chance.random() < CHANCE and END not in tab.text():
             happens = chance.choice(DISTURBANCES)
             done.append(happens.__name__)
@@ -109,7 +113,7 @@ def test_a_session_in_which_everything_goes_wrong(make_site, make_tab, seed):
     check_records(site, heard, slowest)
 
 
-def check_records(site, heard, slowest):
+def check_records(site: Site, heard, slowest) -> None:
     (session,) = all_sessions(site.responses)
     every = answers(site, all_attempts=True)
     assert not every.duplicated(["trial", "attempt", "item"]).any()

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
+from typing import Any
 
 import pytest
+from devtools import Tab
 from greek import GREEK, latin
+from serving import Site
 
 from study.experiment.protocol.whole import parse_protocol
 
@@ -22,7 +26,7 @@ WORDS = """(() => {
 
 
 @pytest.fixture
-def greek(make_site, make_tab):
+def greek(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> Any:
     return make_site(GREEK), make_tab(), parse_protocol(GREEK).texts
 
 
@@ -31,7 +35,7 @@ def foreign(text: str) -> set[str]:
     return set(latin(re.sub(r"\b[a-z0-9]{4}(?:-[a-z0-9]{4}){3}\b", "", text)))
 
 
-def go_through(tab, texts, seen, at_most=300):
+def go_through(tab, texts, seen, at_most: int = 300) -> None:
     """To the end, by whatever the first button is; the form is filled in wrongly first."""
     end = time.monotonic() + at_most
     wrong = True
@@ -52,7 +56,7 @@ def go_through(tab, texts, seen, at_most=300):
     seen |= foreign(tab.run(WORDS))
 
 
-def test_every_page_of_a_session_is_in_the_protocol_s_words(greek):
+def test_every_page_of_a_session_is_in_the_protocol_s_words(greek) -> None:
     site, tab, texts = greek
     seen: set[str] = set()
     tab.open(site.address)
@@ -66,7 +70,7 @@ def test_every_page_of_a_session_is_in_the_protocol_s_words(greek):
     assert foreign(tab.run(WORDS)) == set()
 
 
-def test_what_goes_wrong_is_said_in_the_protocol_s_words(greek, make_tab):
+def test_what_goes_wrong_is_said_in_the_protocol_s_words(greek, make_tab: Callable[..., Tab]) -> None:
     """A film that fails, a server that is away, a second tab."""
     site, tab, texts = greek
     seen: set[str] = set()

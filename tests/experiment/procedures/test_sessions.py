@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -137,7 +138,7 @@ def test_answers_to_trials_that_were_not_asked_are_refused() -> None:
         open_session(protocol, plan, [Answer(5, "", 1, "same", 1.0)])
 
 
-def test_simulated_sessions_are_stored_and_taken_up(tmp_path) -> None:
+def test_simulated_sessions_are_stored_and_taken_up(tmp_path: Path) -> None:
     """Stopped after some answers, by an error, and run again: the table is that of an uninterrupted run."""
     protocol = protocol_of("in order")
     stimuli = FakeStimuli(pairs_of(protocol))
