@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from scripted import Act, ScriptedWindow, press
 from serving import PROTOCOL, Person, make_host, protocol_of, unfilmed
 from starlette.testclient import TestClient
 
@@ -18,7 +19,6 @@ from study.apps.cli.play import the_plan
 from study.apps.player.lettering import default_font
 from study.apps.player.loop import play
 from study.apps.player.pages import Look
-from study.apps.player.scripted import Act, ScriptedWindow, press
 from study.apps.player.store import ResponsesStore
 from study.apps.server.web import make_app
 from study.experiment.plan import Plan, draw_plan

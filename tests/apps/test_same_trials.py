@@ -14,6 +14,7 @@ from typing import Any
 import pandas as pd
 import pytest
 import sqlalchemy as sa
+from scripted import Act, ScriptedWindow, press
 from serving import PROTOCOL, Person, make_host, protocol_of, unfilmed
 from starlette.testclient import TestClient
 
@@ -23,7 +24,6 @@ from study.apps.player import loop
 from study.apps.player.lettering import default_font
 from study.apps.player.loop import play
 from study.apps.player.pages import Look
-from study.apps.player.scripted import Act, ScriptedWindow, press
 from study.apps.player.store import ResponsesStore
 from study.apps.server.web import make_app
 from study.experiment.plan import Plan, draw_plan

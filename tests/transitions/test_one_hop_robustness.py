@@ -20,25 +20,35 @@ from study.motion.synthetic import synthesize
 from study.transitions.cost_matrix import cost_matrix
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.joint_distance import JointDistance
-from study.transitions.one_hop.pictures import draw_costs, draw_distances
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
-from study.transitions.one_hop.robustness import Costs, costs_of, robustness_set
 from study.transitions.point_cloud import point_cloud, window_distances
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(scope="module")
-def benchmark() -> ModuleType:
-    """The benchmark, for its search that tries everything."""
-    spec = importlib.util.spec_from_file_location("benchmark_one_hop", ROOT / "benchmarks" / "one_hop.py")
+def loaded(name: str) -> ModuleType:
+    """A benchmark as a module."""
+    spec = importlib.util.spec_from_file_location(f"benchmark_{name}", ROOT / "benchmarks" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
     path = list(sys.path)
     spec.loader.exec_module(module)
     sys.path[:] = path
     return module
+
+
+@pytest.fixture(scope="module")
+def benchmark() -> ModuleType:
+    """The benchmark, for its search that tries everything."""
+    return loaded("one_hop")
+
+
+@pytest.fixture(scope="module")
+def robustness() -> ModuleType:
+    """The transitions by rule, their costs and pictures."""
+    return loaded("one_hop_robustness")
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +57,9 @@ def dances() -> tuple[Clip, ...]:
     return tuple(synthesize(name, seconds=6.0 + k, fps=30.0, seed=k) for k, name in enumerate(names))
 
 
-def test_the_robustness_set_follows_its_rule(dances: tuple[Clip, ...]) -> None:
+def test_the_robustness_set_follows_its_rule(dances: tuple[Clip, ...], robustness: ModuleType) -> None:
     settings = Settings.at(30.0)
-    switches = robustness_set(dances, settings)
+    switches = robustness.robustness_set(dances, settings)
     assert len(switches) == 15
     usable = [clip.frames - 90 + 1 for clip in dances]
     starts = np.concatenate([[0], np.cumsum(usable)])
@@ -58,39 +68,45 @@ def test_the_robustness_set_follows_its_rule(dances: tuple[Clip, ...]) -> None:
     for switch in switches:
         assert switch.destination == (switch.source + 1) % 3
         assert 0 <= (switch.alignment.destination_frame or 0) < usable[switch.destination]
-    assert robustness_set(dances, settings) == switches
+    assert robustness.robustness_set(dances, settings) == switches
     with pytest.raises(TransitionError, match="at least two clips of 90 frames or more"):
-        robustness_set((dances[0], trim(dances[1], 0, 80)), settings)
+        robustness.robustness_set((dances[0], trim(dances[1], 0, 80)), settings)
 
 
-def test_the_parts_of_a_cost_add_up_to_the_table(dances: tuple[Clip, ...], tmp_path: Path) -> None:
+def test_the_parts_of_a_cost_add_up_to_the_table(
+    dances: tuple[Clip, ...], tmp_path: Path, robustness: ModuleType
+) -> None:
     distance = PointCloudDistance()
-    switches = robustness_set(dances, Settings.at(30.0), 6)
+    switches = robustness.robustness_set(dances, Settings.at(30.0), 6)
     problem = Problem(dances, switches, Settings.at(30.0), weight_in_counts(3e-4, distance), distance)
     table = build_table(problem)
-    costs = [costs_of(problem, table, number, switch.first_trigger) for number, switch in enumerate(switches)]
+    costs = [
+        robustness.costs_of(problem, table, number, switch.first_trigger) for number, switch in enumerate(switches)
+    ]
     for number, parts in enumerate(costs):
         assert parts.total == pytest.approx(table.costs[number], abs=3 * distance.unit)
         assert parts.direct == pytest.approx(table.direct_costs[number], abs=2 * distance.unit)
         assert parts.total <= parts.direct + 3 * distance.unit
-    draw_costs(costs, tmp_path / "costs.png")
+    robustness.draw_costs(costs, tmp_path / "costs.png")
     picture = imread(tmp_path / "costs.png")
     blue = np.all(np.abs(picture[..., :3] - np.array([0.0, 0x62 / 255, 0xA8 / 255])) < 0.01, axis=-1)
     assert blue.sum() > 100
 
 
-def test_bars_are_as_high_as_their_costs(tmp_path: Path) -> None:
-    draw_costs([Costs(0.0, 0.0, 0.0, 0.4), Costs(0.0, 0.0, 0.0, 0.2)], tmp_path / "costs.png")
+def test_bars_are_as_high_as_their_costs(tmp_path: Path, robustness: ModuleType) -> None:
+    robustness.draw_costs(
+        [robustness.Costs(0.0, 0.0, 0.0, 0.4), robustness.Costs(0.0, 0.0, 0.0, 0.2)], tmp_path / "costs.png"
+    )
     dark = np.all(np.abs(imread(tmp_path / "costs.png")[..., :3] - 0x44 / 255) < 0.01, axis=-1)
     heights = dark[80:].sum(axis=0)  # below the legend
     bars = np.flatnonzero(heights > 40)
     assert heights[bars[3]] == pytest.approx(2 * heights[bars[-4]], abs=3)
 
 
-def test_a_colour_map_has_its_marks(dances: tuple[Clip, ...], tmp_path: Path) -> None:
+def test_a_colour_map_has_its_marks(dances: tuple[Clip, ...], tmp_path: Path, robustness: ModuleType) -> None:
     distances = window_distances(point_cloud(dances[0]), point_cloud(dances[1]), 15)
-    draw_distances(distances, tmp_path / "plain.png", fps=30.0)
-    draw_distances(distances, tmp_path / "marked.png", fps=30.0, marks=[(20, 100)])
+    robustness.draw_distances(distances, tmp_path / "plain.png", fps=30.0)
+    robustness.draw_distances(distances, tmp_path / "marked.png", fps=30.0, marks=[(20, 100)])
     plain, marked = imread(tmp_path / "plain.png"), imread(tmp_path / "marked.png")
     changed = np.argwhere(np.any(plain != marked, axis=-1))
     assert 20 < len(changed) < 500

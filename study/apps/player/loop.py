@@ -2,7 +2,7 @@
 
 A window, a protocol, a plan's session and a store come in; what the participant did goes to the store, each answer
 before the next step. Which step comes next is the session's business alone, so that window, browser and simulation
-show the same trials. The window is an argument: `scripted.ScriptedWindow` takes its place in tests, clock included.
+show the same trials. The window is an argument: a scripted one takes its place in tests, clock included.
 
 Reaction times run from the first flip of the last frame of the last stimulus. While a question stands the player
 sleeps until something happens, so a key is timed when it arrives, not at the next flip.

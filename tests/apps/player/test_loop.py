@@ -7,12 +7,12 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from scripted import Act, ScriptedWindow, click, press
 
 from renderer.events import CloseAsked, Focus, Key, Resized, Typed
 from study.apps.player.lettering import default_font
 from study.apps.player.loop import Outcome, play
 from study.apps.player.pages import Look
-from study.apps.player.scripted import Act, ScriptedWindow, click, press
 from study.errors import SessionError
 from study.experiment.session import open_session
 

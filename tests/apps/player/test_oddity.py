@@ -5,10 +5,11 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+from scripted import ScriptedWindow, press
+
 from study.apps.player.lettering import default_font
 from study.apps.player.loop import play
 from study.apps.player.pages import Look
-from study.apps.player.scripted import ScriptedWindow, press
 from study.experiment.session import open_session
 from study.experiment.store.answers import Presentation
 

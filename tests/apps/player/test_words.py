@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 from greek import GREEK, latin
+from scripted import ScriptedWindow
 
 from renderer.events import Key, Typed
 from study.apps.player import desk, loop
 from study.apps.player.lettering import default_font
 from study.apps.player.pages import Look, Page
-from study.apps.player.scripted import ScriptedWindow
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
 from study.experiment.session import open_session
