@@ -45,8 +45,7 @@ def presentation_table(presentations: pd.DataFrame) -> tables.Table:
         "presentation",
         "How stimuli were shown. Presentations by what timed them; how many were display failures (a gap of more than "
         f"{LONGEST_GAP_FRAMES:g} frames, a frame missing, or hidden) and how many showed a trial again; frames that "
-        "were not shown; and the longest "
-        "time between two frames, in frames (1 is perfect).",
+        "were not shown; and the longest time between two frames, in frames (1 is perfect).",
         "timed_by shown badly again frames_lost frames_lost_percent median_gap longest_gap",
         rows,
     )
@@ -79,8 +78,7 @@ def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> st
         add_mark(figure, mark)
         over = int((gaps > LONGEST_GAP_FRAMES).sum())
         spoken = (
-            f"{counted(len(gaps), 'presentation')}, median {np.median(gaps):.2f} frames, longest "
-            f"{gaps.max():.2f}; "
+            f"{counted(len(gaps), 'presentation')}, median {np.median(gaps):.2f} frames, longest {gaps.max():.2f}; "
             f"{over} over {LONGEST_GAP_FRAMES:g} frames"
         )
         return to_svg(figure, name, "Longest gap between frames of each presentation", spoken)
@@ -111,8 +109,7 @@ def quality_sentence(quality: Quality) -> str:
         text += f" {counted(quality.shown_badly, 'answer')} followed a stimulus that stalled or was hidden."
     return text + (
         f" {counted(quality.flagged, 'participant')} {noun(quality.flagged, 'is', 'are')} flagged, which excludes no "
-        "one, for one of these reasons:  "
-        f"{'; '.join(quality.rules)}."
+        f"one, for one of these reasons: {'; '.join(quality.rules)}."
     )
 
 
@@ -193,8 +190,7 @@ def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Tabl
         "Participants. Flags follow the rules above and exclude no one."
         + (" The last column says who was excluded, and why." if left_out else ""),
         "participant kind started trials answered missed median_response_s too_fast shown_badly false_alarms "
-        "same_pairs "
-        "flags left_out",
+        "same_pairs flags left_out",
         rows,
         files_only=" ".join(keys for keys, hide in hidden.items() if hide),
     )

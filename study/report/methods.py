@@ -89,8 +89,7 @@ def _design(protocol: Protocol, analysis: Analysis, who: str) -> str:
     return (
         f"{words.sentence(who)} took part in one session of {studies}. "
         f"{' '.join(_study(protocol, study) for study in protocol.studies)} The order of trials was drawn separately "
-        "for every participant (seed "
-        f"{protocol.seed}); a participant was asked {counted(round(each), 'question')} "
+        f"for every participant (seed {protocol.seed}); a participant was asked {counted(round(each), 'question')} "
         "on average."
     )
 

@@ -88,8 +88,7 @@ def power_sentence(found: FoundPower) -> str:
     )
     note = f" ({found.note})" if found.note else ""
     return (
-        f"{words.sentence(words.readable(found.study))}: to {found.aim} in {100 * found.target:g}% of "
-        "studies, "
+        f"{words.sentence(words.readable(found.study))}: to {found.aim} in {100 * found.target:g}% of studies, "
         f"with {counted(found.answers_per_participant, 'answer')} of each participant, {who}{note}."
     )
 

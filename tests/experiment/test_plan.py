@@ -73,12 +73,10 @@ def test_another_process_draws_the_same_plan(
 ) -> None:
     """Nothing hangs on hash randomisation, on the clock or on anything else outside seed and name."""
     code = (
-        "import sys; sys.path.insert(0, 'tests/experiment');"
-        "import toys as c;"
+        "import sys; sys.path.insert(0, 'tests/experiment');import toys as c;"
         "from study.experiment.plan import draw_plan;"
         "from study.experiment.protocol.whole import find_protocol, load_protocol;"
-        "p = load_protocol(find_protocol('blend_length_jnd'));"
-        "print(draw_plan(p, c.pairs_of(p), 'p07').to_json())"
+        "p = load_protocol(find_protocol('blend_length_jnd'));print(draw_plan(p, c.pairs_of(p), 'p07').to_json())"
     )
     run = subprocess.run([sys.executable, "-c", code], cwd=repository, capture_output=True, text=True, check=True)
     plan = draw_plan(jnd_protocol, make_stimuli(jnd_protocol).pairs, "p07")

@@ -159,8 +159,7 @@ def test_a_frame_in_the_window_is_the_one_of_the_offscreen_renderer(
         "apart = [np.abs(a - b).max(axis=2) for a, b in zip(inside, want)]\n"
         "ground = np.array(figure.background)\n"
         "print(max(one.max() for one in apart), max((one > 0).mean() for one in apart),"
-        " (want[4] != ground).any(axis=2).mean(),"
-        " np.abs(want[4][-8:, :30].astype(int) - want[0][-8:, :30]).max())\n"
+        " (want[4] != ground).any(axis=2).mean(), np.abs(want[4][-8:, :30].astype(int) - want[0][-8:, :30]).max())\n"
         "print(all((one[:15] == ground).all() and (one[:, :20] == ground).all() for one in got))\n",
         virtual_display,
     )

@@ -64,8 +64,7 @@ def test_the_worse_method_is_not_called_better() -> None:
     (headline,) = shown(result, About("cuts", "Cuts")).headlines
     assert headline.statement == (
         "Cut-lee2002 was rated 0.70 points higher than cut-wang2003 on average, on a scale of 0 to 4; across "
-        "participants "
-        "this is significant (p = .015)."
+        "participants this is significant (p = .015)."
     )
 
 

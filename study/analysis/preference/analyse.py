@@ -176,8 +176,7 @@ def _order_in_words(method_a: str, method_b: str, order: OrderEffect, alpha: flo
     place = "first" if order.first_percent else "second"
     return (
         f"Each of {counted(order.answers, 'answer')} favoured the one shown {place}: the order of presentation "
-        "decided, which says nothing about  "
-        f"{method_a} and {method_b}."
+        f"decided, which says nothing about {method_a} and {method_b}."
     )
 
 

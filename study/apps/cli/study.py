@@ -241,8 +241,7 @@ def demo(out: Path | None, workers: int | None, participants: int, as_json: bool
         f"{counted(rendered['videos'], 'stimulus video')} ({counted(rendered['frames'], 'frame')}) in "
         f"{folder / 'stimuli'}",
         f"{counted(simulated['answers'] + simulated['found'], 'answer')} of "
-        f"{counted(participants, 'simulated participant')} "
-        f"in {folder / 'responses.sqlite'}",
+        f"{counted(participants, 'simulated participant')} in {folder / 'responses.sqlite'}",
         *analysis.sentences(),
         f"The report: {page.resolve()}",
     ]

@@ -213,8 +213,7 @@ def _methods(found: Collection[PairRatings], analysis: Analysis) -> str:
     del found, analysis
     return (
         "The sign of comparisons on a scale was reversed where the order was reversed, so that scores compare the "
-        "comparison with the reference; each participant’s mean score "
-        "was tested against the middle of the scale by "
+        "comparison with the reference; each participant’s mean score was tested against the middle of the scale by "
         "Student’s t and Wilcoxon’s signed ranks, and between the orders by analysis of variance."
     )
 

@@ -137,8 +137,7 @@ def _notes(comparison: Comparison) -> list[str]:
         notes.append(
             f"Answers of one participant correlate by {correlation}: the pooled test counts "
             f"{counted(comparison.published.answers, 'answer')} as informative as "
-            f"{clusters.effective_answers or 0:.0f} "
-            f"independent ones (design effect {clusters.design_effect:.2f})."
+            f"{clusters.effective_answers or 0:.0f} independent ones (design effect {clusters.design_effect:.2f})."
         )
     if order.first_percent is not None:
         test = f", {words.p(order.p_value)} over participants" if order.p_value is not None else ""

@@ -96,8 +96,7 @@ def _of_one(question: Question, difference: MethodDifference, points: int, alpha
         statement = f"{words.sentence(first)} and {second} had equal mean ratings, on a scale of 0 to {points - 1}"
     else:
         statement = (
-            f"{words.sentence(first)} was rated {abs(mean):.2f} points higher than {second} on "
-            "average, on "
+            f"{words.sentence(first)} was rated {abs(mean):.2f} points higher than {second} on average, on "
             f"a scale of 0 to {points - 1}"
         )
     if difference.p_value is not None:
@@ -240,8 +239,7 @@ def difference_table(name: str, questions: Sequence[Question]) -> Table:
     return tables.make(
         f"{name}_differences",
         "Corrected: difference between each participant’s ratings of two methods. Mean, 95% interval, and t test (the "
-        "exact sign test if all differences are equal)"
-        "; p-values of several pairs adjusted by Holm’s method.",
+        "exact sign test if all differences are equal); p-values of several pairs adjusted by Holm’s method.",
         "item of mean low high t degrees_of_freedom p_value holm_p_value",
         _by_question(questions, lambda question: question.differences),
     )

@@ -81,13 +81,11 @@ def threshold_table(name: str, result: SameDifferent, fps: float) -> Table:
         f"The just noticeable difference, as published and corrected. Linear interpolation: where {percent} of the "
         "answers "
         "are “different”, interpolated between the levels; this depends on the false-alarm rate and is biased for a "
-        "curved function. "
-        f"Model: the same {percent} on the fitted curve. Best criterion: the difference at which an "
+        f"curved function. Model: the same {percent} on the fitted curve. Best criterion: the difference at which an "
         f"observer with the best criterion would be right in {percent} of same and different pairs, whatever "
         "criterion the participants used"
         ". Abbott: corrected for false alarms as guesses. Mixed model: participants with individual sensitivities and "
-        "criteria: the median one, and the mean of all. "
-        "Fieller’s and the "
+        "criteria: the median one, and the mean of all. Fieller’s and the "
         "jackknife’s intervals are over participants, the curvature’s rest on the mixed model; profile likelihood "
         "treats all answers as independent and is too narrow if participants differ"
         ". A dash: the interval reaches beyond the levels shown.",
@@ -120,8 +118,7 @@ def percent_table(name: str, result: SameDifferent) -> Table:
     return make(
         f"{name}_percent_different",
         "Answers “different” by difference in blend length. Mean and standard error over participants; Wilson’s "
-        "interval with answers treated as independent"
-        ".",
+        "interval with answers treated as independent.",
         "difference_frames participants answers different percent standard_error:one low:one high:one",
         [vars(row) for row in result.percent_different],
     )
@@ -179,8 +176,7 @@ def recovery_table(name: str, result: SameDifferent, known: Mapping[str, Any]) -
     return make(
         f"{name}_recovery",
         "What the simulated observers had and what was found, in frames. For linear interpolation the known value is "
-        "where "
-        "they would cross with endless data; for staircases it is where the observers reach what these aim at.",
+        "the crossing with infinite data; for staircases it is where the observers reach their target.",
         "estimate side known found standard_error distance standard_errors",
         rows,
     )
