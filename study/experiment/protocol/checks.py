@@ -7,67 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import Protocol as Shape
 
 from pydantic import ValidationError
 
 from study.counting import counted
+from study.experiment.protocol.content import Content
 from study.experiment.protocol.errors import KeyMismatchError, short
-from study.experiment.protocol.methods import OwnMethod
-from study.experiment.protocol.stimuli import Points, Timing, TransitionSpec
-from study.experiment.protocol.studies import AnalysisSettings, StudySpec, check_once, repeated
+from study.experiment.protocol.stimuli import TransitionSpec
+from study.experiment.protocol.studies import StudySpec, check_once, repeated
 from study.experiment.protocol.texts import LONGEST_NAME
 from study.tasks.registry import task_of
-from study.transitions.methods.method import Method
 
 MOST_TRIALS = 100_000
 """Of one participant in one study: far beyond what anybody could answer."""
 
 
-class Whole(Shape):
-    """What is looked at of a protocol (`protocol.Protocol`, which imports this module)."""
-
-    @property
-    def transitions(self) -> tuple[TransitionSpec, ...]:
-        """All transitions."""
-
-    @property
-    def studies(self) -> tuple[StudySpec, ...]:
-        """All studies."""
-
-    @property
-    def timing(self) -> Timing:
-        """Times of a trial."""
-
-    @property
-    def analysis(self) -> AnalysisSettings:
-        """Decisions about the analysis."""
-
-    @property
-    def methods(self) -> tuple[OwnMethod, ...]:
-        """The protocol's own methods."""
-
-    @property
-    def method_names(self) -> tuple[str, ...]:
-        """The methods that studies can name."""
-
-    def methods_of(self, study: StudySpec) -> dict[str, Method]:
-        """The methods of a study."""
-
-    def transitions_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
-        """The transitions of a study's trials."""
-
-    def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
-        """The transitions of its practice alone."""
-
-    def trials_of(self, study: StudySpec) -> int:
-        """How many trials it has."""
-
-    def points_for(self, study: StudySpec, transition: TransitionSpec) -> Points:
-        """The conditions for one transition in it."""
-
-
-def check_whole(protocol: Whole) -> None:
+def check_whole(protocol: Content) -> None:
     """Refuse a protocol whose parts contradict each other."""
     _check_names(protocol)
     places = {transition.name: index for index, transition in enumerate(protocol.transitions)}
@@ -77,7 +32,7 @@ def check_whole(protocol: Whole) -> None:
     _check_analysis(protocol)
 
 
-def _check_names(protocol: Whole) -> None:
+def _check_names(protocol: Content) -> None:
     """Refuse duplicate names, and studies that name unknown transitions."""
     for kind in ("transitions", "methods", "studies", "form"):
         names = [part.name for part in getattr(protocol, kind)]
@@ -97,7 +52,7 @@ def _check_names(protocol: Whole) -> None:
         _check_lengths(protocol, study, index)
 
 
-def _check_methods(protocol: Whole, study: StudySpec, index: int) -> None:
+def _check_methods(protocol: Content, study: StudySpec, index: int) -> None:
     """Refuse unknown methods, methods that do not suit the task, and pairs that cannot be compared."""
     where, who = ("studies", index), f"the {study.task} study {study.name!r}"
     for key in ("reference", "comparison"):
@@ -132,7 +87,7 @@ def _check_known(names: Sequence[str], known: Sequence[str], what: str, *locatio
         raise KeyMismatchError(f"expected names of {what}, found {short(name)}; {hint}", *location)
 
 
-def _check_analysis(protocol: Whole) -> None:
+def _check_analysis(protocol: Content) -> None:
     """Refuse decisions about the analysis that the studies can't carry out."""
     preferences = [study.name for study in protocol.studies if task_of(study).tested]
     names = protocol.analysis.confirmatory
@@ -155,7 +110,7 @@ def _check_analysis(protocol: Whole) -> None:
         )
 
 
-def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
+def _check_lengths(protocol: Content, study: StudySpec, index: int) -> None:
     """Refuse more practice, or more attention checks, than a study has trials."""
     trials = protocol.trials_of(study)
     if trials > MOST_TRIALS:
@@ -175,7 +130,7 @@ def _check_lengths(protocol: Whole, study: StudySpec, index: int) -> None:
             )
 
 
-def _check_practice(protocol: Whole, study: StudySpec, index: int) -> None:
+def _check_practice(protocol: Content, study: StudySpec, index: int) -> None:
     """Refuse practice with the transitions of the study, and practice transitions without practice trials."""
     where = ("studies", index, "practice_transitions")
     if study.practice_transitions and not study.practice:
@@ -190,7 +145,7 @@ def _check_practice(protocol: Whole, study: StudySpec, index: int) -> None:
             )
 
 
-def _check_points(protocol: Whole, study: StudySpec, transition: TransitionSpec, index: int) -> None:
+def _check_points(protocol: Content, study: StudySpec, transition: TransitionSpec, index: int) -> None:
     """Refuse merged conditions that leave nothing to choose."""
     where = ("transitions", index)
     who = f"for the transition {transition.name!r} in the study {study.name!r}"

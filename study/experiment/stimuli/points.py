@@ -16,7 +16,8 @@ import numpy as np
 from study.counting import counted, noun
 from study.errors import MotionError, StimulusError, TransitionError
 from study.experiment.chance import generator
-from study.experiment.protocol.whole import Points, Protocol, StudySpec, TransitionSpec
+from study.experiment.protocol.stimuli import Points, TransitionSpec
+from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.supply import Needs, Supply, supply
 from study.motion.clip import retarget
 from study.transitions.methods.method import CANDIDATES, Method, Room
