@@ -46,14 +46,15 @@ def _by_sixths(study: str, course: Course, part: pd.DataFrame) -> list[dict[str,
     if most.max() < PARTS:
         return []
     sixth = np.ceil(place / most * PARTS).loc[given.index]
-    counts = course.counts(given).astype(float)
+    what, counts_of = course
+    counts = counts_of(given).astype(float)
     shares = counts.groupby([given["participant"].astype(str), sixth]).mean().unstack()
     sizes = counts.groupby(sixth).size()
     rows = []
     for number in shares.columns:
         column = shares[number].dropna()
         error = 100 * float(column.std(ddof=1)) / len(column) ** 0.5 if len(column) > 1 else None
-        row = {"study": study, "part": int(number), "what": course.what, "percent": 100 * float(column.mean())}
+        row = {"study": study, "part": int(number), "what": what, "percent": 100 * float(column.mean())}
         rows.append(row | {"standard_error": error, "answers": int(sizes[number])})
     return rows
 

@@ -12,8 +12,7 @@ import pytest
 
 from study.analysis.estimates import Interval
 from study.analysis.same_different.analyse import SameDifferent, analyse_jnd
-from study.analysis.same_different.counts import PercentDifferent, Side
-from study.analysis.same_different.threshold import Status, Threshold
+from study.analysis.same_different.counts import PercentDifferent, Side, Status, Threshold
 from study.report import words
 from study.report.media import _moments, strip_of_video
 from study.report.sections.same_different.section import headline

@@ -18,6 +18,7 @@ from study.analysis.same_different.counts import (
     Counts,
     PercentDifferent,
     Side,
+    Threshold,
     count_answers,
     percent_different,
     same_different_answers,
@@ -31,7 +32,6 @@ from study.analysis.same_different.motions import AcrossMotions, across_motions
 from study.analysis.same_different.order import OrderShare, OrderTest, order_test, shares_by_order
 from study.analysis.same_different.profiles import profile_intervals
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
-from study.analysis.same_different.threshold import Threshold
 
 if TYPE_CHECKING:
     import pandas as pd

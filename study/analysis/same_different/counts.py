@@ -1,4 +1,4 @@
-"""Answers of a same-different task counted by participant and difference, and the percentages of 2004 Figure 6."""
+"""Answers of a same-different task counted by participant and difference, percentages, and what a threshold is."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 Side = Literal["shorter", "longer"]
 SIDES: tuple[Side, Side] = ("shorter", "longer")
+Status = Literal["reached", "not reached", "above", "not estimable"]
+
+FEWEST_FOR_INTERVAL = 2
 
 NEEDED_COLUMNS = ("participant", "difference_frames", "answer")
 
@@ -40,6 +43,38 @@ class Counts:
     differences: FloatArray
     different: FloatArray
     shown: FloatArray
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """A threshold on one side.
+
+    Attributes
+    ----------
+    side
+        "shorter" or "longer" than the reference.
+    frames
+        Size of the difference, always positive; None unless `status` is "reached".
+    standard_error
+        Frames.
+    interval
+        Frames; an open end lies outside the levels shown, or can't be determined.
+    status
+        "reached"; "not reached" within the levels shown; "above": the curve is above the level at the smallest
+        difference shown; "not estimable".
+    method
+        How it was found, and what its interval rests on.
+    note
+        In words, where the status is not "reached" or the estimate needs a caution.
+    """
+
+    side: Side
+    frames: float | None
+    standard_error: float | None
+    interval: estimates.Interval
+    status: Status
+    method: str
+    note: str = ""
 
 
 @dataclass(frozen=True)

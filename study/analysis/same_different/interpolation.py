@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.same_different.counts import SIDES, Counts, Side, percentages
-from study.analysis.same_different.threshold import FEWEST_FOR_INTERVAL, Threshold
+from study.analysis.same_different.counts import FEWEST_FOR_INTERVAL, SIDES, Counts, Side, Threshold, percentages
 
 FloatArray = NDArray[np.float64]
 

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.same_different import fits
-from study.analysis.same_different.counts import SIDES, Counts, Side, frames_by_side
+from study.analysis.same_different.counts import SIDES, Counts, Side, Threshold, frames_by_side
 from study.analysis.same_different.model import why_no_fit
-from study.analysis.same_different.threshold import Threshold
 from study.counting import counted
 from study.models.differencing import ROOT_TWO, density, detected
 

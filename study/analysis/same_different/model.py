@@ -15,8 +15,15 @@ from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.same_different import fits
-from study.analysis.same_different.counts import SIDES, Counts, Side, both_sides, frames_by_side
-from study.analysis.same_different.threshold import FEWEST_FOR_INTERVAL, Threshold
+from study.analysis.same_different.counts import (
+    FEWEST_FOR_INTERVAL,
+    SIDES,
+    Counts,
+    Side,
+    Threshold,
+    both_sides,
+    frames_by_side,
+)
 from study.models.differencing import KINDS, Kind, probability_different
 
 FloatArray = NDArray[np.float64]

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
-from study.analysis.same_different.counts import Side
-from study.analysis.same_different.threshold import Threshold
+from study.analysis.same_different.counts import Side, Threshold
 from study.counting import counted
 from study.models.up_down import Track, UpDown, moved, target
 

@@ -121,12 +121,8 @@ class About:
 Result = TypeVar("Result")
 
 
-@dataclass(frozen=True)
-class Course:
-    """What the course of a study is told by: a percentage in words, and which answers count towards it."""
-
-    what: str
-    counts: Callable[[pd.DataFrame], pd.Series[bool]]
+Course = tuple[str, Callable[["pd.DataFrame"], "pd.Series[bool]"]]
+"""What the course of a study is told by: a percentage in words, and which answers count towards it."""
 
 
 @dataclass(frozen=True)

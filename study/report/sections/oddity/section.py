@@ -11,7 +11,7 @@ from study.models.oddity import CHANCE, HALFWAY
 from study.report import tables, words
 from study.report.drawing import BLUE, INK, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
 from study.report.references import MACMILLAN_2005
-from study.report.sections.section import About, Course, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.tables import Table
 
 if TYPE_CHECKING:
@@ -142,4 +142,4 @@ def _right(given: pd.DataFrame) -> pd.Series[bool]:
     return given["correct"].astype(bool)
 
 
-KIND = SectionKind(oddity_section, _main_results, _methods, lambda _: {MACMILLAN_2005}, Course("right answers", _right))
+KIND = SectionKind(oddity_section, _main_results, _methods, lambda _: {MACMILLAN_2005}, ("right answers", _right))

@@ -26,7 +26,7 @@ from study.report.references import (
     WILSON_1927,
 )
 from study.report.sections.preference.figures import preference_figure
-from study.report.sections.section import About, Course, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.tables import Table
 
 if TYPE_CHECKING:
@@ -372,5 +372,5 @@ KIND = SectionKind(
     _main_results,
     _methods,
     _references,
-    Course("answers for the first", lambda given: given["answer"] == "first"),
+    ("answers for the first", lambda given: given["answer"] == "first"),
 )

@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
-from study.analysis.same_different.counts import PercentDifferent, Side
-from study.analysis.same_different.threshold import Threshold
+from study.analysis.same_different.counts import PercentDifferent, Side, Threshold
 from study.report.drawing import (
     BLUE,
     FAINT,

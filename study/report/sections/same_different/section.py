@@ -10,12 +10,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from study.analysis.same_different.analyse import SameDifferent
-from study.analysis.same_different.counts import Side
+from study.analysis.same_different.counts import Side, Threshold
 from study.analysis.same_different.mixed import MixedThresholds
 from study.analysis.same_different.model import EqualSlopes, ModelFit
 from study.analysis.same_different.motions import AcrossMotions
 from study.analysis.same_different.staircases import Staircases
-from study.analysis.same_different.threshold import Threshold
 from study.counting import counted
 from study.report import words
 from study.report.references import FIELLER_1954, MACMILLAN_2005, WILSON_1927
@@ -29,7 +28,7 @@ from study.report.sections.same_different.tables import (
     staircase_table,
     threshold_table,
 )
-from study.report.sections.section import About, Course, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.transitions.methods.method import WANG_2004
 
 if TYPE_CHECKING:
@@ -315,5 +314,5 @@ KIND = SectionKind(
     _main_results,
     _methods,
     lambda _: {WANG_2004, FIELLER_1954, MACMILLAN_2005, WILSON_1927},
-    Course("right answers", _right),
+    ("right answers", _right),
 )

@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
-from study.analysis.same_different.counts import Side
+from study.analysis.same_different.counts import Side, Threshold
 from study.analysis.same_different.staircases import Staircases
-from study.analysis.same_different.threshold import Threshold
 from study.report import words
 from study.report.tables import Table, make
 
@@ -28,17 +27,10 @@ def _threshold_rows(entry: SameDifferent | MotionThresholds, fps: float) -> list
     if isinstance(entry, SameDifferent) and (mixed := entry.mixed):
         kinds += [("mixed model, median observer", mixed.typical), ("mixed model, group", mixed.population)]
     return [
-        {
-            "estimate": label,
-            "interval": _interval_by(found),
-            "side": side,
-            "frames": found.frames,
-            "seconds": found.frames / fps if found.frames is not None else None,
-            "standard_error": found.standard_error,
-            "low": found.interval.low,
-            "high": found.interval.high,
-            "remark": found.note,
-        }
+        vars(found)
+        | {"estimate": label, "interval": _interval_by(found), "remark": found.note}
+        | {"seconds": found.frames / fps if found.frames is not None else None}
+        | {"low": found.interval.low, "high": found.interval.high}
         for label, thresholds in kinds
         for side, _ in SIDES
         if (found := thresholds.get(side))
