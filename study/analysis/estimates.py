@@ -195,6 +195,12 @@ def mean_test(values: ArrayLike, expected: float = 0.5, confidence: float = 0.95
     return MeanTest(**vars(found), t=t, degrees_of_freedom=freedom, p_value=t_probability(t, freedom))
 
 
+def in_percent(test: MeanTest) -> MeanTest:
+    """Return the test of a share as one of a percentage."""
+    values = {name: getattr(test, name) for name in ("mean", "standard_error", "low", "high")}
+    return MeanTest(**vars(test) | {name: None if value is None else 100 * value for name, value in values.items()})
+
+
 def student_p_values(values: FloatArray, there: NDArray[np.bool_], expected: float) -> FloatArray:
     """Return the p-values of Student's t of many samples at once; NaN where a sample has no spread to judge by.
 

@@ -77,7 +77,7 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> MotionsAs
     if "motion" not in part.columns or part["motion"].nunique() < 2:
         return MotionsAsSample(None, None, "fewer than two motions: they can't represent other motions")
     shares = part.groupby(part["motion"].astype(str))["chose_a"].mean().to_numpy(dtype=np.float64)
-    test = estimates.mean_test(100 * shares, 50.0, confidence)
+    test = estimates.in_percent(estimates.mean_test(shares, 0.5, confidence))
     by_motion = ByMotion(
         motions=test.participants,
         mean_percent=100 * float(shares.mean()),

@@ -77,7 +77,7 @@ def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0
     """
     yes, total = np.asarray(chosen, dtype=np.float64), np.asarray(shown, dtype=np.float64)
     share = yes[total > 0] / total[total > 0]
-    test = estimates.mean_test(100 * share, 50.0, confidence)
+    test = estimates.in_percent(estimates.mean_test(share, 0.5, confidence))
     p_value = float(default_p_values(yes, total)) if test.participants > 1 else None
     robust, by_ranks = _robust_chi_square(yes, total), signed_rank(share - 0.5)
     return ParticipantTests(

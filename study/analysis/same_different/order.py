@@ -76,7 +76,7 @@ def order_test(given: pd.DataFrame) -> OrderTest:
     keys = [known["participant"].astype(str), known["difference_frames"], first]
     shares = different.groupby(keys).mean().unstack().dropna()
     gaps = (shares[True] - shares[False]).groupby(level=0).mean().to_numpy(dtype=np.float64)
-    test = estimates.mean_test(100 * gaps, 0.0)
+    test = estimates.in_percent(estimates.mean_test(gaps, 0.0))
     found = OrderTest(
         difference_percent=test.mean,
         low=test.low,
