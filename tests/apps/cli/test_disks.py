@@ -22,7 +22,7 @@ from study.experiment.store.databases import try_to_write
 from study.experiment.store.responses import open_responses
 from study.files import write_whole
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 # What each verb writes, below the folder OUT; STUDY is a finished study elsewhere.
 WRITES = {

@@ -104,7 +104,7 @@ class Running:
         self.start()
 
     def start(self) -> None:
-        here = Path(__file__).parent
+        here = Path(__file__).parents[1]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(here), str(here.parents[1])))}
         command = [sys.executable, str(here / "server_child.py"), str(self.folder), str(self.port), self.database]
         self.child = subprocess.Popen(command, env=environment)

@@ -12,7 +12,7 @@ from study.errors import ProtocolError
 from study.experiment.protocol.whole import Protocol, find_protocol, load_protocol, parse_protocol, protocols_folder
 from study.tasks.registry import task_of
 
-GOOD = Path(__file__).parents[2].joinpath("protocols", "demo.toml").read_text()
+GOOD = Path(__file__).parents[3].joinpath("protocols", "demo.toml").read_text()
 
 
 def refused(old: str, new: str, base: str = GOOD) -> str:

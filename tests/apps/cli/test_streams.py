@@ -13,7 +13,7 @@ from study.apps.cli import run
 from study.apps.cli.group import VERBS
 from study.motion.readers.other_formats import by_beginning
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SEGUE = [sys.executable, "-m", "study.apps.cli"]
 
 PRINTS = """

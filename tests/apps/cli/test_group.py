@@ -13,7 +13,7 @@ from study import __version__
 from study.apps.cli import run
 from study.apps.cli.group import VERBS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def ask(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, object]:

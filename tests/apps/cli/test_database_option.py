@@ -19,7 +19,7 @@ from study.apps.cli import run
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import find_session
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from study.errors import SessionError
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import find_session
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 # What `segue serve` does once the films are there; the command line takes Ctrl-C for an end, too.
 SERVE = """

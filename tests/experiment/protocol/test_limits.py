@@ -13,7 +13,7 @@ from study.experiment.protocol.proofreading import to_do
 from study.experiment.protocol.whole import Protocol, load_protocol, parse_protocol
 from study.experiment.wording import all_texts
 
-GOOD = Path(__file__).parents[2].joinpath("protocols", "demo.toml").read_text()
+GOOD = Path(__file__).parents[3].joinpath("protocols", "demo.toml").read_text()
 SECONDS = 4.0  # many times what it takes, as other tests run beside this one
 
 
