@@ -330,8 +330,8 @@ def test_an_order_that_decided_everything_is_said(fitted: Fitted, place: str) ->
     rows = [f"p{person},{pair},{place}" for person in range(8) for pair in ("A,B", "B,A")]
     found = fitted("who,l,r,c\n" + "\n".join(rows), *PREFERRED)
     assert found["answer"] == (
-        f"Each of 16 answers favoured the one shown {place}: the order of presentation decided, and nothing can be "
-        "said about A and B."
+        f"Each of 16 answers favoured the one shown {place}: the order of presentation decided, which says "
+        "nothing about A and B."
     )
     assert found["preference"]["preference"][0]["order"]["p_value"] == pytest.approx(2 * 0.5**8)
 
