@@ -1,6 +1,6 @@
 """How long `segue report` takes: `python benchmarks/report.py [--runs 7] [--participants 35] [--keep FOLDER]`.
 
-The whole sitting of 2004 is rendered and answered by simulated participants once, into a temporary folder (or one that
+The whole session of 2004 is rendered and answered by simulated participants once, into a temporary folder (or one that
 is kept, and used again). Then `segue report` runs as a process of its own, several times, in turn with one that only
 imports what the report needs: no report can be faster than that. Printed are medians of wall and of processor time,
 and the size of the page.

@@ -1,6 +1,6 @@
 """Random walks through sessions: every path ends, loses no answer, and goes on after a kill as if there had been none.
 
-Participants miss, films stall, programs are killed at any step, in a sitting with everything in it.
+Participants miss, films stall, programs are killed at any step, in a session with everything in it.
 """
 
 from __future__ import annotations

@@ -233,7 +233,7 @@ def test_instructions_that_speak_of_another_answer_window_are_noticed(
     assert bool(notes) == said
 
 
-def test_a_sitting_lasts_as_long_as_its_parts(toy_protocol: Protocol) -> None:
+def test_a_session_lasts_as_long_as_its_parts(toy_protocol: Protocol) -> None:
     """Eight pairs of 0.3 + 0.3 + 1 s films, a gap of one second, two to answer, one of pause; then reading."""
     reading = sum(len(text) for text in ("Welcome.", "Thank you.", "Some pairs are the same.")) / 15
     assert duration_s(toy_protocol) == pytest.approx(8 * (2 * 1.6 + 1 + 2 + 1) + reading)

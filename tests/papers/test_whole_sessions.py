@@ -1,4 +1,4 @@
-"""The whole sitting of 2004 (section 4) and the study of 2003 (section 4.2), on both libraries, end to end."""
+"""The whole session of 2004 (section 4) and the study of 2003 (section 4.2), on both libraries, end to end."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def published(name) -> Any:
     return load_protocol(find_protocol(name))
 
 
-def test_the_sitting_of_2004_is_as_printed() -> None:
+def test_the_session_of_2004_is_as_printed() -> None:
     """Sections 4.1 to 4.5: four studies in one session; the first three as their own protocols have them."""
     session = published("wang2004_session")
     one, two, three, four = session.studies
@@ -60,7 +60,7 @@ def test_the_sitting_of_2004_is_as_printed() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("library", LIBRARIES, indirect=True)
-def test_the_sitting_of_2004_has_42_and_three_times_8_pairs(library: str, tmp_path: Path) -> None:
+def test_the_session_of_2004_has_42_and_three_times_8_pairs(library: str, tmp_path: Path) -> None:
     protocol = published("wang2004_session")
     assert check(protocol, library) == []
     prepared = prepare(protocol, library)

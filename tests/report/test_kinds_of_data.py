@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from sitting import Behaviour, attentive, missing, perfect, sit, stubborn, stuttering
+from walking_through import Behaviour, attentive, missing, perfect, sit, stubborn, stuttering
 
 from study.errors import AnalysisError
 from study.experiment.store.participants import erase

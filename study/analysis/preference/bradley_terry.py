@@ -181,6 +181,11 @@ def _fitted(
     told: NDArray[np.bool_],
     note: str,
 ) -> BradleyTerry:
+    """The strengths by maximum likelihood, with their covariance over participants where there are groups.
+
+    `design` has a row a comparison and a column a method but the one held at 0; `yes` of `total` answers favoured the
+    first. `told` says of each method whether the answers tell its strength.
+    """
     from scipy.special import expit, xlogy
 
     def share(point: FloatArray) -> FloatArray:

@@ -1,6 +1,6 @@
 """Hosting: the live sessions of a study, and every rule about them that is not HTTP.
 
-A results folder and settings come in; views for the page go out. All that counts is in the database: a sitting in
+A results folder and settings come in; views for the page go out. All that counts is in the database: a live in
 memory is only its answers taken up again, so a restart of the server loses nothing but who had which tab open.
 """
 
@@ -65,7 +65,7 @@ log = logging.getLogger("segue.serve")
 
 
 @dataclass
-class Sitting:
+class LiveSession:
     """One session in progress: its state, what was stored, and which tab shows it."""
 
     record: SessionRecord
@@ -100,7 +100,7 @@ class Host:
         self.places = people.Places(groups, settings.most_participants, settings.dropped_after)
         self.clock = people.steady_clock()
         self.guesses = Guesses()
-        self.sittings: dict[str, Sitting] = {}
+        self.live_sessions: dict[str, LiveSession] = {}
         self.recent: set[int] = set()
         self.questions: dict[int, int] = {}
         self._told_away = -math.inf
@@ -113,22 +113,22 @@ class Host:
 
     # Who it is
 
-    async def sitting(self, token: str) -> Sitting | None:
+    async def live_session(self, token: str) -> LiveSession | None:
         """The session of a token: the live one, or the one in the database; None for an unknown token."""
         key = people.hashed(token)
-        if key not in self.sittings:
+        if key not in self.live_sessions:
             participant = await asyncio.to_thread(people.find_by_token, self.responses, token)
             if participant is None:
                 return None
             found = await asyncio.to_thread(self._load, participant)
-            self.sittings.setdefault(key, found)
-        return self.sittings[key]
+            self.live_sessions.setdefault(key, found)
+        return self.live_sessions[key]
 
-    def live(self, token: str) -> Sitting | None:
-        """The sitting of a token, where it is in memory."""
-        return self.sittings.get(people.hashed(token))
+    def in_memory(self, token: str) -> LiveSession | None:
+        """The session of a token, where it is in memory."""
+        return self.live_sessions.get(people.hashed(token))
 
-    def _load(self, participant: Participant) -> Sitting:
+    def _load(self, participant: Participant) -> LiveSession:
         record = session_by_id(self.responses, participant.session_id)
         before = stored_answers(self.responses, record.id)
         happened = event_counts(self.responses, record)
@@ -136,38 +136,38 @@ class Host:
         state = views.to_view(open_session(self.protocol, record.plan, before, passed=happened, frames=frames))
         answers = {(a.trial, a.item, a.attempt): a for a in before}
         total, finished = sum(happened.values()), "finished" in happened
-        return Sitting(record, participant, state, answers, events=total, finished=finished)
+        return LiveSession(record, participant, state, answers, events=total, finished=finished)
 
     async def begin(self, token: str, message: Begin) -> tuple[dict[str, Any], str]:
         """A page was opened: the view that it shows, and the token that its cookie should hold."""
         kept = {name: value for name, value in message.parameters.items() if name in self.settings.parameters}
         parameters, unfilled = filled_in(kept, (*self.settings.identifying, VISIT))
-        sitting = await self.sitting(token) if token else None
-        if sitting is not None and self._is_another(sitting, parameters):
-            sitting = None
-        if sitting is None:
+        live = await self.live_session(token) if token else None
+        if live is not None and self._is_another(live, parameters):
+            live = None
+        if live is None:
             async with self._starting:
                 found, token = await self._admit(parameters)
             if isinstance(found, dict):
                 return found, ""
-            sitting = found
+            live = found
             if unfilled:
-                await self._page_event(sitting, "fault", {"what": "link not filled in", **unfilled})
-        async with sitting.lock:
-            if not self._take_tab(sitting, message.page, message.previous, message.force):
+                await self._page_event(live, "fault", {"what": "link not filled in", **unfilled})
+        async with live.lock:
+            if not self._take_tab(live, message.page, message.previous, message.force):
                 return {"kind": "elsewhere"}, token
-            if sitting.shown_trial is not None:
-                trial, attempt = sitting.shown_trial
-                await self._page_event(sitting, "interrupted", {"trial": trial, "attempt": attempt})
-            await self._page_event(sitting, "display", message.display.model_dump(mode="json"))
-            return {**await self._view(sitting), "session": views.session_name(sitting.participant)}, token
+            if live.shown_trial is not None:
+                trial, attempt = live.shown_trial
+                await self._page_event(live, "interrupted", {"trial": trial, "attempt": attempt})
+            await self._page_event(live, "display", message.display.model_dump(mode="json"))
+            return {**await self._view(live), "session": views.session_name(live.participant)}, token
 
-    def _is_another(self, sitting: Sitting, parameters: Mapping[str, str]) -> bool:
+    def _is_another(self, live: LiveSession, parameters: Mapping[str, str]) -> bool:
         """Whether the link names another person than the cookie, as on a computer that several use."""
-        stored = sitting.participant.parameters
+        stored = live.participant.parameters
         return any(parameters[name] != stored.get(name) for name in self.settings.identifying if parameters.get(name))
 
-    async def _admit(self, parameters: dict[str, str]) -> tuple[Sitting | dict[str, Any], str]:
+    async def _admit(self, parameters: dict[str, str]) -> tuple[LiveSession | dict[str, Any], str]:
         """A new participant, or one who returns with the identical link; or why not."""
         token = people.new_token()
         who = {name: parameters[name] for name in self.settings.identifying if name in parameters}
@@ -178,17 +178,17 @@ class Host:
                 return {"kind": "taken"}, ""
             self._forget(known.session_id)
             await asyncio.to_thread(people.give_token, self.responses, known, token)
-            sitting = await self.sitting(token)
-            assert sitting is not None  # its token was stored just now
-            return sitting, token
+            live = await self.live_session(token)
+            assert live is not None  # its token was stored just now
+            return live, token
         name = parameters.get("participant", "")
         name = name if NAME.fullmatch(name) else f"web-{secrets.token_hex(5)}"
         found = await asyncio.to_thread(self._arrive, people.Newcomer(name, token, parameters, who))
         if isinstance(found, str):
             return {"kind": found}, ""
-        sitting = await self.sitting(token)
-        assert sitting is not None  # it was stored just now
-        return sitting, token
+        live = await self.live_session(token)
+        assert live is not None  # it was stored just now
+        return live, token
 
     def _arrive(self, newcomer: people.Newcomer) -> Participant | str:
         return people.admit(
@@ -203,66 +203,66 @@ class Host:
         )
 
     def _forget(self, session_id: int) -> None:
-        self.sittings = {key: one for key, one in self.sittings.items() if one.record.id != session_id}
+        self.live_sessions = {key: one for key, one in self.live_sessions.items() if one.record.id != session_id}
 
     # Which tab it is
 
-    def _take_tab(self, sitting: Sitting, page: str, previous: str, force: bool) -> bool:
+    def _take_tab(self, live: LiveSession, page: str, previous: str, force: bool) -> bool:
         """Give the session to a tab, where no other one has it; a reloaded tab names the page that it was."""
         now = time.monotonic()
-        free = not sitting.page or now - sitting.page_seen > TAB_SECONDS or sitting.page in (page, previous)
+        free = not live.page or now - live.page_seen > TAB_SECONDS or live.page in (page, previous)
         if not (free or force):
             return False
-        sitting.page, sitting.page_seen = page, now
+        live.page, live.page_seen = page, now
         return True
 
-    def has_tab(self, sitting: Sitting, page: str) -> bool:
+    def has_tab(self, live: LiveSession, page: str) -> bool:
         """Whether a page is the one that shows this session; after a restart the first one to ask is."""
-        if not sitting.page:
-            sitting.page = page
-        if sitting.page != page:
+        if not live.page:
+            live.page = page
+        if live.page != page:
             return False
-        sitting.page_seen = time.monotonic()
-        self.recent.add(sitting.record.id)
+        live.page_seen = time.monotonic()
+        self.recent.add(live.record.id)
         return True
 
-    def leave(self, sitting: Sitting, page: str) -> None:
+    def leave(self, live: LiveSession, page: str) -> None:
         """A page was closed."""
-        if sitting.page == page:
-            sitting.page = ""
+        if live.page == page:
+            live.page = ""
 
     # What is done
 
-    async def done(self, sitting: Sitting, message: Done) -> dict[str, Any]:
+    async def done(self, live: LiveSession, message: Done) -> dict[str, Any]:
         """A page was read; sent twice, or late, it changes nothing."""
-        async with sitting.lock:
-            step = current(sitting.state)
+        async with live.lock:
+            step = current(live.state)
             read = step.kind in ("consent", "form", "instructions", "feedback", "break", "debrief")
-            if not read or message.step != views.step_key(sitting.state):
-                return await self._view(sitting)
+            if not read or message.step != views.step_key(live.state):
+                return await self._view(live)
             if step.kind == "consent" and message.declined:
-                await asyncio.to_thread(people.erase, self.responses, sitting.record.id)
-                self._forget(sitting.record.id)
+                await asyncio.to_thread(people.erase, self.responses, live.record.id)
+                self._forget(live.record.id)
                 return {"kind": "declined"}
             if step.kind == "form":
-                state, values = filled(sitting.state, message.values)
-                await asyncio.to_thread(record_form, self.responses, sitting.record, values)
+                state, values = filled(live.state, message.values)
+                await asyncio.to_thread(record_form, self.responses, live.record, values)
             else:
-                state = advanced(sitting.state)
+                state = advanced(live.state)
                 if step.kind in ("consent", "debrief"):
-                    await self._note(sitting, step.kind)
-            sitting.state = views.to_view(state)
-            return await self._view(sitting)
+                    await self._note(live, step.kind)
+            live.state = views.to_view(state)
+            return await self._view(live)
 
-    async def answer(self, sitting: Sitting, message: Answered) -> dict[str, Any]:
+    async def answer(self, live: LiveSession, message: Answered) -> dict[str, Any]:
         """An answer: committed when this returns. Sent twice it counts once; out of turn it is not counted."""
-        async with sitting.lock:
+        async with live.lock:
             key = (message.trial, message.item, message.attempt)
-            if key in sitting.answers:
-                return {**await self._view(sitting), "counted": self._is_stored(sitting, key, message)}
-            state = self._at_question(sitting.state, key)
+            if key in live.answers:
+                return {**await self._view(live), "counted": self._is_stored(live, key, message)}
+            state = self._at_question(live.state, key)
             if state is None:
-                return {**await self._view(sitting), "counted": False}
+                return {**await self._view(live), "counted": False}
             well = message.shown_well and all(shown.shown_well for shown in message.shown)
             step = current(state)
             late = step.duration_s is not None and (message.response_s or 0.0) > step.duration_s
@@ -273,27 +273,27 @@ class Host:
             else:
                 state, answer = answered(state, message.value, message.response_s, shown_well=well)
             at = datetime.now(UTC)
-            stimuli = sitting.state.trial(message.trial).stimuli
+            stimuli = live.state.trial(message.trial).stimuli
             shown = [presented(message, one, stimuli, self.frames) for one in message.shown]
             try:
-                await self.writer.put(answer_rows(sitting.record, state.trial(answer.trial), answer, shown, at))
+                await self.writer.put(answer_rows(live.record, state.trial(answer.trial), answer, shown, at))
             except sa.exc.IntegrityError:
                 # It is there: the database was lost before it could say so, or another server stored it.
-                await self._take_up(sitting)
-                return {**await self._view(sitting), "counted": self._is_stored(sitting, key, message)}
-            sitting.answers[key] = answer
-            sitting.state = views.to_view(state)
-            sitting.shown_trial = None
-            self.recent.add(sitting.record.id)
-            return {**await self._view(sitting), "counted": True}
+                await self._take_up(live)
+                return {**await self._view(live), "counted": self._is_stored(live, key, message)}
+            live.answers[key] = answer
+            live.state = views.to_view(state)
+            live.shown_trial = None
+            self.recent.add(live.record.id)
+            return {**await self._view(live), "counted": True}
 
-    def _is_stored(self, sitting: Sitting, key: tuple[int, str, int], message: Answered) -> bool:
-        return key in sitting.answers and sitting.answers[key].value == message.value
+    def _is_stored(self, live: LiveSession, key: tuple[int, str, int], message: Answered) -> bool:
+        return key in live.answers and live.answers[key].value == message.value
 
-    async def _take_up(self, sitting: Sitting) -> None:
+    async def _take_up(self, live: LiveSession) -> None:
         """What the database has, in place of what is in memory."""
-        fresh = await asyncio.to_thread(self._load, sitting.participant)
-        sitting.state, sitting.answers = fresh.state, fresh.answers
+        fresh = await asyncio.to_thread(self._load, live.participant)
+        live.state, live.answers = fresh.state, fresh.answers
 
     def _at_question(self, state: Session, key: tuple[int, str, int]) -> Session | None:
         """The state at a question, past the films that the page has shown; None where another question is due."""
@@ -301,41 +301,41 @@ class Host:
             state = advanced(state)
         return state if step.kind == "answer" and (step.trial, step.item, step.attempt) == key else None
 
-    async def happened(self, sitting: Sitting, message: Happened) -> None:
+    async def happened(self, live: LiveSession, message: Happened) -> None:
         """Another event, reported by the page."""
-        await self._page_event(sitting, message.kind, message.detail)
+        await self._page_event(live, message.kind, message.detail)
 
-    async def _page_event(self, sitting: Sitting, kind: str, detail: Mapping[str, Any]) -> None:
+    async def _page_event(self, live: LiveSession, kind: str, detail: Mapping[str, Any]) -> None:
         """Store what a page told or caused, unless it was too much already."""
-        if sitting.events < MOST_EVENTS:
-            await self._note(sitting, kind, detail)
+        if live.events < MOST_EVENTS:
+            await self._note(live, kind, detail)
 
-    async def _note(self, sitting: Sitting, kind: str, detail: Mapping[str, Any] | None = None) -> None:
+    async def _note(self, live: LiveSession, kind: str, detail: Mapping[str, Any] | None = None) -> None:
         """Store an event of a session."""
-        sitting.events += 1
-        await self.writer.put([event_row(sitting.record, kind, detail, datetime.now(UTC))])
+        live.events += 1
+        await self.writer.put([event_row(live.record, kind, detail, datetime.now(UTC))])
 
     # What is shown
 
-    async def _view(self, sitting: Sitting) -> dict[str, Any]:
-        step = current(sitting.state)
-        view = views.view(sitting.state, sitting.participant, self.film_bytes)
-        sitting.shown_trial = (step.trial, step.attempt) if step.slot == 1 else None
+    async def _view(self, live: LiveSession) -> dict[str, Any]:
+        step = current(live.state)
+        view = views.view(live.state, live.participant, self.film_bytes)
+        live.shown_trial = (step.trial, step.attempt) if step.slot == 1 else None
         if step.kind in ("debrief", "done"):
             # All is answered: who closes the page over the debriefing has finished, too.
-            if not sitting.finished:
-                await self._note(sitting, "finished")
-                sitting.finished = True
-            view["withdrawal_code"] = sitting.participant.withdrawal_code
+            if not live.finished:
+                await self._note(live, "finished")
+                live.finished = True
+            view["withdrawal_code"] = live.participant.withdrawal_code
         if step.kind == "done":
             view |= {"completion_code": self.settings.completion_code, "completion_url": self.settings.completion_url}
             # Nothing more will change: the memory is for those who are in progress.
-            self._forget(sitting.record.id)
+            self._forget(live.record.id)
         return view
 
-    async def film(self, sitting: Sitting, name: str) -> Film | None:
+    async def film(self, live: LiveSession, name: str) -> Film | None:
         """A film that a participant may load now; a damaged one is a fault that is noted."""
-        step = self._film_step(sitting, name)
+        step = self._film_step(live, name)
         if step is None:
             return None
         video = self.manifest.videos.get(step.stimulus, {})
@@ -346,14 +346,14 @@ class Host:
             size = None
         if size is None or size != video["bytes"]:
             detail = {"what": "film damaged", "stimulus": step.stimulus, "bytes": size, "expected": video.get("bytes")}
-            await self._page_event(sitting, "fault", detail)
+            await self._page_event(live, "fault", detail)
             # The event records which one it is: a page must not learn it.
             raise SessionError("Expected the film whole, found it damaged; the researcher has to render again.")
         return Film(path, name, size, self.frames[step.stimulus], self.film_bytes)
 
-    def _film_step(self, sitting: Sitting, name: str) -> Step | None:
-        for step in views.films_due(sitting.state):
-            if secrets.compare_digest(views.film_name(sitting.participant, step).encode(), name.encode()):
+    def _film_step(self, live: LiveSession, name: str) -> Step | None:
+        for step in views.films_due(live.state):
+            if secrets.compare_digest(views.film_name(live.participant, step).encode(), name.encode()):
                 return step
         return None
 
@@ -366,7 +366,9 @@ class Host:
 
     async def note_who_is_here(self) -> None:
         """Store who was active, so that drop-outs are known; forget sessions that are closed or finished."""
-        self.sittings = {key: one for key, one in self.sittings.items() if one.lock.locked() or one.is_under_way}
+        self.live_sessions = {
+            key: one for key, one in self.live_sessions.items() if one.lock.locked() or one.is_under_way
+        }
         recent, self.recent = self.recent, set()
         try:
             await asyncio.to_thread(people.seen, self.responses, recent, clock=self.clock)

@@ -19,7 +19,7 @@ from typing import Any
 from pydantic_core import to_json
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from study.apps.server.hosting import Host, Sitting
+from study.apps.server.hosting import Host, LiveSession
 from study.apps.server.messages import LONGEST_PAGE, SHORTEST_PAGE, Answered, Begin, Done, Happened, Withdrawal, read
 from study.errors import SegueError
 from study.experiment.store.databases import AWAY
@@ -113,24 +113,24 @@ async def begin(host: Host, letter: Letter) -> Reply:
 async def done(host: Host, letter: Letter) -> Reply:
     """A page was read."""
     largest = LARGEST_MESSAGE + LARGEST_FIELD * len(host.protocol.form)
-    sitting, body = await _from_participant(host, letter, largest)
+    live, body = await _from_participant(host, letter, largest)
     message: Done = read(Done, body)
-    view = await host.done(sitting, message)
+    view = await host.done(live, message)
     return Reply(view, "" if view["kind"] == "declined" else None)
 
 
 async def answer(host: Host, letter: Letter) -> Reply:
     """A question was answered."""
-    sitting, body = await _from_participant(host, letter, LARGEST_ANSWER)
+    live, body = await _from_participant(host, letter, LARGEST_ANSWER)
     message: Answered = read(Answered, body)
-    return Reply(await host.answer(sitting, message))
+    return Reply(await host.answer(live, message))
 
 
 async def happened(host: Host, letter: Letter) -> Reply:
     """Another event than a response."""
-    sitting, body = await _from_participant(host, letter, LARGEST_MESSAGE)
+    live, body = await _from_participant(host, letter, LARGEST_MESSAGE)
     message: Happened = read(Happened, body)
-    await host.happened(sitting, message)
+    await host.happened(live, message)
     return Reply({})
 
 
@@ -143,9 +143,9 @@ async def alive(host: Host, letter: Letter) -> Reply:
 async def leave(host: Host, letter: Letter) -> Reply:
     """The page was closed. A beacon can't carry our header: its body is the page's name, and it only ends the hold."""
     _same_origin(letter)
-    sitting = host.live(letter.cookie(host.cookie))
-    if sitting is not None:
-        host.leave(sitting, (await letter.body(SMALLEST_MESSAGE)).decode("latin-1"))
+    live = host.in_memory(letter.cookie(host.cookie))
+    if live is not None:
+        host.leave(live, (await letter.body(SMALLEST_MESSAGE)).decode("latin-1"))
     return Reply({})
 
 
@@ -215,16 +215,16 @@ def _of_our_pages(letter: Letter) -> None:
         raise RefusedError(403, "Expected a message of this site's own pages.")
 
 
-async def _from_participant(host: Host, letter: Letter, largest: int) -> tuple[Sitting, bytes]:
-    """The sitting of the participant whose page this is, and what the page says."""
+async def _from_participant(host: Host, letter: Letter, largest: int) -> tuple[LiveSession, bytes]:
+    """The session of the participant whose page this is, and what the page says."""
     _of_our_pages(letter)
-    sitting = await host.sitting(letter.cookie(host.cookie))
-    if sitting is None:
+    live = await host.live_session(letter.cookie(host.cookie))
+    if live is None:
         raise RefusedError(401, "Expected a participant of this study; open the link again.")
     body = await letter.body(largest)
-    if not host.has_tab(sitting, letter.page):
+    if not host.has_tab(live, letter.page):
         raise RefusedError(409, "This session is open in another tab.")
-    return sitting, body
+    return live, body
 
 
 def cookie(header: bytes, name: str) -> str:

@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from study.apps.server.hosting import Host, Sitting
+from study.apps.server.hosting import Host, LiveSession
 from study.experiment.plan import questions
 from study.experiment.session import current
 from study.experiment.store import participants as people
@@ -46,8 +46,8 @@ def researcher_routes(host: Host, guarded: Callable[[Handler], Handler]) -> list
 
     async def overview(_: Request) -> Response:
         # Taken here: in a thread, participants who arrive would change it while it is gone through.
-        live = {sitting.record.id: sitting for sitting in host.sittings.values()}
-        return JSONResponse(await asyncio.to_thread(_overview, host, live))
+        by_number = {live.record.id: live for live in host.live_sessions.values()}
+        return JSONResponse(await asyncio.to_thread(_overview, host, by_number))
 
     async def table(request: Request) -> Response:
         name = request.path_params["name"]
@@ -63,10 +63,10 @@ def researcher_routes(host: Host, guarded: Callable[[Handler], Handler]) -> list
     ]
 
 
-def _overview(host: Host, live: Mapping[int, Sitting]) -> dict[str, Any]:
+def _overview(host: Host, by_number: Mapping[int, LiveSession]) -> dict[str, Any]:
     now = host.clock()
     rows = people.overview(host.responses)
-    listed = [_listed(host, row, live.get(row["id"]), now) for row in rows]
+    listed = [_listed(host, row, by_number.get(row["id"]), now) for row in rows]
     states = [row["state"] for row in listed]
     with host.responses.engine.connect() as connection:
         withdrawn = connection.execute(sa.select(sa.func.count()).select_from(withdrawals)).scalar_one()
@@ -89,13 +89,13 @@ def _overview(host: Host, live: Mapping[int, Sitting]) -> dict[str, Any]:
     }
 
 
-def _listed(host: Host, row: Mapping[str, Any], sitting: Sitting | None, now: datetime) -> dict[str, Any]:
+def _listed(host: Host, row: Mapping[str, Any], live: LiveSession | None, now: datetime) -> dict[str, Any]:
     happened = row["events"]
     if "finished" in happened:
         state = "finished"
     elif "declined" in happened:
         state = "declined"
-    elif now - row["seen_at"] > host.settings.dropped_after and sitting is None:
+    elif now - row["seen_at"] > host.settings.dropped_after and live is None:
         state = "dropped out"
     else:
         state = "in progress"
@@ -104,9 +104,9 @@ def _listed(host: Host, row: Mapping[str, Any], sitting: Sitting | None, now: da
         "group": row["group_number"],
         "parameters": json.loads(row["parameters_json"]),
         "state": state,
-        "step": current(sitting.state).place if sitting is not None else "",
+        "step": current(live.state).place if live is not None else "",
         "answers": row["answers"],
-        "questions": _questions(host, row["id"], sitting),
+        "questions": _questions(host, row["id"], live),
         "began_at": row["began_at"].isoformat(timespec="seconds"),
         "seen_at": row["seen_at"].isoformat(timespec="seconds"),
         "faults": happened.get("fault", 0),
@@ -114,10 +114,10 @@ def _listed(host: Host, row: Mapping[str, Any], sitting: Sitting | None, now: da
     }
 
 
-def _questions(host: Host, session_id: int, sitting: Sitting | None) -> int:
+def _questions(host: Host, session_id: int, live: LiveSession | None) -> int:
     """How many a session has; looked up once, since to read all plans every few seconds would make answers wait."""
     if session_id not in host.questions:
-        record = sitting.record if sitting is not None else session_by_id(host.responses, session_id)
+        record = live.record if live is not None else session_by_id(host.responses, session_id)
         host.questions[session_id] = questions(host.protocol, record.plan)
     return host.questions[session_id]
 

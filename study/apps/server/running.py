@@ -72,7 +72,7 @@ def run(
 def serve(app: ASGIApp, listening: socket.socket, *, behind_proxy: bool = False, root_path: str = "") -> None:
     """Serve an application in this process until it is told to end."""
     _allow_files(MOST_CONNECTIONS + 100)
-    # Two hundred answers at one instant are so many new objects that the collector would look through all sittings
+    # Two hundred answers at one instant are so many new objects that the collector would look through all sessions
     # several times, a quarter of all work; what is there now stays, and the rest can wait a while.
     gc.freeze()
     gc.set_threshold(100_000, 10, 10)

@@ -1,4 +1,4 @@
-"""Views: what a page may know of a step. A sitting's state comes in, JSON goes out.
+"""Views: what a page may know of a step. The state of a session comes in, JSON goes out.
 
 A page learns which films to play and what to ask, and nothing of what an answer means: films have an address of their
 own in every trial (a keyed hash) and all one size, so that even two showings of one stimulus can't be determined before

@@ -49,8 +49,8 @@ def make_app(host: Host) -> Limits:
         return JSONResponse(_about(host))
 
     async def film(request: Request) -> Response:
-        sitting = await host.sitting(cookie(request.headers.get("cookie", "").encode("latin-1"), host.cookie))
-        found = None if sitting is None else await host.film(sitting, request.path_params["name"])
+        live = await host.live_session(cookie(request.headers.get("cookie", "").encode("latin-1"), host.cookie))
+        found = None if live is None else await host.film(live, request.path_params["name"])
         if found is None:
             raise RefusedError(404, "Expected a film of the trial that is shown now.")
         return found

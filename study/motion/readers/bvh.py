@@ -92,6 +92,7 @@ def _assemble(
     mapping: Mapping[str, str] | None,
     history: list[str],
 ) -> Clip:
+    """The clip of a hierarchy and the values of its channels, shape (frames, channels), with what was mended noted."""
     names = tuple(joint.name for joint in hierarchy.joints)
     parents = np.array([joint.parent for joint in hierarchy.joints])
     offsets = np.array([joint.offset for joint in hierarchy.joints])

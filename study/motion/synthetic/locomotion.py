@@ -245,6 +245,11 @@ def _whole_body(
     phase: FloatArray,
     contacts: tuple[list[Contact], list[Contact]],
 ) -> Targets:
+    """Pelvis, trunk and arms over the steps, at each of the course's times.
+
+    `pace` is the speed in m/s, `path` the way over the ground in metres (times, 2), `pull` the acceleration in m/s²
+    (times, 2), `phase` the place in the cycle of steps, in cycles; `contacts` are those of the left and the right foot.
+    """
     times, heading = course.times, course.heading
     turn = 2 * np.pi * phase
     moving = np.clip(pace / 0.5, 0.0, 1.0)

@@ -193,7 +193,7 @@ def test_touch_is_refused_politely_where_the_protocol_does_not_allow_it(
     tab.open(site.address)
     tab.wait_text("on a computer with a keyboard")
     assert tab.run("document.querySelectorAll('button').length") == 0
-    assert site.host.sittings == {}
+    assert site.host.live_sessions == {}
 
 
 def spoken(tab) -> set[Any]:

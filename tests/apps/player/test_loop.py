@@ -241,7 +241,7 @@ def test_going_on_after_escape_shows_the_trial_from_its_start(make_small: Any, s
     assert frames[:8] == [0, 0, 1, 1, 2, 2, 0, 0]
 
 
-def test_stopping_keeps_what_was_answered_and_the_next_sitting_goes_on(make_small: Any, store: Any) -> None:
+def test_stopping_keeps_what_was_answered_and_the_next_session_goes_on(make_small: Any, store: Any) -> None:
     small = make_small()
     window = ScriptedWindow([GO, GO, press("s"), press("d"), press("escape"), press("x")])
     assert sit(small, window, store).end == "stopped"

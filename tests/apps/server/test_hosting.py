@@ -234,15 +234,15 @@ def test_a_page_may_load_the_films_of_this_trial_and_of_the_next_and_no_others(s
     serving = serve()
     person = serving.person()
     person.until(person.begin(), "trial")
-    (sitting,) = serving.host.sittings.values()
-    showings = [step for step in sitting.state.steps if step.slot and step.role != "practice"]
-    due = [step.trial for step in views.films_due(sitting.state)]
+    (live,) = serving.host.live_sessions.values()
+    showings = [step for step in live.state.steps if step.slot and step.role != "practice"]
+    due = [step.trial for step in views.films_due(live.state)]
     assert len(set(due)) == 2
     assert due == [trial for trial in dict.fromkeys(due) for _ in range(2)]
     later = [step for step in showings if step.trial not in due]
     assert later
     for step in later:
-        name = views.film_name(sitting.participant, step)
+        name = views.film_name(live.participant, step)
         assert person.client.get(f"/films/{name}.mp4").status_code == 404
 
 

@@ -190,7 +190,7 @@ def test_the_researcher_looks_on_while_participants_arrive(
             return super().values()
 
     monkeypatch.setattr(people, "overview", slow)
-    serving.host.sittings = Changing(serving.host.sittings)
+    serving.host.live_sessions = Changing(serving.host.live_sessions)
     answers = []
     worker = None
 
@@ -217,15 +217,15 @@ def test_finished_sessions_leave_the_memory_and_their_pages_still_work(serve: Ca
     people_ = [serving.person() for _ in range(3)]
     for person in people_:
         person.until(person.begin(), "done")
-        assert host.sittings == {}
+        assert host.live_sessions == {}
     gc.collect()
-    assert not [one for one in gc.get_objects() if type(one).__name__ == "Sitting"]
+    assert not [one for one in gc.get_objects() if type(one).__name__ == "LiveSession"]
     person = people_[0]
     assert person.begin("page-two")["completion_code"] == "C1"
     assert person.post("/api/alive", {}).status_code == 200
     person.client.post("/api/leave", content="page-two")
     serving.client.portal.call(host.note_who_is_here)
-    assert host.sittings == {}
+    assert host.live_sessions == {}
 
 
 def test_who_left_in_the_middle_leaves_the_memory_and_comes_back_from_the_database(
@@ -235,12 +235,12 @@ def test_who_left_in_the_middle_leaves_the_memory_and_comes_back_from_the_databa
     person = serving.person()
     view = person.until(person.begin(), "trial")
     serving.client.portal.call(serving.host.note_who_is_here)
-    assert len(serving.host.sittings) == 1
+    assert len(serving.host.live_sessions) == 1
     now = time.monotonic()
     monkeypatch.setattr(time, "monotonic", lambda: now + hosting.GONE_SECONDS + 1)
     serving.client.portal.call(serving.host.note_who_is_here)
     monkeypatch.undo()
-    assert serving.host.sittings == {}
+    assert serving.host.live_sessions == {}
     assert person.post("/api/answer", answer_to(view)).json()["counted"] is True
 
 
@@ -256,8 +256,8 @@ def test_messages_that_arrive_together_at_the_end_are_counted_once(
     async def together() -> Any:
         from study.apps.server.messages import Done
 
-        sittings = [await serving.host.sitting(token) for _ in range(4)]
-        return await asyncio.gather(*(serving.host.done(one, Done(step=view["step"])) for one in sittings))
+        found = [await serving.host.live_session(token) for _ in range(4)]
+        return await asyncio.gather(*(serving.host.done(one, Done(step=view["step"])) for one in found))
 
     found = serving.client.portal.call(together)
     assert [one["kind"] for one in found] == ["done"] * 4

@@ -282,8 +282,8 @@ def test_one_bad_write_takes_no_others_with_it(serve: Callable[..., Serving]) ->
     host = serving.host
 
     async def together() -> Any:
-        sitting = next(iter(host.sittings.values()))
-        rows = [hosting.event_row(sitting.record, kind, None, hosting.datetime.now(hosting.UTC)) for kind in "abc"]
+        live = next(iter(host.live_sessions.values()))
+        rows = [hosting.event_row(live.record, kind, None, hosting.datetime.now(hosting.UTC)) for kind in "abc"]
         bad = (rows[1][0], {**rows[1][1], "session_id": 999})
         return await asyncio.gather(
             *(host.writer.put([row]) for row in (rows[0], bad, rows[2])), return_exceptions=True
@@ -304,10 +304,10 @@ def test_who_is_long_gone_is_taken_up_from_the_database(
     view = person.until(person.begin(), "trial")
     view = person.until(person.answer(view), "trial")
     serving.client.portal.call(serving.host.note_who_is_here)
-    assert len(serving.host.sittings) == 1
+    assert len(serving.host.live_sessions) == 1
     monkeypatch.setattr(hosting, "GONE_SECONDS", -1.0)
     serving.client.portal.call(serving.host.note_who_is_here)
-    assert serving.host.sittings == {}
+    assert serving.host.live_sessions == {}
     assert person.answer(view)["counted"] is True
 
 

@@ -162,7 +162,7 @@ def test_ratings_of_pairs_compare_two_methods_in_any_order(
     assert "expected show in rating studies only; remove it from the preference study 'liking'" in said
 
 
-def test_a_sitting_may_hold_the_four_studies_of_2004() -> None:
+def test_a_session_may_hold_the_four_studies_of_2004() -> None:
     """Section 4.1: all in a single session; 42 + 8 + 8 + 8 pairs (here with the methods that there are)."""
     text = GOOD.split("[[transitions]]")[0]
     for number in range(11):
