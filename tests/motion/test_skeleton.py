@@ -135,7 +135,7 @@ def test_a_missing_role_is_refused_with_what_there_is() -> None:
         ({"names": ("A", "A")}, "unique joint names, found A"),
         ({"parents": np.array([0, 0])}, "joint 0 to be the only root"),
         ({"parents": np.array([-1, -1])}, "joint 0 to be the only root"),
-        ({"parents": np.array([-1, 1])}, "every parent to stand before its children"),
+        ({"parents": np.array([-1, 1])}, "every parent before its children"),
         ({"end_parents": np.array([2])}, "every end site to hang on a joint"),
         ({"offsets": np.zeros((3, 3))}, r"skeleton offsets of shape \(2, 3\), got \(3, 3\)"),
     ],

@@ -158,4 +158,4 @@ def test_a_study_reports_the_median_observer(same_different_study: Callable[...,
     assert "the median observer's is k +" in result.answer
     alone = analyse_jnd(answers[answers["participant"] == "p00"], resamples=50)
     assert alone.mixed is None
-    assert "too few to tell how people differ" in alone.mixed_note
+    assert "too few to estimate individual differences" in alone.mixed_note

@@ -199,7 +199,7 @@ def test_a_display_that_disappears_loses_nothing(
     playing.process.wait(20)
     playing.ended()
     assert playing.process.returncode == 2, "\n".join(playing.said)
-    assert playing.said[-1].startswith("segue: The display is gone. Every answer that was given is stored")
+    assert playing.said[-1].startswith("segue: The display is gone. Every response is stored")
     stored = {(one.trial, one.item, one.attempt) for one in answers(out)}
     assert set(playing.stored) <= stored
     assert len(happened(out, "display lost")) == 1
