@@ -112,7 +112,7 @@ def check(problem: Problem, table: OneHopTable, samples: int, rng: np.random.Gen
         start = time.perf_counter()
         cost, stay, hop, frame, stay_hop = brute_force(problem, problem.switches[number], trigger, legs)
         times.append(time.perf_counter() - start)
-        # Distances are matrix products in single precision: other blocks, or another processor, round by a count or two.
+        # Matrix products in single precision: other blocks, or another processor, round by a count or two.
         same_cost = abs(cost - round(table.costs[position] / problem.distance.unit)) <= 2
         equal += same_cost and [hop, trigger + stay - frame, stay, stay_hop] == table.entries[position].tolist()
     return {"sampled": len(chosen), "equal": equal, "brute_force_s_each": statistics.median(times)}
