@@ -25,8 +25,29 @@ LARGEST_HEAD = 32_768
 MOST_BODIES = 32_000_000
 """Bytes of all bodies whose requests have no reply yet; beyond it the oldest is closed, and its page sends again."""
 
-_bodies: dict[Connection, int] = {}
-"""Bytes of the bodies of this process that have no reply yet, the oldest first."""
+
+class _Bodies:
+    """Bytes of the bodies of this process that have no reply yet, connection by connection, the oldest first."""
+
+    def __init__(self) -> None:
+        self.held: dict[Connection, int] = {}
+        self.total = 0
+
+    def add(self, connection: Connection, count: int) -> None:
+        """A part of a body came; if all bodies together are too large, the oldest connection is closed."""
+        self.held[connection] = self.held.get(connection, 0) + count
+        self.total += count
+        if self.total > MOST_BODIES:
+            oldest = next(iter(self.held))
+            self.drop(oldest)
+            oldest.transport.abort()
+
+    def drop(self, connection: Connection) -> None:
+        """The body of a connection is kept no longer."""
+        self.total -= self.held.pop(connection, 0)
+
+
+_bodies = _Bodies()
 
 
 class _Joined:
@@ -77,7 +98,7 @@ class Connection(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Nobody is there any more."""
         self._within(None)
-        _bodies.pop(self, None)
+        _bodies.drop(self)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -125,11 +146,7 @@ class Connection(HttpToolsProtocol):
         super().on_body(body)
         if self.cycle.response_complete:
             return
-        _bodies[self] = _bodies.get(self, 0) + len(body)
-        if sum(_bodies.values()) > MOST_BODIES:
-            oldest = next(iter(_bodies))
-            del _bodies[oldest]
-            oldest.transport.abort()
+        _bodies.add(self, len(body))
 
     def on_message_complete(self) -> None:
         """The request is whole; now the reply has to be made and taken. Idle connections uvicorn ends before that."""
@@ -139,7 +156,7 @@ class Connection(HttpToolsProtocol):
 
     def on_response_complete(self) -> None:
         """The reply is made; what was sent of a body is of no use any more."""
-        _bodies.pop(self, None)
+        _bodies.drop(self)
         if self.cycle.response_complete:
             self.cycle.body.clear()
         super().on_response_complete()
