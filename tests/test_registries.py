@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from study.analysis.registry import ANALYSES, analysis_of
+from study.apps.player.loop import LAYOUTS
+from study.apps.player.screens import ANSWERS
 from study.errors import AnalysisError
 from study.experiment.observers import person
 from study.experiment.protocol.languages import languages, words
@@ -130,6 +132,12 @@ def test_the_page_has_a_part_for_the_layout_and_for_the_kind_of_answer(task: Tas
     assert buttons is not None
     assert f'"{task.layout}":' in layouts[1]
     assert f"{task.kind}:" in buttons[1]
+
+
+@every_task
+def test_the_window_has_a_part_for_the_layout_and_for_the_kind_of_answer(task: Task) -> None:
+    assert task.layout in LAYOUTS
+    assert task.kind in ANSWERS
 
 
 @every_task

@@ -162,17 +162,19 @@ def page_look(stimuli: StimulusSet, session: Session, font: Path | None) -> Look
     from study.apps.player.pages import Look
 
     protocol = session.protocol
-    parts = protocol.model_dump(include={"consent", "form", "texts", "studies"})
+    parts = [protocol.consent, protocol.form, protocol.texts, protocol.studies]
     texts = [*_strings(parts), *(step.text for step in session.steps)]
     return Look(stimuli.stimuli[0].figure.background, fonts_for(texts, font))
 
 
 def _strings(data: Any) -> Iterator[str]:
-    """All texts in nested lists and tables."""
+    """All texts in lists and in the parts of a protocol."""
+    from study.experiment.protocol.texts import Part
+
     if isinstance(data, str):
         yield data
-    elif isinstance(data, dict | list | tuple):
-        for one in data.values() if isinstance(data, dict) else data:
+    elif isinstance(data, Part | list | tuple):
+        for one in dict(data).values() if isinstance(data, Part) else data:
             yield from _strings(one)
 
 

@@ -27,6 +27,8 @@ from study.experiment.session import Session, advanced, answered, current, fille
 from study.experiment.steps import Step
 from study.experiment.stimuli.stimulus import Stimulus
 from study.experiment.store.answers import Presentation
+from study.tasks.registry import task_of
+from study.tasks.task import Layout
 from study.tasks.trial import PLACES
 
 
@@ -185,6 +187,10 @@ class _Player(Desk):
             if not self.window.focused:
                 self.read_until(screens.away_page(self.protocol))
                 self._blank_for(0.3)
+        LAYOUTS[task_of(self.protocol.study(step.study)).layout](self, step)
+
+    def in_turn(self, step: Step) -> None:
+        """Show the stimulus of one slot by itself; the steps between two slots are gaps."""
         showing = self._show(step.stimulus)
         if showing is None:
             self._start_again()
@@ -333,3 +339,7 @@ class _Player(Desk):
                 )
             )
         return rows
+
+
+LAYOUTS: Mapping[Layout, Callable[[_Player, Step], None]] = {"one after another": _Player.in_turn}
+"""How the slots of a trial are shown: from a slot's step on, past all that it showed."""

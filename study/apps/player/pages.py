@@ -27,6 +27,33 @@ class Button:
 
 
 @dataclass(frozen=True)
+class ButtonStyle:
+    """How the buttons of a page look; lengths in heights of the text.
+
+    Parameters
+    ----------
+    least
+        The least width of a button.
+    margin
+        What is left of a button beside its words, on both sides together.
+    gap, gap_of_many
+        What is left between buttons, and where there are ten or more.
+    one_row
+        Whether they stand in one row however narrow that makes them, not one below another where the row is too long.
+    """
+
+    least: float
+    margin: float
+    gap: float
+    gap_of_many: float
+    one_row: bool
+
+
+WORDS = ButtonStyle(least=7.0, margin=2.0, gap=1.6, gap_of_many=1.6, one_row=False)
+POINTS = ButtonStyle(least=2.6, margin=1.2, gap=0.7, gap_of_many=0.4, one_row=True)
+
+
+@dataclass(frozen=True)
 class Page:
     """One thing to read or to decide.
 
@@ -37,7 +64,9 @@ class Page:
     question
         What is asked, set larger, under the text.
     buttons
-        In a row, from left to right.
+        From left to right.
+    style
+        How the buttons look: words to choose from, or the points of a scale.
     low, middle, high
         Words at the ends and in the middle of a row of buttons that is a scale.
     note
@@ -59,6 +88,7 @@ class Page:
     text: str = ""
     question: str = ""
     buttons: tuple[Button, ...] = ()
+    style: ButtonStyle = WORDS
     low: str = ""
     middle: str = ""
     high: str = ""

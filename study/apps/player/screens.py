@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from study.apps.player.pages import Button, Page
+from study.apps.player.pages import POINTS, Button, Page
 from study.experiment.protocol.texts import FormField
 from study.experiment.protocol.whole import Protocol
 from study.experiment.steps import Step, answer_keys, answer_words
+from study.tasks.registry import task_of
+from study.tasks.task import Kind
 
 
 def reading_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Page:
@@ -37,15 +40,32 @@ def consent_page(protocol: Protocol, step: Step) -> Page:
 
 def answer_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Page:
     """The question after the stimuli, a button for each legal answer."""
+    page = ANSWERS[task_of(protocol.study(step.study)).kind](protocol, step)
+    note = protocol.texts.practice if step.role == "practice" else ""
+    return _with_progress(protocol, replace(page, note=note), progress, step.role != "practice")
+
+
+def _buttons(protocol: Protocol, step: Step) -> tuple[Button, ...]:
     keys = answer_keys(protocol, step.legal)
     buttons = []
     for value in step.legal:
         words, key = answer_words(protocol, value), keys.get(value, "")
         # A digit on its own button says which key it is.
         buttons.append(Button(value, words, key, "" if words == key else key.upper()))
-    note = protocol.texts.practice if step.role == "practice" else ""
-    page = Page("", step.text, tuple(buttons), step.low, step.middle, step.high, note)
-    return _with_progress(protocol, page, progress, step.role != "practice")
+    return tuple(buttons)
+
+
+def _words(protocol: Protocol, step: Step) -> Page:
+    return Page(question=step.text, buttons=_buttons(protocol, step))
+
+
+def _points(protocol: Protocol, step: Step) -> Page:
+    scale = Page(question=step.text, buttons=_buttons(protocol, step), style=POINTS)
+    return replace(scale, low=step.low, middle=step.middle, high=step.high)
+
+
+ANSWERS: Mapping[Kind, Callable[[Protocol, Step], Page]] = {"word": _words, "point": _points}
+"""What each kind of answer looks like."""
 
 
 def field_page(protocol: Protocol, field: FormField, entry: str, *, first: bool, complaint: bool = False) -> Page:

@@ -106,13 +106,9 @@ class _Sheet:
         return self.em * (3.4 if any(button.key_words for button in self.page.buttons) else 2.4)
 
     def _button_width(self, button: Button) -> float:
-        least, margin = (2.6, 1.2) if self._scale else (7.0, 2.0)
+        style = self.page.style
         words = max(self._font(1.0).getlength(button.words), self._font(0.68).getlength(button.key_words) + self.em)
-        return max(least * self.em, words + margin * self.em)
-
-    @property
-    def _scale(self) -> bool:
-        return all(len(button.words) <= 2 for button in self.page.buttons)
+        return max(style.least * self.em, words + style.margin * self.em)
 
     def _button_rows(self, limit: float) -> list[list[tuple[int, float]]]:
         """Numbers and widths of the buttons, row by row: all as wide as the widest in one row, or one below another."""
@@ -120,7 +116,7 @@ class _Sheet:
         gap, count = self._button_gap, len(widths)
         if widths and max(widths) * count + gap * (count - 1) <= limit:
             return [list(enumerate([max(widths)] * count))]
-        if self._scale:
+        if self.page.style.one_row:
             return [list(enumerate([(limit - gap * (count - 1)) / count] * count))] if widths else []
         self.stacked = True
         # Beside the words, the key's cap.
@@ -129,7 +125,8 @@ class _Sheet:
 
     @property
     def _button_gap(self) -> float:
-        return self.em * ((0.7 if len(self.page.buttons) < 10 else 0.4) if self._scale else 1.6)
+        style = self.page.style
+        return self.em * (style.gap if len(self.page.buttons) < 10 else style.gap_of_many)
 
     # Drawing
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import unicodedata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw, features
 
+from study.apps.cli.play import page_look
 from study.apps.player import lettering
 from study.apps.player.lettering import Face, balanced, default_font, fonts_for, leftwards, letters_of, wrapped
 from study.errors import SessionError
+from study.experiment.session import open_session
 
 # A letter that DejaVu Sans has not, and a font beside it, which matplotlib brings along, that has it.
 STIX = default_font().parent / "STIXGeneral.ttf"
@@ -125,3 +128,17 @@ def test_the_first_letter_with_a_direction_says_where_a_line_begins() -> None:
     assert leftwards("12 هل a")
     assert not leftwards("a هل")
     assert not leftwards("12 34")
+
+
+def test_every_text_of_a_protocol_gets_its_letters(make_small: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    none_installed(monkeypatch, STIX)
+    plain = make_small()
+    assert page_look(plain.stimuli, open_session(plain.protocol, plan=plain.plan), None).fonts == (default_font(),)
+    for old, new in (
+        ("Same or different?", f"Same {STRANGE}?"),
+        ('debrief = "', f'debrief = "{STRANGE}'),
+        ("\n[texts]", f'\n[consent]\nagree = "Yes {STRANGE}"\n\n[texts]'),
+    ):
+        small = make_small("", (old, new))
+        look = page_look(small.stimuli, open_session(small.protocol, plan=small.plan), None)
+        assert look.fonts == (default_font(), STIX)

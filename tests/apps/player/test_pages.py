@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from study.apps.player.lettering import default_font
-from study.apps.player.pages import Button, Look, Page, moved
+from study.apps.player.pages import POINTS, Button, Look, Page, moved
 from study.apps.player.sheet import draw_page
 from study.errors import SessionError
 
@@ -74,7 +74,7 @@ def test_text_stands_out_from_the_ground_which_is_that_of_the_stimuli(look: Look
 
 def test_a_scale_of_eleven_points_is_one_row_with_its_words_at_the_ends() -> None:
     points = tuple(Button(str(i), str(i), str(i) if i < 10 else "") for i in range(11))
-    page = Page(question="How natural was it?", buttons=points, low="not at all", high="very")
+    page = Page(question="How natural was it?", buttons=points, style=POINTS, low="not at all", high="very")
     for size in ((640, 480), (1280, 800)):
         boxes = draw_page(page, size, LIGHT).boxes
         assert len({top for _, top, _, _ in boxes}) == 1
@@ -83,9 +83,14 @@ def test_a_scale_of_eleven_points_is_one_row_with_its_words_at_the_ends() -> Non
         assert all(one[2] < other[0] for one, other in pairwise(boxes))
 
 
+def test_short_words_are_as_wide_as_long_ones_and_no_scale() -> None:
+    short = replace(ASK, buttons=(Button("same", "同じ", "s", "S"), Button("different", "違う", "d", "D")))
+    assert draw_page(short, (1280, 800), LIGHT).boxes == draw_page(ASK, (1280, 800), LIGHT).boxes
+
+
 def test_words_for_the_middle_of_a_scale_stand_under_its_middle() -> None:
     points = tuple(Button(str(i), str(i), str(i)) for i in range(5))
-    bare = Page(question="How was it?", buttons=points, low="worse", high="very much better indeed")
+    bare = Page(question="How was it?", buttons=points, style=POINTS, low="worse", high="very much better indeed")
     drawn = [draw_page(page, (1280, 800), LIGHT) for page in (bare, replace(bare, middle="the same"))]
     middle = drawn[1].boxes[2]
     across, below = (middle[0] + middle[2]) / 2, middle[3]
