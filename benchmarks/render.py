@@ -30,9 +30,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from renderer.camera import Camera, frame_group
+from renderer.camera import Camera
 from renderer.context import open_context
 from renderer.figure import Figure, make_figure
+from renderer.framing import frame_group
 from renderer.jobs import RenderJob, default_workers, render_many
 from renderer.offscreen import paste_frames, render_frames
 from renderer.video import CRF, PRESET, frame_rate, open_encoder, render_video

@@ -1,9 +1,16 @@
 """Cameras: where the eye is, and where each point of the world appears in the image.
 
 Positions `(frames, points, 3)` in metres, Y up, come in; pixels go out: x to the right and y *down* from the top left
-corner of the frame, so that the first row of a picture is the top one. One fixed camera frames a whole group of
-stimuli, so that nothing but the motion differs between two of them (Wang and Bodenheimer 2004, section 4: both
-clips of a pair were seen from one camera); `track` lets the camera follow the figure.
+corner of the frame, so that the first row of a picture is the top one. One camera frames a whole group of stimuli, so
+that nothing but the motion differs between two of them (Wang and Bodenheimer 2004, section 4: groups of motions were
+shown from the same camera position).
+
+- `fixed`: it neither moves nor turns. A figure that travels far is small in it.
+- `pan`: it stands still and turns, by the same slow path in every film of the group: yaw and pitch are quadratic in the
+  time since the film began, fitted by least squares to the figures of all films. A path with three numbers can follow
+  neither a step nor a hop, and films of one group that begin alike look alike until they differ. It stands far away
+  and looks through a long lens, so a figure keeps nearly its size wherever it goes.
+- `track`: it follows the figure over the floor, so it hides part of what the figure does; for looking at a motion.
 
 Everything is computed element by element: a matrix product may sum in another order for another number of frames,
 and the same pose must land on the same pixels whatever batch it stands in.
@@ -11,7 +18,6 @@ and the same pose must land on the same pixels whatever batch it stands in.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +31,9 @@ VIEWS = ("front", "side", "three-quarter")
 """Named views: seen against the way the group travels, square to it, and half way between."""
 
 _VIEW_YAW = {"front": 0.0, "three-quarter": -np.pi / 4, "side": -np.pi / 2}
+
+CAMERAS = ("fixed", "pan", "track")
+"""What a camera does while a film lasts; see above."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +51,10 @@ class Camera:
     size
         Width and height of the frame that it was made for, pixels.
     track_seconds
-        None for a fixed camera. Otherwise it follows the figure's centre over the floor; smoothing window in
-        seconds.
+        Where given, it follows the figure's centre over the floor; smoothing window in seconds.
+    turns : (2, coefficients)
+        Where given, it turns while the film lasts: polynomials, constant first, in the seconds since the film began, of
+        what is added to the yaw and to the elevation of `axes`, radians.
     fill_share
         The share of the frame's width or height, whichever is the larger, that the motion it was made for takes.
     """
@@ -54,6 +65,7 @@ class Camera:
     size: tuple[int, int]
     track_seconds: float | None = None
     fill_share: float | None = None
+    turns: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for field, shape in (("eye", (3,)), ("axes", (3, 3))):
@@ -62,6 +74,12 @@ class Camera:
                 raise RendererError(f"Expected a camera's {field} as finite numbers of shape {shape}, got {array}.")
             array.setflags(write=False)
             object.__setattr__(self, field, array)
+        if self.turns is not None:
+            turns = np.array(self.turns, dtype=np.float64)
+            if turns.ndim != 2 or len(turns) != 2 or not np.isfinite(turns).all():
+                raise RendererError(f"Expected a camera's turns as two rows of finite coefficients, got {self.turns}.")
+            turns.setflags(write=False)
+            object.__setattr__(self, "turns", turns)
         if not (np.isfinite(self.focal_pixels) and self.focal_pixels > 0):
             raise RendererError(f"Expected a focal length above 0 pixels, got {self.focal_pixels}.")
         check_size(self.size)
@@ -70,6 +88,11 @@ class Camera:
     def elevation(self) -> float:
         """Radians by which it looks down."""
         return float(np.arcsin(np.clip(self.axes[2, 1], -1.0, 1.0)))
+
+    @property
+    def yaw(self) -> float:
+        """Radians about Y, from +Z towards +X, of the side on which it stands."""
+        return float(np.arctan2(self.axes[2, 0], self.axes[2, 2]))
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -109,80 +132,6 @@ def check_positions(positions: ArrayLike, name: str = "positions") -> FloatArray
     return array
 
 
-def frame_group(
-    positions_list: Sequence[ArrayLike],
-    *,
-    size: tuple[int, int] = (640, 480),
-    view: str | float = "three-quarter",
-    fill: float = 0.86,
-    elevation: float = 0.10,
-    field_of_view: float = 0.44,
-    padding_m: float = 0.16,
-    heading: float | None = None,
-    track_seconds: float | None = None,
-    fps: float = 30.0,
-) -> Camera:
-    """One camera in which everything that moves in the group stays inside the frame.
-
-    Parameters
-    ----------
-    positions_list
-        Each `(frames, points, 3)`, metres: every stimulus of the group.
-    size
-        Width and height in pixels.
-    view
-        `"front"`, `"side"` or `"three-quarter"`, relative to the way the group travels; or radians from the front.
-    fill
-        The share of the frame, across or up, that the group's motion takes at most; reached in one of the two.
-    elevation
-        Radians by which the camera looks down.
-    field_of_view
-        Radians from the top to the bottom of the frame. Small: a long lens, which distorts little.
-    padding_m
-        What a figure takes around its points, metres: half a head and some.
-    heading
-        The direction that counts as forwards, radians about Y from +Z; found from the motion where None.
-    track_seconds
-        Let the camera follow the figure; smoothing window in seconds. The group is then framed as seen by that
-        camera.
-    fps
-        Frames per second of the positions, for `track_seconds`.
-
-    Notes
-    -----
-    The closest eye that sees all points has a closed form. With `t` the tangent of half the angle across, a point
-    at `x` right of and `z` before the origin is seen where `|x - x_eye| <= t (z_eye - z)`; adding the tightest
-    left and right of these bounds gives `z_eye`, their difference `x_eye`. The same holds for the height.
-    """
-    width, height = check_size(size)
-    group = [check_positions(p, f"positions of clip {i} of the group") for i, p in enumerate(positions_list)]
-    if not group:
-        raise RendererError("Expected at least one clip to frame, got none.")
-    if not 0.05 <= fill <= 1.0:
-        raise RendererError(f"Expected a fill share from 0.05 to 1, got {fill}.")
-    if not 0.02 <= field_of_view <= 2.5:
-        raise RendererError(f"Expected a field of view from 0.02 to 2.5 radians, got {field_of_view}.")
-    yaw = (find_heading(group) if heading is None else heading) + view_yaw(view)
-    axes = view_axes(yaw, elevation)
-    if track_seconds is not None:
-        group = [clip - smooth_path(clip, track_seconds, fps)[:, None] for clip in group]
-    seen = np.concatenate([_turned(clip, axes).reshape(-1, 3) for clip in group])
-    focal = 0.5 * height / np.tan(0.5 * field_of_view)
-    half = np.array([0.5 * width, 0.5 * height])
-    eye = np.zeros(3)
-    distances = []
-    for axis in (0, 1):
-        tangent = fill * half[axis] / focal
-        reach = padding_m * np.sqrt(1.0 + tangent * tangent)
-        right = np.max(seen[:, axis] + tangent * seen[:, 2]) + reach
-        left = np.max(-seen[:, axis] + tangent * seen[:, 2]) + reach
-        distances.append((right + left) / (2.0 * tangent))
-        eye[axis] = 0.5 * (right - left)
-    # Never closer than half a metre before the nearest point, whatever the lens.
-    eye[2] = max(*distances, float(seen[:, 2].max()) + padding_m + 0.5)
-    return Camera(_turned_back(eye, axes), axes, float(focal), (width, height), track_seconds, float(fill))
-
-
 def view_yaw(view: str | float) -> float:
     """Radians about Y from the front, of a named view or of a number."""
     if isinstance(view, str):
@@ -194,28 +143,18 @@ def view_yaw(view: str | float) -> float:
     return float(view)
 
 
-def view_axes(yaw: float, elevation: float) -> FloatArray:
-    """Axes of a camera at `yaw` about Y (from +Z towards +X) and looks down by `elevation`, radians."""
-    sin_y, cos_y, sin_e, cos_e = np.sin(yaw), np.cos(yaw), np.sin(elevation), np.cos(elevation)
-    return np.array(
-        [
-            [cos_y, 0.0, -sin_y],
-            [-sin_e * sin_y, cos_e, -sin_e * cos_y],
-            [cos_e * sin_y, sin_e, cos_e * cos_y],
-        ]
-    )
+def view_axes(yaw: FloatArray | float, elevation: FloatArray | float) -> FloatArray:
+    """Axes `(..., 3, 3)` of a camera that stands at `yaw` about Y (from +Z towards +X) and looks down by `elevation`.
 
-
-def find_heading(group: Sequence[FloatArray]) -> float:
-    """The way the group travels over the floor, radians about Y from +Z: the mean of the clips' displacements.
-
-    0.0 where nobody gets further than 0.3 m, since standing has no heading.
+    Both in radians, as numbers or of shape `(...)`.
     """
-    ways = np.array([(clip[-1] - clip[0]).mean(axis=0)[[0, 2]] for clip in group])
-    way = ways.mean(axis=0)
-    if np.hypot(*way) < 0.3:
-        return 0.0
-    return float(np.arctan2(way[0], way[1]))
+    sin_y, cos_y, sin_e, cos_e = np.sin(yaw), np.cos(yaw), np.sin(elevation), np.cos(elevation)
+    rows = [
+        [cos_y, np.zeros_like(cos_y), -sin_y],
+        [-sin_e * sin_y, cos_e, -sin_e * cos_y],
+        [cos_e * sin_y, sin_e, cos_e * cos_y],
+    ]
+    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
 
 
 def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray:
@@ -239,20 +178,39 @@ def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray
     return path
 
 
-def camera_path(positions: FloatArray, camera: Camera, fps: float) -> FloatArray:
-    """Displacement of the camera at each frame, `(frames, 3)`, metres; zero for a fixed camera."""
-    if camera.track_seconds is None:
-        return np.zeros((len(positions), 3))
-    return smooth_path(positions, camera.track_seconds, fps)
+@dataclass(frozen=True, eq=False)
+class CameraPath:
+    """What a camera does during a film: how far it has come, `shift (frames, 3)`, metres, and `axes (frames, 3, 3)`."""
+
+    shift: FloatArray
+    axes: FloatArray
 
 
-def project(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def camera_path(positions: FloatArray, camera: Camera, fps: float) -> CameraPath:
+    """Where a camera is and looks in each frame of a film with these positions, which matter where it tracks."""
+    frames = len(positions)
+    tracks = camera.track_seconds is not None
+    shift = smooth_path(positions, float(camera.track_seconds or 0.0), fps) if tracks else np.zeros((frames, 3))
+    if camera.turns is None:
+        return CameraPath(shift, np.broadcast_to(camera.axes, (frames, 3, 3)))
+    seconds = np.arange(frames) / fps
+    yaw, elevation = (sum(c * seconds**i for i, c in enumerate(row)) for row in camera.turns)
+    return CameraPath(shift, view_axes(camera.yaw + yaw, camera.elevation + elevation))
+
+
+def project_film(camera: Camera, positions: FloatArray, fps: float) -> tuple[FloatArray, FloatArray]:
+    """Where the points of a film `(frames, points, 3)` land in its picture, whatever its camera does; as `project`."""
+    path = camera_path(positions, camera, fps)
+    return project(camera, positions - path.shift[:, None], path.axes)
+
+
+def project(camera: Camera, points: FloatArray, axes: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
     """Where points `(..., 3)` land: pixels `(..., 2)`, y down, and the nearness `(...)`, 1 / distance along the view.
 
     Nearness times `focal_pixels` is the size of a metre there, in pixels. Points nearer than 1 cm or behind the
-    eye count as 1 cm before it.
+    eye count as 1 cm before it. `axes (frames, 3, 3)` are those of a camera that turns, for points `(frames, ..., 3)`.
     """
-    seen = _turned(points - camera.eye, camera.axes)
+    seen = turned(points - camera.eye, camera.axes if axes is None else axes)
     nearness = 1.0 / np.maximum(-seen[..., 2], 0.01)
     scale = camera.focal_pixels * nearness
     width, height = camera.size
@@ -260,11 +218,8 @@ def project(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]
     return pixels, nearness
 
 
-def _turned(points: FloatArray, axes: FloatArray) -> FloatArray:
+def turned(points: FloatArray, axes: FloatArray) -> FloatArray:
+    """Points `(..., 3)` along axes `(3, 3)`, or along axes `(frames, 3, 3)` of their own for each frame."""
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    return np.stack([x * row[0] + y * row[1] + z * row[2] for row in axes], axis=-1)
-
-
-def _turned_back(point: FloatArray, axes: FloatArray) -> FloatArray:
-    turned: FloatArray = (axes * point[:, None]).sum(axis=0)
-    return turned
+    rows = axes.reshape(*axes.shape[:-2], *(1,) * (points.ndim - axes.ndim + 1), 3, 3) if axes.ndim > 2 else axes
+    return np.stack([x * rows[..., i, 0] + y * rows[..., i, 1] + z * rows[..., i, 2] for i in range(3)], axis=-1)

@@ -119,6 +119,11 @@ def place(figure: Figure, positions: FloatArray) -> FloatArray:
     return placed
 
 
+def outline(figure: Figure, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What a figure takes of space: ends of its capsules `(frames, points, 3)`, and their radii `(points,)`, metres."""
+    return place(figure, positions).reshape(len(positions), -1, 3), figure.radii.reshape(-1)
+
+
 def _facing(positions: FloatArray, points: tuple[int, int, int, int]) -> FloatArray:
     """The way a body faces: square to the line of its shoulders and to the line up its neck; `(frames, 3)`."""
     left, right, low, high = (positions[:, point] for point in points)

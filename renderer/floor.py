@@ -1,7 +1,8 @@
 """A floor to stand on: a plane that fades into the background, with a faint grid of metres, and soft contact shadows.
 
-The plane is computed here and not on the GPU, once for a camera; where it travels, only the grid's lines are moved. (A
-window moves them by a shader, `texels`, since a large floor takes longer here than a frame lasts.)
+The plane is computed here and not on the GPU, so that its pixels are the same everywhere: once for a camera, of which
+only the grid's lines move while it travels, and again for every frame of one that turns. (A window, which has no time
+for that, has a shader do it; see `uniforms`.)
 Shadows are capsules like any other, flattened onto the floor: dark and narrow under a foot that stands, wide and faint
 under one that is lifted.
 """
@@ -27,23 +28,28 @@ _BODY_OPACITY, _BODY_RADIUS_M = 0.20, 0.42
 
 
 class Floor:
-    """The plane as one camera sees it.
+    """The plane as one camera sees it, looking along its own axes or along others `(3, 3)`.
 
     What does not change while the camera travels straight on is computed once; the grid's lines move.
     """
 
-    def __init__(self, figure: Figure, camera: Camera) -> None:
+    def __init__(self, figure: Figure, camera: Camera, axes: FloatArray | None = None) -> None:
         self._size = camera.size
         self._ground = to_ycbcr(figure.background)
-        floor = 0.0 if figure.floor_m is None else figure.floor_m
-        way = _rays(camera)
+        axes = camera.axes if axes is None else axes
+        floor = _height(figure)
+        way = _rays(camera, axes)
         falls = (way[1] < -1e-6) & (camera.eye[1] > floor)
-        far = np.where(falls, (floor - camera.eye[1]) / np.where(falls, way[1], -1.0), 0.0)
-        # Half way faded at twice the distance to where the camera looks.
+        down = np.where(falls, way[1], -1.0)
+        far = np.where(falls, (floor - camera.eye[1]) / down, 0.0)
         reach = far * np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-        scale = 2.0 * float(np.hypot(*camera.eye[[0, 2]])) + 2.0 * abs(float(camera.eye[1] - floor)) + 1.0
-        self._seen = np.where(falls, np.exp(-np.log(2.0) * (reach / scale) ** 2), 0.0)
-        self._lines = [_Lines(camera.eye[axis] + far * way[axis]) for axis in (0, 2)]
+        self._seen = np.where(falls, np.exp(-np.log(2.0) * (reach / _half_faded(figure, camera)) ** 2), 0.0)
+        self._lines = []
+        for axis in (0, 2):
+            # How far on the floor one pixel aside and one pixel up lead.
+            steps = [far * (row[axis] - way[axis] * row[1] / down) for row in axes[:2] / camera.focal_pixels]
+            footprint = np.maximum(np.abs(steps[0]) + np.abs(steps[1]), 1e-6)
+            self._lines.append(_Lines(camera.eye[axis] + far * way[axis], footprint))
 
     def luma(self, shift: FloatArray) -> FloatArray:
         """Luma `(height, width)`, not rounded; `shift (3,)` is how far a tracking camera has come, metres."""
@@ -65,31 +71,15 @@ class Floor:
         luma = self.luma(shift)
         return to_rgb(luma, np.full_like(luma, self._ground[1]), np.full_like(luma, self._ground[2]))
 
-    def texels(self) -> tuple[NDArray[np.float32], NDArray[np.float32], dict[str, float | tuple[float, ...]]]:
-        """What `shaders/floor.frag` computes the same from, for any shift.
-
-        Returns
-        -------
-        tuple
-            `(height, width, 4)`: metres along x and z, pixels per metre across the lines of each; `(height, width)`:
-            how much has not faded; and the values of its uniforms.
-        """
-        across, along = self._lines
-        lines = np.stack([across.metres, along.metres, across.slope, along.slope], axis=-1, dtype=np.float32)
-        uniforms: dict[str, float | tuple[float, ...]] = {
-            "ground": tuple(value / 255.0 for value in self._ground),
-            "half_width": _GRID_HALF_WIDTH_M,
-            "shades": (_FLOOR_SHADE, _GRID_SHADE),
-        }
-        return lines, self._seen.astype(np.float32), uniforms
-
 
 class _Lines:
-    """Lines a metre apart across one axis of the floor, as wide on the screen as they are, and as faint where thin."""
+    """Lines a metre apart across one axis of the floor, as wide on the screen as they are, and as faint where thin.
 
-    def __init__(self, metres: FloatArray) -> None:
+    `metres` along the axis, and those that a pixel covers, its `footprint`: both `(height, width)`.
+    """
+
+    def __init__(self, metres: FloatArray, footprint: FloatArray) -> None:
         self.metres = metres
-        footprint = np.maximum(np.abs(np.gradient(metres, axis=0)) + np.abs(np.gradient(metres, axis=1)), 1e-6)
         self.slope = 1.0 / footprint
         # Where a pixel is wider than a third of the spacing the lines would run into each other: they fade before.
         self._faint = np.minimum(1.0, 2.0 * _GRID_HALF_WIDTH_M / footprint) * np.clip(1.5 - 3.0 * footprint, 0.0, 1.0)
@@ -102,19 +92,43 @@ class _Lines:
         return cover
 
 
-def _rays(camera: Camera) -> list[FloatArray]:
+def uniforms(figure: Figure, camera: Camera) -> dict[str, float | tuple[float, ...]]:
+    """What `shaders/floor.frag` computes the same from, except for the axes and the shift of a frame."""
+    return {
+        "eye": tuple(float(value) for value in camera.eye),
+        "middle": (0.5 * camera.size[0], 0.5 * camera.size[1]),
+        "focal": camera.focal_pixels,
+        "floor_m": _height(figure),
+        "half_faded": _half_faded(figure, camera),
+        "ground": tuple(value / 255.0 for value in to_ycbcr(figure.background)),
+        "half_width": _GRID_HALF_WIDTH_M,
+        "shades": (_FLOOR_SHADE, _GRID_SHADE),
+    }
+
+
+def _height(figure: Figure) -> float:
+    return 0.0 if figure.floor_m is None else figure.floor_m
+
+
+def _half_faded(figure: Figure, camera: Camera) -> float:
+    """The distance at which the floor is half way faded: twice that to where the camera looks."""
+    above = abs(float(camera.eye[1] - _height(figure)))
+    return 2.0 * float(np.hypot(*camera.eye[[0, 2]])) + 2.0 * above + 1.0
+
+
+def _rays(camera: Camera, axes: FloatArray) -> list[FloatArray]:
     """The way that each pixel looks: three arrays that go with `(height, width)`, one metre deep."""
     width, height = camera.size
     across = ((np.arange(width) + 0.5 - 0.5 * width) / camera.focal_pixels)[None, :]
     up = ((0.5 * height - np.arange(height) - 0.5) / camera.focal_pixels)[:, None]
-    right, above, back = camera.axes
+    right, above, back = axes
     return [across * right[i] + up * above[i] - back[i] for i in range(3)]
 
 
 def shadow_capsules(
-    placed: FloatArray, figure: Figure, camera: Camera
+    placed: FloatArray, figure: Figure, camera: Camera, axes: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
-    """Shadows of capsules `placed (frames, capsules, 2, 3)`, in pixels.
+    """Shadows of capsules `placed (frames, capsules, 2, 3)`, in pixels, seen along `axes (frames, 3, 3)`.
 
     Returns
     -------
@@ -123,7 +137,7 @@ def shadow_capsules(
         the luma to paint them in. A shadow is a circle on the floor, so on the screen it is flat: stretched by
         that much in y it is round again.
     """
-    floor = 0.0 if figure.floor_m is None else figure.floor_m
+    floor = _height(figure)
     heights = np.maximum(placed[..., 1] - figure.radii - floor, 0.0)
     opacity = _CONTACT_OPACITY * np.exp(-heights.mean(axis=2) / _CONTACT_HEIGHT_M)
     opacity = np.where(opacity > 0.01, opacity, 0.0)
@@ -134,7 +148,7 @@ def shadow_capsules(
     on_floor = np.concatenate([np.broadcast_to(middle, (len(placed), 1, 2, 3)), on_floor], axis=1)
     opacity = np.concatenate([np.full((len(placed), 1), _BODY_OPACITY), opacity], axis=1)
     radii = np.concatenate([np.full((len(placed), 1, 2), _BODY_RADIUS_M), radii], axis=1)
-    pixels, nearness = project(camera, on_floor)
+    pixels, nearness = project(camera, on_floor, axes)
     from_eye = on_floor.mean(axis=2) - camera.eye
     distance = np.sqrt(from_eye[..., 0] ** 2 + from_eye[..., 1] ** 2 + from_eye[..., 2] ** 2)
     stretch = np.clip(distance / np.maximum(-from_eye[..., 1], 1e-3), 1.001, 25.0)

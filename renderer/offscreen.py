@@ -26,6 +26,7 @@ from renderer.context import Context, shared_context
 from renderer.errors import RendererError
 from renderer.floor import Floor
 from renderer.painter import Painter
+from renderer.segments import Segment
 from renderer.shapes import Shapes, lay_out
 
 Bytes = NDArray[np.uint8]
@@ -86,12 +87,11 @@ def render_rgb(
     """Frames of RGB, `(height, width, 3)` each, drawn without the half-size chroma of video; for stills."""
     points = check_positions(positions)
     shapes = lay_out(points, figure, camera, fps)
-    path = camera_path(points, camera, fps)
-    floor = None if figure.floor_m is None else Floor(figure, camera)
+    ground = Ground(figure, camera, points, fps)
     with _rgb_target(camera.size, context) as (target, painter):
-        for data, shift in zip(shapes.data, path, strict=True):
+        for number, data in enumerate(shapes.data):
             with target.ctx:
-                _start_rgb(target, figure, floor, shift)
+                _start_rgb(target, figure, ground.floor(number), ground.path.shift[number])
                 picture = _painted_rgb(target, painter, data, camera.size)
             yield picture
 
@@ -148,18 +148,20 @@ def paste_frames(
     batch: int,
     context: Context | None,
     fps: float = 30.0,
+    segments: Sequence[Segment] = (),
 ) -> Iterator[tuple[Bytes, Box]]:
     """The frames of `render_frames`, each in the *same* array: to be used up before the next one is asked for.
 
-    With each comes the box (left, top, right, bottom) outside which it is the background.
+    Frames in one of the `segments` have its colours. With each comes the box (left, top, right, bottom) outside which
+    it is the background.
     """
     points = check_positions(positions)
     if size is not None and check_size(size) != camera.size:
         raise RendererError(f"Expected the size that the camera was made for, {camera.size}, got {tuple(size)}.")
     if batch < 1:
         raise RendererError(f"Expected a batch of at least one frame, got {batch}.")
-    shapes = lay_out(points, figure, camera, fps)
-    backdrop = _Backdrop(figure, camera, points, fps)
+    shapes = lay_out(points, figure, camera, fps, segments)
+    backdrop = Ground(figure, camera, points, fps)
     gl = (context or shared_context()).gl
     canvas = backdrop.frame(0).copy()
     atlas = Atlas(gl, painter_of(gl), shapes, camera.size, backdrop, batch)
@@ -176,16 +178,22 @@ def paste_frames(
         atlas.release()
 
 
-class _Backdrop:
-    """The background of the figure: one colour, or a floor, which moves under a tracking camera."""
+class Ground:
+    """What is behind the figure: one colour, or a floor, which moves under a camera that tracks or turns."""
 
     def __init__(self, figure: Figure, camera: Camera, positions: NDArray[np.float64], fps: float) -> None:
         self._figure, self._camera = figure, camera
         self.plain = figure.floor_m is None
-        self.moves = not self.plain and camera.track_seconds is not None
-        self._path = camera_path(positions, camera, fps)
+        self.moves = not self.plain and (camera.track_seconds is not None or camera.turns is not None)
+        self.path = camera_path(positions, camera, fps)
         self._floor = None if self.plain else Floor(figure, camera)
         self._known: dict[int, Bytes] = {}
+
+    def floor(self, number: int) -> Floor | None:
+        """The floor as the camera sees it in one frame, except for how far it has come."""
+        if self._floor is None or self._camera.turns is None:
+            return self._floor
+        return Floor(self._figure, self._camera, self.path.axes[number])
 
     def frame(self, number: int) -> Bytes:
         """The NV12 frame without the figure; not to be written to."""
@@ -193,10 +201,12 @@ class _Backdrop:
         if key not in self._known:
             if len(self._known) >= 2 * BATCH:
                 self._known.clear()
-            if self._floor is None:
-                self._known[key] = plain_frame(self._camera.size, self._figure.background)
-            else:
-                self._known[key] = self._floor.nv12(self._path[number])
+            floor = self.floor(number)
+            self._known[key] = (
+                plain_frame(self._camera.size, self._figure.background)
+                if floor is None
+                else floor.nv12(self.path.shift[number])
+            )
         return self._known[key]
 
 
@@ -235,7 +245,7 @@ class Atlas:
     """A picture that holds the boxes of several frames side by side."""
 
     def __init__(
-        self, gl: Any, painter: Painter, shapes: Shapes, size: tuple[int, int], backdrop: _Backdrop, batch: int
+        self, gl: Any, painter: Painter, shapes: Shapes, size: tuple[int, int], backdrop: Ground, batch: int
     ) -> None:
         self._gl, self._painter, self._shapes, self._size = gl, painter, shapes, size
         self._boxes = _cut(shapes.boxes, size)

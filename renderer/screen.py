@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from renderer.camera import Camera, camera_path, check_positions
 from renderer.capsules import Figure
 from renderer.events import Size
-from renderer.floor import Floor
+from renderer.floor import uniforms
 from renderer.painter import SCREEN, Painter
 from renderer.shapes import Shapes, lay_out
 
@@ -82,7 +82,6 @@ class Screen:
         self._painter = Painter(gl, (SCREEN,))
         self._copy, self._floor = (_program(gl, name) for name in ("picture", "floor"))
         self._copy_array, self._floor_array = (gl.vertex_array(one, []) for one in (self._copy, self._floor))
-        self._floor["lines"].value, self._floor["seen"].value = 0, 1
         self._floors: dict[tuple[Any, ...], _LoadedFloor] = {}
 
     def release(self) -> None:
@@ -142,46 +141,44 @@ class Screen:
 
     def _floor_picture(self, drawing: Drawing, frame: int) -> Picture:
         """The floor at one frame; painted again only if the camera has moved."""
-        floor, shift = self._loaded_floor(drawing), drawing.path[frame]
-        if floor.shift != tuple(shift):
-            floor.shift = tuple(shift)
-            for name, value in {**floor.uniforms, "shift": (float(shift[0]), float(shift[2]))}.items():
+        floor = self._loaded_floor(drawing)
+        shift, axes = drawing.path.shift[frame], drawing.path.axes[frame]
+        seen_from = (shift.tobytes(), axes.tobytes())
+        if floor.seen_from != seen_from:
+            floor.seen_from = seen_from
+            right, above, back = (tuple(row) for row in axes)
+            moving = {"shift": (float(shift[0]), float(shift[2])), "right": right, "above": above, "back": back}
+            for name, value in {**floor.uniforms, **moving}.items():
                 self._floor[name].value = value
             floor.target.use()
             self.gl.disable(self.gl.BLEND)
-            for unit, texture in enumerate(floor.textures):
-                texture.use(unit)
             self._floor_array.render(self.gl.TRIANGLE_STRIP, vertices=4)
         return floor.picture
 
     def _loaded_floor(self, drawing: Drawing) -> _LoadedFloor:
         """The same for all motions under one camera, so the latest ones are kept."""
         camera, figure = drawing.camera, drawing.figure
-        view = (camera.eye.tobytes(), camera.axes.tobytes(), camera.focal_pixels, camera.size)
-        key = (*view, figure.floor_m, figure.background)
+        key = (camera.eye.tobytes(), camera.focal_pixels, camera.size, figure.floor_m, figure.background)
         if key not in self._floors:
             while len(self._floors) >= _KEPT_FLOORS:
                 self._floors.pop(next(iter(self._floors))).release()
-            self._floors[key] = _LoadedFloor(self.gl, Floor(figure, camera), camera.size)
+            self._floors[key] = _LoadedFloor(self.gl, uniforms(figure, camera), camera.size)
         return self._floors[key]
 
 
 class _LoadedFloor:
-    """What the floor's shader looks up, and the picture that it painted last."""
+    """What the floor's shader paints from, and the picture that it painted last."""
 
-    def __init__(self, gl: Any, floor: Floor, size: Size) -> None:
-        lines, seen, self.uniforms = floor.texels()
-        self.textures = [_sharp(gl.texture(size, n, one.tobytes(), dtype="f4")) for n, one in ((4, lines), (1, seen))]
+    def __init__(self, gl: Any, uniforms: dict[str, Any], size: Size) -> None:
+        self.uniforms = uniforms
         self.picture = Picture(_sharp(gl.texture(size, 4)))
         self.target = gl.framebuffer([self.picture.texture])
-        self.shift: tuple[float, ...] | None = None
+        self.seen_from: tuple[bytes, ...] | None = None
 
     def release(self) -> None:
         """Free it."""
         self.target.release()
         self.picture.release()
-        for texture in self.textures:
-            texture.release()
 
 
 def _sharp(texture: Any) -> Any:

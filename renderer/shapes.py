@@ -9,6 +9,7 @@ not by the middles of bones: else a long limb would jump before another while bo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from renderer.camera import Camera, camera_path, project
 from renderer.capsules import Figure, kept_capsules, place
 from renderer.colour import to_ycbcr
 from renderer.floor import shadow_capsules
+from renderer.segments import Segment, painted
 
 FloatArray = NDArray[np.float64]
 
@@ -47,12 +49,14 @@ class Shapes:
     boxes: NDArray[np.int64]
 
 
-def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 30.0) -> Shapes:
-    """Capsules on the screen, sorted from the back to the front; `fps` matters to a camera that tracks."""
-    positions = positions - camera_path(positions, camera, fps)[:, None]
-    placed = place(figure, positions)
+def lay_out(
+    positions: FloatArray, figure: Figure, camera: Camera, fps: float = 30.0, segments: Sequence[Segment] = ()
+) -> Shapes:
+    """Capsules on the screen, sorted from the back to the front; `fps` matters to a camera that moves."""
+    path = camera_path(positions, camera, fps)
+    placed = place(figure, positions - path.shift[:, None])
     figure, placed = _without_hidden(figure, placed)
-    ends, nearness = project(camera, placed)
+    ends, nearness = project(camera, placed, path.axes)
     # Rounded to 1/256 pixel, as far as the eye goes; what remains of a difference in the last bit of a sine between
     # two machines is rounded away too.
     ends = np.round(ends * 256.0) / 256.0
@@ -60,10 +64,12 @@ def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 
     radii = np.maximum(np.round(radii * 256.0) / 256.0, 0.5)
     order = paint_order(ends, radii, nearness, figure.radii.mean(axis=1), joined(figure))
     data = _shader_numbers(ends, radii, figure)
+    for segment in segments:
+        data[segment.start : segment.stop, :, 8:11] = _paint(painted(figure, segment.start, [segment]))
     data = np.take_along_axis(data, order[..., None], axis=1)
     boxes = _boxes(ends, radii)
     if figure.floor_m is not None:
-        shadows, shadow_boxes = _shadows(placed, figure, camera)
+        shadows, shadow_boxes = _shadows(placed, figure, camera, path.axes)
         data = np.concatenate([shadows, data], axis=1)
         boxes = np.concatenate(
             [np.minimum(boxes[:, :2], shadow_boxes[:, :2]), np.maximum(boxes[:, 2:], shadow_boxes[:, 2:])], axis=1
@@ -71,9 +77,11 @@ def lay_out(positions: FloatArray, figure: Figure, camera: Camera, fps: float = 
     return Shapes(data, boxes)
 
 
-def _shadows(placed: FloatArray, figure: Figure, camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _shadows(
+    placed: FloatArray, figure: Figure, camera: Camera, axes: FloatArray
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """The shadows' numbers and boxes; they cover fully in their middle and fade out towards their radius."""
-    ends, radii, opacity, stretch, luma = shadow_capsules(placed, figure, camera)
+    ends, radii, opacity, stretch, luma = shadow_capsules(placed, figure, camera, axes)
     ends, radii = np.round(ends * 256.0) / 256.0, np.maximum(np.round(radii * 256.0) / 256.0, 0.5)
     boxes = _boxes(ends, radii)
     round_ends = ends.copy()
@@ -127,12 +135,17 @@ def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure | None) 
     data[..., 15] = 1.0
     if figure is None:
         return data
-    data[..., 8:11] = np.array([to_ycbcr(colour) for colour in figure.colours]) / 255.0
+    data[..., 8:11] = _paint(figure)
     if figure.lit:
         rounded = np.zeros((count, 2), dtype=bool) if figure.rounded is None else figure.rounded
         # 1: going straight on at both ends; 2: the far end is round; 3: both are.
         data[..., 14] = 1.0 + rounded[:, 1] + (rounded[:, 0] & rounded[:, 1])
     return data
+
+
+def _paint(figure: Figure) -> FloatArray:
+    paint: FloatArray = np.array([to_ycbcr(colour) for colour in figure.colours]) / 255.0
+    return paint
 
 
 def _boxes(ends: FloatArray, radii: FloatArray) -> NDArray[np.int64]:

@@ -8,48 +8,25 @@ their own colours.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.camera import Camera, check_positions, find_heading, frame_group, project
+from renderer.camera import Camera, check_positions, project
 from renderer.capsules import Figure
-from renderer.colour import RGB
 from renderer.context import Context
 from renderer.errors import RendererError
 from renderer.files import whole_file
+from renderer.framing import find_heading, frame_group
 from renderer.offscreen import render_layers
+from renderer.segments import Segment, painted
 
 FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 LAYOUTS = ("row", "onion")
-
-SEGMENT_COLOURS: dict[str, RGB] = {"source": (0, 98, 168), "blend": (158, 58, 128), "destination": (204, 98, 0)}
-"""Told apart by people with any colour vision (after Okabe and Ito 2008), and by their place in the row."""
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Frames `start .. stop - 1` of a motion, drawn in a colour of their own (by name where None)."""
-
-    name: str
-    start: int
-    stop: int
-    colour: RGB | None = None
-
-    @property
-    def paint(self) -> RGB:
-        """The colour to draw it in."""
-        if self.colour is not None:
-            return self.colour
-        if self.name not in SEGMENT_COLOURS:
-            raise RendererError(
-                f"Expected a segment named {', '.join(SEGMENT_COLOURS)}, or one with a colour; got {self.name!r}."
-            )
-        return SEGMENT_COLOURS[self.name]
 
 
 def render_strip(
@@ -140,7 +117,7 @@ def draw_strip(
     if not (height % 2 == 0 and 32 <= height <= 4096):
         raise RendererError(f"Expected an even height from 32 to 4096 pixels, got {height}.")
     shown = _choose(len(points), count, frames)
-    figures = [_painted(figure, frame, segments) for frame in shown]
+    figures = [painted(figure, frame, segments) for frame in shown]
     if layout == "onion":
         seen = camera or frame_group([points[shown]], size=_wide(points[shown], height, view), view=view)
         faded = [_faded(f, share) for f, share in zip(figures, np.linspace(0.62, 0.0, len(shown)), strict=True)]
@@ -192,19 +169,6 @@ def _choose(total: int, count: int, frames: Sequence[int] | None) -> list[int]:
     if count < 1:
         raise RendererError(f"Expected at least one pose, got count {count}.")
     return sorted({round(frame) for frame in np.linspace(0, total - 1, min(count, total)).tolist()})
-
-
-def _painted(figure: Figure, frame: int, segments: Sequence[Segment]) -> Figure:
-    """The figure in the colour of the frame's segment; its own light and dark sides stay apart."""
-    for segment in segments:
-        if segment.start <= frame < segment.stop:
-            lightness = figure.colours.mean(axis=1)
-            middle, spread = lightness.mean(), max(float(np.ptp(lightness)), 1.0)
-            share = ((lightness - middle) / spread)[:, None]
-            paint = np.array(segment.paint, dtype=np.float64)
-            colours = np.where(share > 0, paint + (255.0 - paint) * 0.55 * share, paint * (1.0 + 0.45 * share))
-            return replace(figure, colours=np.round(np.clip(colours, 0, 255)).astype(np.int64))
-    return figure
 
 
 def _faded(figure: Figure, share: float) -> Figure:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -30,6 +30,7 @@ from renderer.digest import Box, FramesHash
 from renderer.errors import RendererError
 from renderer.files import whole_file
 from renderer.offscreen import BATCH, paste_frames
+from renderer.segments import Segment
 
 PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
 
@@ -107,6 +108,7 @@ def render_video(
     crf: int = CRF,
     batch: int = BATCH,
     context: Context | None = None,
+    segments: Sequence[Segment] = (),
 ) -> VideoInfo:
     """Draw a motion and encode it.
 
@@ -126,6 +128,8 @@ def render_video(
         Of libx264: how long it searches, and how much it may lose (0 nothing, 18 nothing that is seen).
     batch, context
         As for `render_frames`; neither changes a pixel.
+    segments
+        Stretches of frames with colours of their own.
 
     Raises
     ------
@@ -133,7 +137,9 @@ def render_video(
         For input that can't be drawn, a folder that can't be written, a full disk, a missing encoder. Nothing is then
         left under `path`, except for what was there before.
     """
-    frames = paste_frames(positions, figure, camera, size, batch, context, fps=float(frame_rate(fps)))
+    frames = paste_frames(
+        positions, figure, camera, size, batch, context, fps=float(frame_rate(fps)), segments=segments
+    )
     luma, blue, red = (round(value) for value in to_ycbcr(figure.background))
     return _write(path, frames, (luma, blue, red), size=camera.size, fps=fps, preset=preset, crf=crf)
 

@@ -1,4 +1,4 @@
-"""From where to look: the side from which a group's motion is largest and clearest in a fixed frame.
+"""From where to look: the side from which a group's motion is largest and clearest.
 
 A fixed camera that sees all of a travelling figure either looks along its way, where the limbs swing towards the
 camera and hardly move in the picture, or from the side, where the way fills the frame and the figure is small. Between
@@ -13,21 +13,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.camera import Camera, check_positions, frame_group, project, smooth_path
+from renderer.camera import Camera, check_positions, project_film
+from renderer.framing import frame_group
 
 FloatArray = NDArray[np.float64]
 
 CANDIDATES_DEGREES = tuple(range(-90, 91, 5))
 """Views tried, from one side by the front to the other."""
 
+LOOKS_HZ = 15.0
+"""Frames per second that are looked at: to choose a view, not to frame it."""
+
 
 def best_view(
     positions_list: Sequence[ArrayLike],
     *,
-    size: tuple[int, int] = (640, 480),
     heading: float,
-    track_seconds: float | None = None,
     fps: float = 30.0,
+    **framing: Any,
 ) -> float:
     """The view, radians from the front, in which a group's figures are large and their limbs move most.
 
@@ -35,11 +38,9 @@ def best_view(
     ----------
     positions_list
         Each `(frames, points, 3)`, metres; point 0 is what the others' motion is seen against (the pelvis).
-    size
-        Width and height of the frame in pixels.
     heading
         The direction that counts as forwards, radians about Y from +Z.
-    track_seconds, fps
+    fps, framing
         As for `frame_group`.
 
     Returns
@@ -50,11 +51,11 @@ def best_view(
         one nearest to the front, then the one to the left.
     """
     group = [check_positions(positions, f"positions of clip {i}") for i, positions in enumerate(positions_list)]
+    step = max(1, round(fps / LOOKS_HZ))
+    group, fps = [positions[::step] for positions in group], fps / step
     candidates = sorted((np.radians(degrees) for degrees in CANDIDATES_DEGREES), key=lambda view: (abs(view), view))
-    following: dict[str, Any] = {"track_seconds": track_seconds, "fps": fps}
     scores = [
-        clarity(group, frame_group(group, size=size, view=view, heading=heading, **following), fps)
-        for view in candidates
+        clarity(group, frame_group(group, view=view, heading=heading, fps=fps, **framing), fps) for view in candidates
     ]
     return float(candidates[int(np.argmax(np.round(scores, 6)))])
 
@@ -63,10 +64,7 @@ def clarity(group: Sequence[FloatArray], camera: Camera, fps: float) -> float:
     """Geometric mean of the figures' median height, pixels, and their points' mean speed against point 0, pixels/s."""
     heights, speeds = [], []
     for positions in group:
-        if camera.track_seconds is not None:
-            positions = positions - smooth_path(positions, camera.track_seconds, fps)[:, None]
-        seen, _ = project(camera, positions.reshape(-1, 3))
-        seen = seen.reshape(*positions.shape[:2], 2)
+        seen, _ = project_film(camera, positions, fps)
         heights.append(np.ptp(seen[..., 1], axis=1))
         moved = np.diff(seen - seen[:, :1], axis=0)
         speeds.append(fps * np.linalg.norm(moved, axis=-1).mean(axis=1) if len(moved) else np.zeros(1))

@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.errors import StimulusError
-from study.motion.clip import Clip, joint_positions
+from study.motion.clip import Clip, joint_positions, trim
 from study.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from renderer.figure import Figure
+
+AROUND_S = 2.0
+"""What a video of a transition shows before and after its blend, as the stimuli of 2004 do (section 4.2)."""
 
 # Hip to ankle over stature (Winter, Biomechanics and Motor Control of Human Movement, anthropometric table).
 LEG_SHARE = 0.491
@@ -56,11 +59,11 @@ def draw_clip(
     clip: Clip,
     out: Path,
     *,
-    size: tuple[int, int] = (640, 480),
+    size: tuple[int, int] = (1280, 720),
     view: str = "three-quarter",
     style: str = "stick",
     poses: int = 9,
-    track_seconds: float | None = None,
+    camera: str = "track",
     floor: bool = False,
     blended: tuple[int, int] | None = None,
 ) -> None:
@@ -72,37 +75,36 @@ def draw_clip(
         What to draw, and where to.
     size
         Width and height of a video in pixels; a strip is as wide as its poses need.
-    view, style
-        As the renderer takes them.
+    view, style, camera
+        As the renderer takes them; the camera is that of a video.
     poses
         How many poses a strip shows.
-    track_seconds
-        Let the camera follow the figure; smoothing window in seconds.
     floor
         Draw the ground, at height 0, with contact shadows.
     blended
-        Frames of a transition's blend, as a slice counts them: a strip shows source, blend and destination apart.
+        Frames of a transition's blend, as a slice counts them: source, blend and destination are coloured apart. A
+        video then shows `AROUND_S` before and after the blend, and no more.
     """
+    from renderer.segments import Segment
+
+    if out.suffix.lower() not in (".mp4", ".png"):
+        raise StimulusError(f"{out}: expected a name that ends in .mp4 or .png, found {out.suffix or 'no ending'!r}.")
+    if blended is not None and out.suffix.lower() == ".mp4":
+        around = round(AROUND_S * clip.fps)
+        first, stop = max(blended[0] - around, 0), min(blended[1] + around, clip.frames)
+        clip, blended = trim(clip, first, stop), (blended[0] - first, blended[1] - first)
     positions = joint_positions(clip, ends=True)
     figure = figure_for(clip.skeleton, style, floor_m=0.0 if floor else None)
+    edges = [0, *blended, clip.frames] if blended is not None else []
+    parts = zip(("source", "blend", "destination"), edges, edges[1:], strict=False)
+    segments = [Segment(name, start, stop) for name, start, stop in parts if stop > start]
     if out.suffix.lower() == ".mp4":
-        from renderer.camera import frame_group
+        from renderer.framing import frame_group
         from renderer.video import render_video
 
-        camera = frame_group([positions], size=size, view=view, track_seconds=track_seconds, fps=clip.fps)
-        render_video(out, positions, figure, camera, fps=clip.fps)
-    elif out.suffix.lower() == ".png":
-        from renderer.strip import Segment, render_strip
-
-        segments: list[Segment] = []
-        if blended is not None:
-            edges = [0, *blended, clip.frames]
-            names = ("source", "blend", "destination")
-            segments = [
-                Segment(name, start, stop)
-                for name, start, stop in zip(names, edges, edges[1:], strict=False)
-                if stop > start
-            ]
-        render_strip(out, positions, figure, count=poses, segments=segments, view=view)
+        seen = frame_group([positions], figures=[figure], camera=camera, size=size, view=view, fps=clip.fps)
+        render_video(out, positions, figure, seen, fps=clip.fps, segments=segments)
     else:
-        raise StimulusError(f"{out}: expected a name that ends in .mp4 or .png, found {out.suffix or 'no ending'!r}.")
+        from renderer.strip import render_strip
+
+        render_strip(out, positions, figure, count=poses, segments=segments, view=view)

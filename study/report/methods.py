@@ -115,7 +115,11 @@ def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:
 def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
     shown = protocol.stimuli
     motions = "synthetic motions" if manifest.synthetic else f"motions of the library {words.library(manifest.library)}"
-    camera = f"a camera following it (smoothed over {shown.track_s:g} s)" if shown.track_s else "a fixed camera"
+    camera = {
+        "fixed": "a fixed camera",
+        "pan": "a camera that stood still and turned by a path quadratic in time, the same for all stimuli of a group,",
+        "track": f"a camera following it (smoothed over {shown.smoothing_s:g} s)",
+    }[shown.camera]
     ground = "above a ground plane" if shown.floor else "without a ground plane"
     how, joint = _made(protocol, manifest)
     return (

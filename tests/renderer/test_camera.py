@@ -5,17 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.camera import (
-    Camera,
-    check_positions,
-    check_size,
-    find_heading,
-    frame_group,
-    project,
-    smooth_path,
-    view_axes,
-)
+from renderer.camera import Camera, check_positions, check_size, project, smooth_path, view_axes
 from renderer.errors import RendererError
+from renderer.framing import find_heading, frame_group
 
 
 def group_of(random: np.random.Generator) -> list[np.ndarray]:
@@ -135,7 +127,7 @@ def test_a_tracking_camera_keeps_a_runner_in_the_middle() -> None:
     np.testing.assert_allclose(path[:, 2], runner[:, 0, 2], atol=0.02)
     assert np.ptp(path[:, 0]) < 0.5 * np.ptp(runner[:, 0, 0]), "sway is not followed"
     still = frame_group([runner], view="side")
-    tracking = frame_group([runner], view="side", track_seconds=0.4)
+    tracking = frame_group([runner], view="side", camera="track", track_seconds=0.4)
     seen, _ = project(tracking, runner - path[:, None])
     assert ((seen > 0) & (seen < [640, 480])).all()
     tall = [float(np.ptp(project(c, runner[:1])[0][0, :, 1])) for c in (still, tracking)]
@@ -199,7 +191,7 @@ def test_a_nan_is_found_and_named() -> None:
         ({"view": "behind"}, "front, side, three-quarter.*'behind'"),
         ({"view": float("nan")}, "finite angle"),
         ({"field_of_view": 4.0}, "field of view"),
-        ({"track_seconds": -1.0}, "tracking time"),
+        ({"camera": "track", "track_seconds": -1.0}, "tracking time"),
     ],
 )
 def test_settings_that_make_no_camera(settings: Any, match: str) -> None:

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 DRAW = """
 import numpy as np
 from renderer.context import open_context, shared_context
-from renderer.camera import frame_group
+from renderer.framing import frame_group
 from renderer.figure import make_figure
 from renderer.offscreen import render_frames, render_rgb
 from renderer.digest import hash_frames

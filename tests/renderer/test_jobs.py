@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.camera import frame_group
 from renderer.errors import RendererError
 from renderer.figure import make_figure
+from renderer.framing import frame_group
 from renderer.jobs import Progress, RenderJob, default_workers, render_many
 
 ROOT = Path(__file__).parents[2]
@@ -84,7 +84,7 @@ LONG = """
 import sys
 import numpy as np
 from pathlib import Path
-from renderer.camera import frame_group
+from renderer.framing import frame_group
 from renderer.figure import make_figure
 from renderer.jobs import RenderJob, render_many
 
@@ -133,7 +133,7 @@ NO_GL = """
 import os, sys
 import numpy as np
 from pathlib import Path
-from renderer.camera import frame_group
+from renderer.framing import frame_group
 from renderer.figure import make_figure
 from renderer.jobs import RenderJob, render_many
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.camera import Camera, frame_group, project, view_axes
+from renderer.camera import Camera, project, view_axes
 from renderer.capsules import Figure, place
 from renderer.colour import nv12_to_rgb, to_ycbcr
 from renderer.context import open_context
 from renderer.digest import hash_frames
 from renderer.errors import RendererError
 from renderer.figure import STYLES, make_figure
+from renderer.framing import frame_group
 from renderer.offscreen import plain_frame, render_frames, render_layers, render_rgb
 from renderer.shapes import lay_out
 
@@ -276,7 +277,7 @@ def test_layers_are_painted_over_one_another() -> None:
 
 
 def test_a_tracking_camera_follows(puppet: Any) -> None:
-    clip, figure, camera = puppet_scene(puppet, frames=30, view="side", track_seconds=0.5)
+    clip, figure, camera = puppet_scene(puppet, frames=30, view="side", camera="track", track_seconds=0.5)
     middles = []
     for frame in render_frames(clip, figure, camera):
         columns = np.flatnonzero((frame[:240] != frame[0, 0]).any(axis=0))
@@ -304,7 +305,7 @@ def test_a_floor_darkens_under_the_feet_and_stands_still(puppet: Any) -> None:
 def test_a_floor_travels_under_a_tracking_camera(puppet: Any) -> None:
     figure = make_figure(puppet.bones, puppet.sides, puppet.parts, floor_m=0.0)
     clip = puppet.walk(6, speed=3.0)
-    camera = frame_group([clip], size=(160, 120), view="side", track_seconds=0.4)
+    camera = frame_group([clip], size=(160, 120), view="side", camera="track", track_seconds=0.4)
     frames = list(render_frames(clip, figure, camera))
     assert (frames[0][100:120, :30] != frames[5][100:120, :30]).any()
     alone = list(render_frames(clip, figure, camera, batch=1))

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.camera import Camera, frame_group, view_axes
+from renderer.camera import Camera, view_axes
 from renderer.figure import make_figure
+from renderer.framing import frame_group
 from renderer.shapes import joined, lay_out, nearest_on_screen, paint_order
 
 

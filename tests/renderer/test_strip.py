@@ -10,7 +10,8 @@ from PIL import Image
 from renderer.colour import to_ycbcr
 from renderer.errors import RendererError
 from renderer.figure import make_figure
-from renderer.strip import SEGMENT_COLOURS, Segment, draw_strip, render_strip
+from renderer.segments import SEGMENT_COLOURS, Segment
+from renderer.strip import draw_strip, render_strip
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("context")]
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from renderer import files
-from renderer.camera import frame_group
 from renderer.digest import FramesHash, hash_frames
 from renderer.errors import RendererError
 from renderer.figure import make_figure
+from renderer.framing import frame_group
 from renderer.offscreen import plain_frame, render_frames
 from renderer.video import frame_rate, render_video, write_video
 

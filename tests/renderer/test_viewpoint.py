@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from renderer.camera import frame_group, project
+from renderer.camera import project
+from renderer.framing import frame_group
 from renderer.viewpoint import best_view, clarity
 
 

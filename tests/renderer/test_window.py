@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer.camera import Camera, frame_group
+from renderer.camera import Camera
 from renderer.events import key_name
 from renderer.figure import make_figure
+from renderer.framing import frame_group
 from renderer.pacing import find_pacing, next_flip
 from renderer.screen import Drawing, fitted_camera
 
@@ -112,7 +113,7 @@ def in_a_window(code: str, display: str) -> str:
         "import numpy as np, subprocess, time\n"
         "from renderer.window import *\n"
         "from renderer.figure import make_figure\n"
-        "from renderer.camera import frame_group\n"
+        "from renderer.framing import frame_group\n"
         "points = np.array([[0, 0, 0], [0, 1, 0], [0.4, 0.7, 0.1], [-0.4, 0.6, 0.0]], dtype=float)\n"
         "walk = points[None] + np.linspace(0, 0.3, 5)[:, None, None] * np.array([1.0, 0, 0])\n"
         "figure = make_figure(np.array([[0, 1], [1, 2], [1, 3]]), ['centre', 'centre', 'left', 'right'], {})\n"
@@ -133,22 +134,21 @@ def in_a_window(code: str, display: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("tracking", [False, True], ids=["still camera", "travelling camera"])
+@pytest.mark.parametrize("kind", ["fixed", "track", "pan"])
 @pytest.mark.parametrize("floor", [False, True], ids=["no floor", "floor"])
 def test_a_frame_in_the_window_is_the_one_of_the_offscreen_renderer(
-    virtual_display: str, floor: bool, tracking: bool
+    virtual_display: str, floor: bool, kind: str
 ) -> None:
     """Byte for byte without a floor, the right way up, in the middle of the window on the figure's background.
 
     The floor's shader reckons in single precision: a level of 255 aside here and there, and nowhere more.
     """
     out = in_a_window(
-        f"floor, tracking = {floor}, {tracking}\n"
+        f"floor, kind = {floor}, {kind!r}\n"
         "from dataclasses import replace\n"
         "if floor: figure = replace(figure, floor_m=0.0)\n"
         "walk = walk + np.linspace(0, 1.3, 5)[:, None, None] * np.array([1.0, 0, 0.4])\n"
-        "track = 0.4 if tracking else None\n"
-        "camera = frame_group([walk], size=(160, 120), view='front', track_seconds=track, elevation=0.4)\n"
+        "camera = frame_group([walk], size=(160, 120), view='front', camera=kind, track_seconds=0.4, elevation=0.4)\n"
         "d = w.drawing(walk, figure, camera, 30.0, fill=False)\n"
         "from renderer.offscreen import render_rgb\n"
         "from renderer.context import Context\n"
@@ -168,7 +168,7 @@ def test_a_frame_in_the_window_is_the_one_of_the_offscreen_renderer(
     assert int(largest) <= (1 if floor else 0)
     assert float(share) < 0.01
     assert float(foreground) > (0.5 if floor else 0.02)
-    assert (int(travels) > 3) == (floor and tracking)
+    assert (int(travels) > 3) == (floor and kind != "fixed")
 
 
 def test_a_picture_is_shown_pixel_for_pixel(virtual_display: str) -> None:

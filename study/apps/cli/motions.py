@@ -11,6 +11,7 @@ import click
 
 from study.apps.cli.clips import clips_options, load_clip
 from study.apps.cli.console import emit, json_option, library_option, say
+from study.apps.cli.films import film_options, film_size
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -170,14 +171,10 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 @clips_options
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.mp4, or X.png: a strip.")
 @click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video (default: that of the clip).")
-@click.option(
-    "--view", type=click.Choice(["front", "side", "three-quarter"]), default="three-quarter", show_default=True
-)
+@film_options
 @click.option("--style", type=click.Choice(["stick", "points", "mannequin"]), default="stick", show_default=True)
-@click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Of the video, in pixels.")
 @click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Of the strip.")
 @click.option("--floor", is_flag=True, help="Draw the ground, with contact shadows.")
-@click.option("--track", is_flag=True, help="Let the camera follow the figure.")
 @json_option
 def preview(
     clip: str,
@@ -185,29 +182,18 @@ def preview(
     out: Path,
     fps: float | None,
     view: str,
-    style: str,
+    camera: str,
     size: str,
+    style: str,
     poses: int,
     floor: bool,
-    track: bool,
     as_json: bool,
 ) -> None:
     """One clip as a video, or as a strip of poses in one image."""
     from study.motion.drawing import draw_clip
 
-    width, _, height = size.partition("x")
-    if not (width.isdigit() and height.isdigit()):
-        raise click.UsageError(f"expected --size as WIDTHxHEIGHT such as 640x480, found {size!r}.")
+    wanted = film_size(size)
     shown = load_clip(clip, library, fps)
-    draw_clip(
-        shown,
-        out,
-        size=(int(width), int(height)),
-        view=view,
-        style=style,
-        poses=poses,
-        floor=floor,
-        track_seconds=1.0 if track else None,
-    )
+    draw_clip(shown, out, size=wanted, view=view, camera=camera, style=style, poses=poses, floor=floor)
     result = {"file": str(out), "frames": shown.frames, "fps": shown.fps, "history": list(shown.history)}
     emit(result, as_json, f"{out}: {shown.name or clip}, {counted(shown.frames, 'frame')} at {shown.fps:g} fps")

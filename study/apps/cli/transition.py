@@ -11,6 +11,7 @@ from click.core import ParameterSource
 
 from study.apps.cli.clips import clip_pair, clips_options
 from study.apps.cli.console import emit, json_option
+from study.apps.cli.films import film_options, film_size
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
 from study.transitions.methods.registry import METHODS
@@ -159,6 +160,7 @@ def _check_two_windows(method: str, specification: str) -> None:
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
 )
+@film_options
 @json_option
 def transition(
     source: str,
@@ -175,11 +177,15 @@ def transition(
     keep_slide: bool,
     unit: str | None,
     out: Path,
+    view: str,
+    camera: str,
+    size: str,
     as_json: bool,
 ) -> None:
     """Blend from frame --start of SRC to frame --end of DST and write the result.
 
-    --start, --end and --frames are frames at --fps.
+    --start, --end and --frames are frames at --fps. A film shows two seconds before and after the blend; source, blend
+    and destination have the colours that they have in a strip.
     """
     from study.motion.drawing import draw_clip
     from study.motion.library_file import UNITS
@@ -189,6 +195,7 @@ def transition(
 
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
+    wanted = film_size(size)
     first, second = clip_pair(source, destination, library, fps)
     joined, found = join(first, second, (start, end), method, frames, weight, specification, joint_frames(joints))
     points = {**moment(first, start, "start"), **moment(second, end, "end")}
@@ -204,7 +211,8 @@ def transition(
     if out.suffix.lower() == ".bvh":
         write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
     else:
-        draw_clip(joined.clip, out, blended=(joined.blend_start, joined.blend_stop))
+        blended = joined.blend_start, joined.blend_stop
+        draw_clip(joined.clip, out, size=wanted, view=view, camera=camera, blended=blended)
     rate = joined.clip.fps
     result = {
         "file": str(out),

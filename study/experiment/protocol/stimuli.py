@@ -5,7 +5,7 @@ Pydantic models only; `protocol.Protocol` holds them.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -31,18 +31,23 @@ class Colours(Part):
 class StimulusSettings(Part):
     """How every stimulus of the protocol is built and drawn."""
 
-    width: int = Field(default=640, ge=64, le=3840, multiple_of=2, description="Width of the video; even. [pixels]")
-    height: int = Field(default=480, ge=64, le=2160, multiple_of=2, description="Height of the video; even. [pixels]")
+    width: int = Field(default=1280, ge=64, le=3840, multiple_of=2, description="Width of the video; even. [pixels]")
+    height: int = Field(default=720, ge=64, le=2160, multiple_of=2, description="Height of the video; even. [pixels]")
+    camera: Literal["fixed", "pan", "track"] = Field(
+        default="pan",
+        description="What the camera of a group does: `fixed` nothing; `pan` stands still and turns by one slow path "
+        "for all films of the group; `track` follows the figure, which hides part of its motion.",
+    )
     view: Literal["clearest", "front", "side", "three-quarter"] = Field(
         default="clearest",
-        description="Direction of the fixed camera relative to the group's heading; `clearest` is the view in which "
+        description="Direction of the camera relative to the group's heading; `clearest` is the view in which "
         "the group's figures are large and their limbs move most in the picture.",
     )
     track_s: float | None = Field(
         default=None,
         gt=0,
         le=60,
-        description="Let the camera follow the figure; smoothing window. [seconds]",
+        description='Smoothing window of `camera = "track"`, 1 where it is missing. [seconds]',
     )
     style: Literal["stick", "points", "mannequin"] = Field(default="stick", description="How the figure is drawn.")
     floor: bool = Field(
@@ -50,7 +55,8 @@ class StimulusSettings(Part):
     )
     camera_group: Literal["transition", "category", "study"] = Field(
         default="transition",
-        description="Which stimuli share one camera (2004: groups of motions share a camera position).",
+        description="Which stimuli share one camera (2004: groups of motions share a camera position); those that one "
+        "trial compares always do.",
     )
     entry_s: float = Field(
         default=2.0, ge=0, le=60, description="Source motion shown before the blend starts. [seconds]"
@@ -63,6 +69,27 @@ class StimulusSettings(Part):
     )
     clean_feet: bool = Field(default=True, description="Whether sliding of planted feet is removed after blending.")
     colours: Colours = Field(default=Colours(), description="Colours of the picture.")
+
+    @property
+    def smoothing_s(self) -> float:
+        """Smoothing window of a camera that tracks, seconds."""
+        return 1.0 if self.track_s is None else self.track_s
+
+    @model_validator(mode="before")
+    @classmethod
+    def _tracks(cls, data: Any) -> Any:
+        """Protocols that were written before there was a `camera` say by `track_s` that it tracks."""
+        if isinstance(data, dict) and data.get("track_s") is not None and "camera" not in data:
+            return {**data, "camera": "track"}
+        return data
+
+    @model_validator(mode="after")
+    def _smoothing(self) -> Self:
+        if self.track_s is not None and self.camera != "track":
+            raise KeyMismatchError(
+                f'expected camera = "track" with track_s, found {self.camera!r}; leave track_s out, or track', "camera"
+            )
+        return self
 
 
 class Timing(Part):

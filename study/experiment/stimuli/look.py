@@ -1,14 +1,14 @@
 """The look of stimuli: figures, one camera a group, and the hash of all that is seen, which is a stimulus's name.
 
-Drafts come in; `Stimulus` objects go out. One fixed camera serves a group (2004 section 4.1: groups of motions were
-shown from the same position). Transitions start over the same point with the same heading, so that it sees all of them
-from the same side, as close as possible.
+Drafts come in; `Stimulus` objects go out. One camera serves a group (2004 section 4.1: groups of motions were shown
+from the same position): what one trial compares is always seen by the same one. Transitions start over the same point
+with the same heading, so that it sees all of them from the same side.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol
 from study.experiment.stimuli.drafts import Draft
-from study.experiment.stimuli.films import Film
+from study.experiment.stimuli.films import Film, Planned
 from study.experiment.stimuli.stimulus import MotionUse, Stimulus, StimulusRecord
 from study.experiment.stimuli.supply import Supply
 from study.motion.clip import Clip
@@ -30,44 +30,66 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-LOOK_VERSION = 1
+LOOK_VERSION = 2
 """Part of every stimulus's name: raised when the renderer comes to draw the same figure otherwise."""
 
 
-def with_cameras(protocol: Protocol, library: Library, drafts: Mapping[Film, Draft]) -> dict[Film, Stimulus]:
+def with_cameras(
+    protocol: Protocol, library: Library, planned: Sequence[Planned], drafts: Mapping[Film, Draft]
+) -> dict[Film, Stimulus]:
     """Figures, one camera a group, and names."""
-    from renderer.camera import frame_group
     from renderer.errors import RendererError
+    from renderer.framing import frame_group
     from renderer.viewpoint import best_view
 
     settings = protocol.stimuli
-    groups: dict[str, list[Film]] = {}
-    for key, draft in drafts.items():
-        groups.setdefault(_group(protocol, draft), []).append(key)
+    framing: dict[str, Any] = {
+        "camera": settings.camera,
+        "size": (settings.width, settings.height),
+        "track_seconds": settings.smoothing_s,
+        "fps": protocol.fps,
+        "heading": 0.0,
+    }
     stimuli: dict[Film, Stimulus] = {}
     try:
-        for group, keys in groups.items():
-            moving, size = [drafts[key].positions for key in keys], (settings.width, settings.height)
-            following: dict[str, Any] = {"track_seconds": settings.track_s, "fps": protocol.fps}
-            clearest = settings.view == "clearest"
-            view = best_view(moving, size=size, heading=0.0, **following) if clearest else settings.view
-            camera = frame_group(moving, size=size, view=view, heading=0.0, **following)
-            for key in keys:
-                stimuli[key] = _stimulus(protocol, library, drafts[key], group, camera)
+        for group, films in camera_groups(protocol, planned).items():
+            moving, view = [drafts[film].positions for film in films], settings.view
+            figures = [_figure(protocol, drafts[film].clip) for film in films]
+            seen_from = best_view(moving, **framing) if view == "clearest" else view
+            camera = frame_group(moving, figures=figures, view=seen_from, **framing)
+            for film, figure in zip(films, figures, strict=True):
+                stimuli[film] = _stimulus(protocol, library, drafts[film], group, figure, camera)
     except RendererError as error:
         raise StimulusError(str(error)) from error
-    return {key: stimuli[key] for key in drafts}
+    return {film: stimuli[film] for film in drafts}
 
 
-def _group(protocol: Protocol, draft: Draft) -> str:
+def camera_groups(protocol: Protocol, planned: Sequence[Planned]) -> dict[str, list[Film]]:
+    """Which films share a camera, by a name of their group.
+
+    With `camera_group = "transition"` those of one transition in one study, and in others that show one of its films: a
+    transition that two studies show at different points is seen by a camera for each.
+    """
     kind = protocol.stimuli.camera_group
-    if kind == "study":
-        return protocol.name
-    return draft.settled.transition.category if kind == "category" else draft.settled.transition.name
+    groups: list[tuple[str, dict[Film, None]]] = []
+    for each in planned:
+        transition = each.settled.transition
+        name = {"study": protocol.name, "category": transition.category, "transition": transition.name}[kind]
+        films = dict.fromkeys(film for showing in each.showings for film in showing.films)
+        same = [one for one in groups if one[0] == name and (kind != "transition" or one[1].keys() & films.keys())]
+        merged = {film: None for _, own in same for film in own} | films
+        groups = [one for one in groups if one not in same] + [(name, merged)]
+    names: dict[str, int] = {}
+    named = {}
+    for name, own in groups:
+        names[name] = names.get(name, 0) + 1
+        named[name if names[name] == 1 else f"{name}-{names[name]}"] = list(own)
+    return named
 
 
-def _stimulus(protocol: Protocol, library: Library, draft: Draft, group: str, camera: Camera) -> Stimulus:
-    figure = _figure(protocol, draft.clip)
+def _stimulus(
+    protocol: Protocol, library: Library, draft: Draft, group: str, figure: Figure, camera: Camera
+) -> Stimulus:
     settled = draft.settled
     record = StimulusRecord(
         id=_content_hash(protocol.fps, draft.positions, figure, camera),
@@ -120,6 +142,7 @@ def _content_hash(fps: float, positions: FloatArray, figure: Figure, camera: Cam
     digest.update(np.round(positions * 1e4).astype("<i4").tobytes())
     for array in (figure.ends, figure.along, figure.beyond, figure.radii, figure.colours):
         digest.update(np.round(np.asarray(array, dtype=np.float64) * 1e6).astype("<i8").tobytes())
-    for array in (camera.eye, camera.axes, np.array([camera.focal_pixels])):
+    turns = np.zeros(0) if camera.turns is None else camera.turns * 1e3
+    for array in (camera.eye, camera.axes, np.array([camera.focal_pixels]), turns):
         digest.update(np.round(array * 1e5).astype("<i8").tobytes())
     return digest.hexdigest()[:16]

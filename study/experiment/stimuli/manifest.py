@@ -181,6 +181,7 @@ def write_manifest(folder: Path, stimulus_set: StimulusSet, videos: Mapping[str,
             "eye_m": stimulus.camera.eye.round(6).tolist(),
             "axes": stimulus.camera.axes.round(9).tolist(),
             "focal_pixels": round(stimulus.camera.focal_pixels, 6),
+            "turns": None if stimulus.camera.turns is None else stimulus.camera.turns.tolist(),
         }
         for stimulus in stimulus_set.stimuli
     }

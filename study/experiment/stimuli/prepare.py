@@ -49,7 +49,7 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
     drafts: dict[Film, Draft] = {}
     for each in planned:
         add_drafts(protocol, each, drafts, ways)
-    stimuli = with_cameras(protocol, library, drafts)
+    stimuli = with_cameras(protocol, library, planned, drafts)
     return StimulusSet(
         protocol,
         library.name,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from renderer.strip import Segment
+    from renderer.segments import Segment
     from study.transitions.one_hop.play import Played
 
 # The hop beside the strip's own colours for source, blend and destination.
@@ -15,7 +15,7 @@ HOP_COLOUR = (196, 160, 0)
 
 def strip_segments(played: Played) -> list[Segment]:
     """The stretches of the output with their colours: the state before the first transition, hops, and other states."""
-    from renderer.strip import Segment
+    from renderer.segments import Segment
 
     parts = []
     for number, part in enumerate(played.segments):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from study import __version__
@@ -110,6 +111,32 @@ def test_motions_are_listed_with_their_library(capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.gl
+def test_a_film_of_a_transition_is_cut_around_the_blend_and_its_parts_have_colours_of_their_own(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """By its pixels: blue before the blend, purple in it, orange after, and the figure is large and in the middle."""
+    import av
+
+    out = tmp_path / "x.mp4"
+    points = ("--start", 100, "--end", 80, "--frames", 10)
+    made = ask(capsys, "transition", "walk", "run", *points, "--out", out, "--size", "320x180", "--view", "side")
+    assert made["frames"] > 130
+    with av.open(str(out)) as film:
+        pictures = [frame.to_ndarray(format="rgb24").astype(int) for frame in film.decode(video=0)]
+    assert len(pictures) == 60 + 10 + 60
+    hues = []
+    for picture in pictures:
+        seen = np.abs(picture - picture[0, 0]).max(axis=2) > 24
+        rows, columns = np.nonzero(seen)
+        assert np.ptp(rows) > 0.55 * 180
+        assert abs(columns.mean() - 160) < 40
+        red, _, blue = picture[seen].mean(axis=0)
+        hues.append(red - blue)
+    before, within, after = (np.mean(hues[part]) for part in (slice(0, 60), slice(61, 69), slice(70, None)))
+    assert before < -30 < within - 10
+    assert within < after - 30
+
+
 @pytest.mark.parametrize("ending", ["png", "mp4"])
 def test_preview_draws_a_strip_or_a_video(capsys: pytest.CaptureFixture[str], tmp_path: Path, ending: str) -> None:
     out = tmp_path / f"walk.{ending}"

@@ -65,6 +65,16 @@ def test_a_mistake_in_the_only_study_does_not_make_it_missing() -> None:
         parse_protocol("studies = []\n" + head)
 
 
+def test_a_camera_pans_by_default_and_a_smoothing_window_alone_says_that_it_tracks() -> None:
+    """As protocols did that were written before there was a `camera`."""
+    plain, old, new = (
+        parse_protocol(GOOD.replace("[stimuli]", f"[stimuli]\n{keys}")).stimuli
+        for keys in ("", "track_s = 0.5", 'camera = "track"')
+    )
+    assert (plain.camera, old.camera, new.camera) == ("pan", "track", "track")
+    assert (old.smoothing_s, new.smoothing_s) == (0.5, 1.0)
+
+
 def test_nothing_can_be_changed_afterwards() -> None:
     protocol = parse_protocol(GOOD)
     with pytest.raises(Exception, match="frozen"):
@@ -83,7 +93,9 @@ def test_nothing_can_be_changed_afterwards() -> None:
         ("seed = 7", "seed = true", r"seed: expected a whole number, found True \(true or false\)"),
         ("gap_s = 0.5", "gap_s = -1", r"timing.gap_s: expected at least 0 in seconds, found -1"),
         ("answer_s = 5.0", "answer_s = 0", r"timing.answer_s: expected above 0 in seconds, found 0"),
-        ("width = 480", "width = 481", r"stimuli.width: expected a multiple of 2 in pixels, found 481"),
+        ("width = 640", "width = 641", r"stimuli.width: expected a multiple of 2 in pixels, found 641"),
+        ("width = 640", 'camera = "pan"\ntrack_s = 1.0', r"stimuli.*camera = .track. with track_s, found .pan."),
+        ("width = 640", 'width = 640\ncamera = "follow"', r"stimuli.camera: expected .*'track', found 'follow'"),
         ('task = "preference"', 'task = "preferance"', r"studies\[1\].task: .*found 'preferance'; did you mean 'pref"),
         ('name = "demo"', 'name = "The demo"', r"name: expected a name of small letters, digits, - and _, found 'The"),
         ('title = "A small study of blend lengths"', 'title = ""', r"title: expected some text, found ''"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from toys import TOY_PROTOCOL, Toy, ToyLibrary
 
-from renderer.camera import project
+from renderer.camera import project_film
 from study.errors import StimulusError
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
@@ -109,7 +109,7 @@ def test_transitions_start_over_the_origin_along_z(prepared: StimulusSet) -> Non
 def test_nothing_leaves_the_frame_and_a_group_shares_its_camera(prepared: StimulusSet) -> None:
     cameras = {}
     for stimulus in prepared.stimuli:
-        pixels, _ = project(stimulus.camera, stimulus.positions)
+        pixels, _ = project_film(stimulus.camera, stimulus.positions, prepared.protocol.fps)
         assert pixels.min() >= 0
         assert pixels[..., 0].max() <= 96
         assert pixels[..., 1].max() <= 64
@@ -121,6 +121,28 @@ def test_nothing_leaves_the_frame_and_a_group_shares_its_camera(prepared: Stimul
 def test_the_protocol_says_what_shares_a_camera(toys: ToyLibrary, group: str, cameras: int) -> None:
     made = prepare(changed(("exit_s", f'camera_group = "{group}"\nexit_s')), toys)
     assert len({id(stimulus.camera) for stimulus in made.stimuli}) == cameras
+
+
+def test_a_transition_at_other_points_has_a_camera_of_its_own(toys: ToyLibrary) -> None:
+    """Films that a trial compares share one; those of another study do too where it shows one of the same films."""
+    old = 'name = "liking"'
+    assert old in TOY_PROTOCOL
+    apart = TOY_PROTOCOL.replace(old, f"{old}\npoints = {{ source_within = [0.6, 1.0] }}")
+    made = prepare(parse_protocol(apart), toys)
+    groups = {pair.name: {made.stimulus(shown).record.group for shown in pair.stimuli} for pair in made.pairs}
+    assert groups["jnd/slow_quick/+5"] == groups["jnd/slow_quick/-3"] == {"slow_quick"}
+    assert groups["liking/slow_quick"] == {"slow_quick-2"}
+    assert all(len(group) == 1 for group in groups.values())
+
+
+@pytest.mark.parametrize("camera", ["fixed", "pan", "track"])
+def test_the_camera_is_part_of_the_name_and_of_the_record(toys: ToyLibrary, prepared: StimulusSet, camera: str) -> None:
+    made = prepare(changed(("exit_s", f'camera = "{camera}"\nexit_s')), toys)
+    same = {one.id for one in made.stimuli} == {one.id for one in prepared.stimuli}
+    assert same == (camera == "pan")
+    for stimulus in made.stimuli:
+        assert (stimulus.camera.turns is not None) == (camera == "pan")
+        assert stimulus.camera.track_seconds == (1.0 if camera == "track" else None)
 
 
 def test_the_same_protocol_gives_the_same_stimuli(prepared: StimulusSet, toys: ToyLibrary) -> None:

@@ -1,0 +1,39 @@
+"""Options of verbs that make a film to look at: from where, by which camera, how large."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+
+def film_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds `--view`, `--camera` and `--size` to a verb."""
+    for decorate in (
+        click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Of the film, in pixels."),
+        click.option(
+            "--camera",
+            type=click.Choice(["track", "pan", "fixed"]),
+            default="track",
+            show_default=True,
+            help="Follows the figure; stands still and turns; does nothing.",
+        ),
+        click.option(
+            "--view",
+            type=click.Choice(["front", "side", "three-quarter"]),
+            default="three-quarter",
+            show_default=True,
+            help="From where, relative to the way the figure goes.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+def film_size(text: str) -> tuple[int, int]:
+    """`1280x720` as width and height."""
+    width, _, height = text.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise click.UsageError(f"expected --size as WIDTHxHEIGHT such as 1280x720, found {text!r}.")
+    return int(width), int(height)
