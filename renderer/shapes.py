@@ -49,6 +49,26 @@ class Shapes:
     boxes: NDArray[np.int64]
 
 
+def on_picture(
+    positions: FloatArray, figure: Figure, camera: Camera, fps: float, frames: Sequence[int]
+) -> tuple[FloatArray, FloatArray]:
+    """Where some frames of a motion land in the picture, in pixels, y down.
+
+    Returns
+    -------
+    tuple
+        The points, `(frames, points, 2)`, and the edges of the figure as `lay_out` draws it, without smooth edges and
+        shadows: `(frames, 4)`, left, top, right, bottom; not cut at the edges of the picture.
+    """
+    path, shown = camera_path(positions, camera, fps), list(frames)
+    seen, axes = (positions - path.shift[:, None])[shown], path.axes[shown]
+    figure, placed = _without_hidden(figure, place(figure, seen))
+    ends, nearness = project(camera, placed, axes)
+    reach = (figure.radii * camera.focal_pixels * nearness)[..., None]
+    edges = np.concatenate([(ends - reach).min(axis=(1, 2)), (ends + reach).max(axis=(1, 2))], axis=1)
+    return project(camera, seen, axes)[0], edges
+
+
 def lay_out(
     positions: FloatArray, figure: Figure, camera: Camera, fps: float = 30.0, segments: Sequence[Segment] = ()
 ) -> Shapes:

@@ -7,7 +7,7 @@ the two there is a best view, and where it is depends on the motion: a run into 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ def best_view(
     *,
     heading: float,
     fps: float = 30.0,
+    score: Callable[[Camera], float] | None = None,
     **framing: Any,
 ) -> float:
     """The view, radians from the front, in which a group's figures are large and their limbs move most.
@@ -42,21 +43,22 @@ def best_view(
         The direction that counts as forwards, radians about Y from +Z.
     fps, framing
         As for `frame_group`.
+    score
+        What makes a camera good, the higher the better; by default `clarity`.
 
     Returns
     -------
     float
-        What `frame_group` takes as `view`: of the candidates, every five degrees, the one with the largest geometric
-        mean of the figure's height in the picture and the speed at which its points move there. Of equals, the
-        one nearest to the front, then the one to the left.
+        What `frame_group` takes as `view`: of the candidates, every five degrees, the one with the best score, by
+        default the largest geometric mean of the figure's height in the picture and the speed at which its points move
+        there. Of equals, the one nearest to the front, then the one to the left.
     """
     group = [check_positions(positions, f"positions of clip {i}") for i, positions in enumerate(positions_list)]
     step = max(1, round(fps / LOOKS_HZ))
     group, fps = [positions[::step] for positions in group], fps / step
     candidates = sorted((np.radians(degrees) for degrees in CANDIDATES_DEGREES), key=lambda view: (abs(view), view))
-    scores = [
-        clarity(group, frame_group(group, view=view, heading=heading, fps=fps, **framing), fps) for view in candidates
-    ]
+    judged = score or (lambda camera: clarity(group, camera, fps))
+    scores = [judged(frame_group(group, view=view, heading=heading, fps=fps, **framing)) for view in candidates]
     return float(candidates[int(np.argmax(np.round(scores, 6)))])
 
 

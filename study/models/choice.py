@@ -38,6 +38,17 @@ def chance_of_first(observer: PreferenceObserver, towards_first: float) -> float
     return observer.lapse / 2 + (1 - observer.lapse) * chance
 
 
+def share_of_more(apart: FloatArray) -> float:
+    """Mean chance that the second of two is chosen by an observer who chooses what seems to have more of a property.
+
+    `apart (pairs,)` is how much more the second one has, in standard deviations of one percept; two noisy percepts are
+    compared (Macmillan & Creelman 2005, chapter 7: two-alternative forced choice).
+    """
+    from scipy.special import ndtr
+
+    return float(ndtr(apart / np.sqrt(2.0)).mean())
+
+
 def preference_probability(observer: PreferenceObserver, method_a: str, method_b: str) -> float:
     """Probability over participants and both orders that method a is chosen."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(31)

@@ -65,13 +65,21 @@ def criterion_free_delta(correct: float) -> float:
     """
     from scipy.optimize import brentq
 
-    criteria = np.linspace(0.0, 8.0, 4001)
+    return float(brentq(lambda delta: best_correct(np.full(1, delta), np.zeros(1)) - correct, 0.1, 10.0, xtol=1e-10))
 
-    def best(delta: float) -> float:
-        gained = detected(np.full(1, delta), criteria) - detected(np.zeros(1), criteria)
-        return float(0.5 + 0.5 * gained.max())
 
-    return float(brentq(lambda delta: best(delta) - correct, 0.1, 10.0, xtol=1e-10))
+def best_correct(different: FloatArray, same: FloatArray) -> float:
+    """Return the share of right answers of an observer with the best criterion, where half of the pairs differ.
+
+    Parameters
+    ----------
+    different, same : ndarray, shape (pairs,)
+        Distance of the percepts' means, in standard deviations of one percept, in each of the pairs that are different
+        and in each of those that are the same; the latter is 0 unless something else than what is judged differs.
+    """
+    criteria = np.linspace(0.0, 8.0 + float(np.abs(different).max()), 4001)
+    hits, alarms = (detected(np.abs(part)[:, None], criteria).mean(axis=0) for part in (different, same))
+    return float(0.5 + 0.5 * (hits - alarms).max())
 
 
 def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind, level: float = 0.75) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from study.counting import counted
-from study.report import conduct, course, facts, methods, power, stimuli, words
+from study.report import conduct, course, facts, methods, power, shortcuts, stimuli, words
 from study.report.material import Material
 from study.report.media import Pictures
 from study.report.sections.preference.section import confirmatory_table
@@ -95,8 +95,13 @@ def compose(material: Material, analysis: Analysis) -> Page:
         power=_power(material, quality.participants),
         conduct=_conduct(material, analysis, mark),
         stimuli=Part(
-            sentences=(facts.shown_sentence(material),),
-            folded=(stimuli.stimulus_table(manifest), stimuli.motion_table(manifest)),
+            sentences=(facts.shown_sentence(material), *shortcuts.shortcut_sentences(material)),
+            tables=shortcuts.shortcut_tables(material),
+            folded=(
+                stimuli.stimulus_table(manifest),
+                stimuli.motion_table(manifest),
+                *([shortcuts.difference_table(material)] if manifest.audits else []),
+            ),
         ),
         pictures=Pictures((), ()),
         methods=tuple(

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from study.tasks.task import Asked, Condition, Problem
+from study.models.choice import share_of_more
+from study.tasks.task import Asked, Condition, Problem, Shortcut
 from study.tasks.trial import Pair
+
+CHOICE = Shortcut("comparison", lambda apart, _: share_of_more(apart), chance=0.5)
+"""Somebody who chooses the stimulus that seems to have more of a property."""
 
 
 def both_methods(asked: Asked, for_practice: bool) -> tuple[Condition, ...]:

@@ -15,7 +15,7 @@ from study.models.oddity import CHANCE, HALFWAY, oddity_correct
 from study.tasks.answer import Answer
 from study.tasks.levels import level_conditions, level_practice, level_problems, levels_in_words
 from study.tasks.observer import ObserverSettings, Person
-from study.tasks.task import Asked, Problem, Task
+from study.tasks.task import Asked, Problem, Shortcut, Task
 from study.tasks.trial import PLACES, Trial
 
 
@@ -94,4 +94,5 @@ ODDITY = Task(
     judge=_judge,
     truth=_truth,
     in_words=_in_words,
+    shortcut=Shortcut("right", lambda apart, _: float(oddity_correct(np.abs(apart)).mean()), CHANCE, HALFWAY),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from study.models.choice import lean
 from study.models.ordinal import mean_score
 from study.tasks.answer import Answer
-from study.tasks.methods import any_practice, both_methods, two_methods
+from study.tasks.methods import CHOICE, any_practice, both_methods, two_methods
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.rating import points, rated_point, scale_in_words, scale_problems
 from study.tasks.task import Asked, Problem, Task
@@ -64,4 +64,5 @@ PAIR_RATING = Task(
     in_words=lambda asked, blends: (
         f"compared the second of two transitions with the first, {scale_in_words(asked, blends)}"
     ),
+    shortcut=CHOICE,
 )

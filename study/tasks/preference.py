@@ -9,7 +9,7 @@ import numpy as np
 
 from study.models.choice import chance_of_first, lean, preference_probability
 from study.tasks.answer import Answer
-from study.tasks.methods import against, any_practice, both_methods, two_methods
+from study.tasks.methods import CHOICE, against, any_practice, both_methods, two_methods
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.task import Asked, Task
 from study.tasks.trial import Trial
@@ -59,4 +59,5 @@ PREFERENCE = Task(
     judge=_judge,
     truth=_truth,
     in_words=_in_words,
+    shortcut=CHOICE,
 )

@@ -97,4 +97,5 @@ RATING = Task(
     judge=_judge,
     truth=_no_truth,
     in_words=lambda asked, blends: f"rated {scale_in_words(asked, blends)}",
+    shortcut=None,
 )

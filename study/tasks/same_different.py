@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from study.models.differencing import best_correct
 from study.models.population import SameDifferentObserver, crossing, population_different, probability_different
 from study.tasks.answer import Answer
 from study.tasks.levels import level_conditions, level_practice, level_problems, levels_in_words
 from study.tasks.observer import ObserverSettings, Person
-from study.tasks.task import Asked, Task
+from study.tasks.task import Asked, Shortcut, Task
 from study.tasks.trial import Trial
 
 
@@ -79,4 +80,5 @@ SAME_DIFFERENT = Task(
     judge=_judge,
     truth=_truth,
     in_words=_in_words,
+    shortcut=Shortcut("right", best_correct, chance=0.5),
 )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.tasks.answer import Answer
 from study.tasks.observer import ObserverSettings, Person
@@ -79,6 +80,29 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class Shortcut:
+    """How somebody would answer who sees one property of a pair's stimuli alone, such as their duration.
+
+    Parameters
+    ----------
+    counts
+        What is counted: `right` answers, or answers for the `comparison`.
+    share
+        Their share, 0 to 1, given how much more of the property the comparison has than the reference, in standard
+        deviations of one percept: in each of the pairs that differ in what is judged, and in those that do not.
+    chance
+        That share where the property tells nothing.
+    needed
+        What people need at threshold; None where the protocol's threshold says it, or there is none.
+    """
+
+    counts: Literal["right", "comparison"]
+    share: Callable[[NDArray[np.float64], NDArray[np.float64]], float]
+    chance: float
+    needed: float | None = None
+
+
+@dataclass(frozen=True)
 class Task:
     """One task: every question that the house asks.
 
@@ -121,6 +145,8 @@ class Task:
         What an analysis of a simulated study should find, at a threshold; None where nothing is known.
     in_words
         What participants did, as a clause for a Methods section, given words for the methods.
+    shortcut
+        How somebody would answer who sees one property of the stimuli alone; None where single stimuli are shown.
     """
 
     name: str
@@ -144,6 +170,7 @@ class Task:
     judge: Callable[[Person, Trial, Sequence[str], np.random.Generator], tuple[str, float]]
     truth: Callable[[ObserverSettings, Asked, float], dict[str, Any] | None]
     in_words: Callable[[Asked, Callable[[str], str]], str]
+    shortcut: Shortcut | None
 
     @property
     def slots(self) -> int:

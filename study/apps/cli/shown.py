@@ -17,6 +17,9 @@ HEADINGS = (
     *("k", "s", "blends", "trials", "films", "seconds"),
 )
 
+MOST_LEVELS = 12
+"""Of more levels than these, every other one is shown, or fewer."""
+
 
 def table_of(protocol: Protocol, outlook: Outlook) -> Iterator[str]:
     """The rows of each study under its name, and a blank line at the end of each."""
@@ -27,6 +30,30 @@ def table_of(protocol: Protocol, outlook: Outlook) -> Iterator[str]:
             yield from columns([HEADINGS, *map(_cells, rows)], left=(0, 1, 5, 11))
             yield from (f"  {row.transition}: {note}" for row in rows for note in row.notes)
             yield ""
+
+
+def shortcut_lines(protocol: Protocol, outlook: Outlook) -> Iterator[str]:
+    """For each study what observers would answer who see one property of the stimuli alone."""
+    from study.experiment.stimuli.shortcuts import needed_share, shares_in_words
+
+    for study in protocol.studies:
+        own = [share for share in outlook.shortcuts if share.study == study.name]
+        if not own:
+            continue
+        yield f"{study.name}: {shares_in_words(study, needed_share(protocol, study))}"
+        levels = list(dict.fromkeys(share.level for share in own))
+        shown = levels if len(levels) <= MOST_LEVELS else levels[:: -(-len(levels) // MOST_LEVELS)]
+        cells = {(share.cue, share.level): share for share in own}
+        cues = dict.fromkeys(share.cue for share in own)
+        rows: list[tuple[str, ...]]
+        if levels == [None]:
+            rows = [("seen alone", "all", "furthest", "at")]
+            rows += [(one.cue, f"{100 * one.share:.0f}", f"{100 * one.furthest:.0f}", one.motion) for one in own]
+        else:
+            rows = [("seen alone", *(f"{level:+d}" for level in shown))]
+            rows += [(cue, *(f"{100 * cells[cue, level].furthest:.0f}" for level in shown)) for cue in cues]
+        yield from columns(rows, left=(0, len(rows[0]) - 1) if levels == [None] else (0,))
+        yield ""
 
 
 def trials_between(fewest: int, most: int) -> str:

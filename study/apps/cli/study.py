@@ -19,7 +19,7 @@ from study.apps.cli.shared import (
     render_stimuli,
     results_folder,
 )
-from study.apps.cli.shown import table_of, trials_between
+from study.apps.cli.shown import shortcut_lines, table_of, trials_between
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
     read = [asdict(one) for one in all_texts(checked, found.film_times)] if texts else []
     lines = [f"{one['where']}\n    {one['text']}\n" for one in read]
     lines += table_of(checked, found)
+    lines += shortcut_lines(checked, found)
     lines += found.problems or [f"{checked.name}: all that it shows can be shown with the library {opened.name}."]
     lines.append(
         f"A participant sees {trials_between(found.fewest_trials, found.trials)} made of "
@@ -108,6 +109,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
     result: dict[str, Any] = {"protocol": checked.name, "library": opened.name, "problems": found.problems}
     result |= {"notes": [*found.notes, *notes], "minutes": found.minutes, "minutes_at_most": found.minutes_at_most}
     result |= {"trials": found.trials, "fewest_trials": found.fewest_trials, "films": found.films, "fps": checked.fps}
+    result |= {"audit": [asdict(one) for one in found.audits], "shortcuts": [asdict(one) for one in found.shortcuts]}
     result |= {"shown": [asdict(row) for row in found.rows]} | ({"texts": read} if texts else {})
     emit(result, as_json, "\n".join(lines))
     if found.problems:

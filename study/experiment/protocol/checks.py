@@ -72,6 +72,15 @@ def _check_methods(protocol: Content, study: StudySpec, index: int) -> None:
             *where,
             "comparison",
         )
+    if protocol.stimuli.match != "none" and task_of(study).shortcut is not None:
+        for key, name in (("reference", study.reference), ("comparison", study.comparison)):
+            if name and not methods[name].make.moves:
+                raise KeyMismatchError(
+                    f"expected in {who} methods whose blends can be moved, as [stimuli] match = "
+                    f"{protocol.stimuli.match!r} asks, found {name!r}; change it, or remove match",
+                    *where,
+                    key,
+                )
     for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
         for method in methods.values():
             if lacking := method.make.lacks(transition.name):

@@ -38,10 +38,11 @@ class StimulusSettings(Part):
         description="What the camera of a group does: `fixed` nothing; `pan` stands still and turns by one slow path "
         "for all films of the group; `track` follows the figure, which hides part of its motion.",
     )
-    view: Literal["clearest", "front", "side", "three-quarter"] = Field(
+    view: Literal["clearest", "least-cue", "front", "side", "three-quarter"] = Field(
         default="clearest",
         description="Direction of the camera relative to the group's heading; `clearest` is the view in which "
-        "the group's figures are large and their limbs move most in the picture.",
+        "the group's figures are large and their limbs move most in the picture, `least-cue` the one in which the "
+        "stimuli of a pair begin and end most alike in place and size.",
     )
     track_s: float | None = Field(
         default=None,
@@ -62,6 +63,12 @@ class StimulusSettings(Part):
         default=2.0, ge=0, le=60, description="Source motion shown before the blend starts. [seconds]"
     )
     exit_s: float = Field(default=2.0, ge=0, le=60, description="Destination motion shown after the blend. [seconds]")
+    match: Literal["none", "duration"] = Field(
+        default="none",
+        description="`duration`: the stimuli of a pair take equally long and show the same frames of both motions at "
+        "the same times, with their blends around the same moment; `none`: each blend starts at the transition point, "
+        "so a longer one makes a longer stimulus (2004).",
+    )
     weight: Literal["linear", "sigmoid"] = Field(default="linear", description="How the blend weight runs from 0 to 1.")
     specification: Literal["start-end"] = Field(
         default="start-end",

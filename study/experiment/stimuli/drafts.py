@@ -5,7 +5,7 @@ What a study shows of a transition comes in (`films.Planned`); joint positions, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,13 +49,14 @@ def add_drafts(protocol: Protocol, planned: Planned, drafts: dict[Film, Draft], 
 def _draft(protocol: Protocol, planned: Planned, method: str, difference: int, film: Film, ways: Ways) -> Draft:
     """Make the frames, cut them to entry and exit, and place them at the origin with the common heading."""
     settled = planned.settled.at(method)
-    made = film.way.made(ways.place(planned.study, settled))
-    first = made.blend_start - film.way.lead - protocol.entry_frames
+    points = replace(settled, start_frame=film.start_frame, end_frame=film.end_frame)
+    made = film.way.made(ways.place(planned.study, points))
+    first = made.blend_start - film.way.lead - film.frames_before - protocol.entry_frames
     clip = trim(made.clip, first, made.blend_stop + film.frames_on + protocol.exit_frames)
     notes = tuple(note for note in (made.note, settled.lengths[method].note) if note)
     positions = _placed(joint_positions(clip, ends=True), protocol, settled)
     blended = made.blend_start - first, made.blend_stop - first
-    return Draft(settled, method, difference, film.way.blend_frames, clip, blended, positions, notes)
+    return Draft(points, method, difference, film.way.blend_frames, clip, blended, positions, notes)
 
 
 def _placed(positions: FloatArray, protocol: Protocol, settled: Settled) -> FloatArray:

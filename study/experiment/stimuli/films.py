@@ -7,9 +7,10 @@ same, so this is also where it shows that two methods would make one film.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from study.counting import counted
 from study.errors import SegueError, StimulusError
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.points import Settled, settle
@@ -35,7 +36,9 @@ class Film:
     way
         How it is made, with its length.
     frames_on
-        How long the destination continues, so that both films of a pair end together.
+        How much longer the destination is shown than `exit_s`: below 0 where less of it is.
+    frames_before
+        How much longer the source is shown than `entry_s`, likewise.
     """
 
     transition: str
@@ -44,10 +47,12 @@ class Film:
     added: tuple[int, int]
     way: Way
     frames_on: int = 0
+    frames_before: int = 0
 
     def frames(self, protocol: Protocol) -> int:
         """Frames in all: entry, transition and exit."""
-        return protocol.entry_frames + self.way.frames + self.frames_on + protocol.exit_frames
+        around = protocol.entry_frames + self.frames_before + self.frames_on + protocol.exit_frames
+        return around + self.way.frames
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +103,39 @@ def plan_all(
 def showings(study: StudySpec, settled: Settled, ways: Ways) -> Iterator[Showing]:
     """The pairs of one transition in one study, or its single films where they are rated one by one."""
     for condition in task_of(study).conditions(study, settled.transition.name in study.practice_transitions):
-        made = zip(condition.methods, condition.added_frames, strict=True)
-        yield Showing(settled, condition, tuple(_film(study, settled, *each, ways) for each in made))
+        films = [
+            _film(study, settled, method, added, ways)
+            for method, added in zip(condition.methods, condition.added_frames, strict=True)
+        ]
+        if ways.protocol.stimuli.match == "duration":
+            films = [films[0], *(_matched(ways.protocol, film, films[0]) for film in films[1:])]
+        yield Showing(settled, condition, tuple(films))
+
+
+def _matched(protocol: Protocol, film: Film, reference: Film) -> Film:
+    """The film with its blend moved so that it has the reference's length and both are in their middle together.
+
+    Where the blend is longer by `d` frames it starts `d / 2` earlier in the source and ends as much later in the
+    destination. So both films begin and end with the same frames of the two motions, and run alongside each other all
+    the time, in and out of the blend. (Of an odd `d` the second half is one frame longer.)
+    """
+    longer = film.way.frames - reference.way.frames
+    before, after = longer // 2, longer - longer // 2
+    if before > protocol.entry_frames or after > protocol.exit_frames:
+        raise StimulusError(
+            f"transition {film.transition!r}: expected an entry and an exit of {counted(max(before, after), 'frame')} "
+            f'or more with match = "duration", which takes half of what a blend is longer from each, found '
+            f"{protocol.entry_frames} and {protocol.exit_frames}; raise entry_s and exit_s."
+        )
+    # The frame after a blend is the one after its end point; after a cut it is the end point itself.
+    cut = (film.way.frames == 0) - (reference.way.frames == 0)
+    return replace(
+        film,
+        start_frame=film.start_frame - before,
+        end_frame=film.end_frame + after + cut,
+        frames_before=-before,
+        frames_on=film.frames_on - after,
+    )
 
 
 def alike(study: StudySpec, settled: Settled, ways: Ways) -> bool:

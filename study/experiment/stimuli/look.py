@@ -8,7 +8,7 @@ with the same heading, so that it sees all of them from the same side.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol
 from study.experiment.stimuli.drafts import Draft
 from study.experiment.stimuli.films import Film, Planned
+from study.experiment.stimuli.shortcuts import largest_cue
 from study.experiment.stimuli.stimulus import MotionUse, Stimulus, StimulusRecord
 from study.experiment.stimuli.supply import Supply
 from study.motion.clip import Clip
@@ -55,13 +56,31 @@ def with_cameras(
         for group, films in camera_groups(protocol, planned).items():
             moving, view = [drafts[film].positions for film in films], settings.view
             figures = [_figure(protocol, drafts[film].clip) for film in films]
-            seen_from = best_view(moving, **framing) if view == "clearest" else view
+            seen_from: str | float = view
+            if view in ("clearest", "least-cue"):
+                score = _evenness(protocol, planned, films, drafts) if view == "least-cue" else None
+                seen_from = best_view(moving, score=score, **framing)
             camera = frame_group(moving, figures=figures, view=seen_from, **framing)
             for film, figure in zip(films, figures, strict=True):
                 stimuli[film] = _stimulus(protocol, library, drafts[film], group, figure, camera)
     except RendererError as error:
         raise StimulusError(str(error)) from error
     return {film: stimuli[film] for film in drafts}
+
+
+def _evenness(
+    protocol: Protocol, planned: Sequence[Planned], films: Sequence[Film], drafts: Mapping[Film, Draft]
+) -> Callable[[Camera], float]:
+    """How little a camera shows of what gives pairs of a group away; the higher, the less."""
+    figures = {film: _figure(protocol, drafts[film].clip) for film in films}
+    shown = (showing.films for each in planned for showing in each.showings)
+    pairs = [pair for pair in shown if all(film in figures for film in pair)]
+
+    def evenness(camera: Camera) -> float:
+        moving = {film: (drafts[film].positions, figure, camera) for film, figure in figures.items()}
+        return -largest_cue(pairs, moving, protocol.fps)
+
+    return evenness
 
 
 def camera_groups(protocol: Protocol, planned: Sequence[Planned]) -> dict[str, list[Film]]:

@@ -17,6 +17,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from study.errors import StimulusError
 from study.experiment.folder import ANSWERS, MANIFEST, PROTOCOL, STIMULI
+from study.experiment.stimuli.audit import PairAudit
 from study.experiment.stimuli.stimulus import Stimulus, StimulusRecord, StimulusSet
 from study.files import make_folder, read_text, refused, write_whole
 from study.tasks.trial import Pair, pair_since_version_1
@@ -33,7 +34,8 @@ class Manifest:
     """The record of a results folder: what its stimuli are, and the pairs that are shown.
 
     `videos` maps a stimulus id to what is known of its file (`file`, `frames_sha256`, `file_sha256`, `bytes`);
-    stimuli that are not rendered yet are missing from it.
+    stimuli that are not rendered yet are missing from it. `audits` say how the stimuli of each pair differ in what is
+    not judged; a manifest of an older Segue has none.
     """
 
     folder: Path
@@ -49,6 +51,7 @@ class Manifest:
     videos: Mapping[str, Mapping[str, Any]]
     versions: Mapping[str, str]
     made_from: str
+    audits: tuple[PairAudit, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -200,6 +203,7 @@ def write_manifest(folder: Path, stimulus_set: StimulusSet, videos: Mapping[str,
         "made_from": stimulus_set.made_from,
         "cameras": cameras,
         "pairs": [asdict(pair) for pair in stimulus_set.pairs],
+        "audit": [asdict(one) for one in stimulus_set.audits],
         "stimuli": [{**asdict(record), "video": videos.get(record.id)} for record in stimulus_set.records],
     }
     write_whole(folder / MANIFEST, json.dumps(data, indent=1) + "\n")
@@ -244,10 +248,11 @@ def read_manifest(folder: str | Path) -> Manifest:
             f"{path}: expected what Segue wrote, found {where} damaged ({first['msg']}); {_ANEW}."
         ) from error
     videos = {entry.id: asdict(entry.video) for entry in listed.stimuli if entry.video is not None}
-    keys = {"records" if name == "stimuli" else name: value for name, value in vars(stored).items()}
+    keys = {_NAMES.get(name, name): value for name, value in vars(stored).items()}
     return Manifest(folder=folder, videos=videos, **keys)
 
 
+_NAMES = {"stimuli": "records", "audit": "audits"}
 _ANEW = "restore a copy of it, or render into a new folder"
 
 
@@ -266,6 +271,7 @@ class _Stored:
     pairs: tuple[Pair, ...]
     versions: dict[str, str]
     made_from: str = ""
+    audit: tuple[PairAudit, ...] = ()
 
 
 @dataclass(frozen=True)

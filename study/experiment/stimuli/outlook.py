@@ -10,8 +10,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from study.counting import counted
+from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol, StudySpec
+from study.experiment.stimuli.audit import PairAudit
 from study.experiment.stimuli.films import Film, Planned, Showing, plan_all
+from study.experiment.stimuli.prepare import made_of
+from study.experiment.stimuli.shortcuts import ShortcutShare, shortcuts_of, told_away
 from study.experiment.stimuli.supply import Supply
 from study.experiment.stimuli.ways import Ways
 from study.experiment.wording import Films, FilmTimes, duration_s, minutes
@@ -80,7 +84,8 @@ class Outlook:
     `films` are different films of the whole protocol; `minutes` count films, gaps, answers, pauses, breaks, practice,
     attention checks, the form and reading; `minutes_at_most` with every answer and every film at its longest.
     `trials` are the most that there may be, `fewest_trials` the fewest. `film_times` are what they rest on, for the
-    texts that speak of minutes.
+    texts that speak of minutes. `audits` say how the films of each pair differ in what is not judged, and `shortcuts`
+    what that alone could explain; both are empty where not all can be shown.
     """
 
     rows: tuple[Row, ...]
@@ -92,24 +97,37 @@ class Outlook:
     minutes: int
     minutes_at_most: int
     film_times: Films
+    audits: tuple[PairAudit, ...] = ()
+    shortcuts: tuple[ShortcutShare, ...] = ()
 
 
 def look_ahead(protocol: Protocol, library: Library) -> Outlook:
     """Plan all films of a protocol and describe them."""
-    planned, problems = plan_all(protocol, library, Ways(protocol, library))
+    ways = Ways(protocol, library)
+    planned, problems = plan_all(protocol, library, ways)
+    audits: tuple[PairAudit, ...] = ()
+    shortcuts: tuple[ShortcutShare, ...] = ()
+    if not problems:
+        try:
+            made = made_of(protocol, library, planned, ways)
+            audits, shortcuts = made.audits, shortcuts_of(protocol, made.pairs, made.audits)
+        except StimulusError as error:
+            problems = [str(error)]
     times = {study.name: found for study in protocol.studies if (found := _times(study, protocol, planned))}
     films = {film for each in planned for showing in each.showings for film in showing.films}
     usual, longest = (minutes(duration_s(protocol, at_most=most, films=times)) for most in (False, True))
     return Outlook(
         tuple(_row(protocol, each) for each in planned),
         tuple(problems),
-        tuple(_too_alike(protocol, planned)),
+        (*_too_alike(protocol, planned), *told_away(protocol, shortcuts)),
         sum(protocol.fewest_trials_of(study) for study in protocol.studies),
         sum(protocol.trials_of(study) for study in protocol.studies),
         len(films),
         usual,
         longest,
         times,
+        audits,
+        shortcuts,
     )
 
 

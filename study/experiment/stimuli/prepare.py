@@ -8,15 +8,16 @@ stimulus is rendered once and reused after. Nothing is drawn here; see `renderin
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol, StudySpec
+from study.experiment.stimuli.audit import audit
 from study.experiment.stimuli.drafts import Draft, add_drafts
-from study.experiment.stimuli.films import Film, Showing, plan_all
+from study.experiment.stimuli.films import Film, Planned, Showing, plan_all
 from study.experiment.stimuli.look import LOOK_VERSION, with_cameras
 from study.experiment.stimuli.manifest import made_from
 from study.experiment.stimuli.stimulus import Stimulus, StimulusSet
@@ -46,19 +47,33 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
     planned, problems = plan_all(protocol, library, ways, progress)
     if problems:
         raise StimulusError("\n".join(problems))
+    return made_of(protocol, library, planned, ways)
+
+
+def made_of(protocol: Protocol, library: Library, planned: Sequence[Planned], ways: Ways) -> StimulusSet:
+    """Build all that was planned.
+
+    Raises
+    ------
+    StimulusError
+        Where two methods of a pair come to look the same, or a camera can't be found.
+    """
     drafts: dict[Film, Draft] = {}
     for each in planned:
         add_drafts(protocol, each, drafts, ways)
     stimuli = with_cameras(protocol, library, planned, drafts)
+    pairs = tuple(_pair(each.study, showing, stimuli) for each in planned for showing in each.showings)
+    moving = {one.id: (one.positions, one.figure, one.camera) for one in stimuli.values()}
     return StimulusSet(
         protocol,
         library.name,
         library.synthetic,
         library.acknowledgement,
         tuple({stimulus.id: stimulus for stimulus in stimuli.values()}.values()),
-        tuple(_pair(each.study, showing, stimuli) for each in planned for showing in each.showings),
+        pairs,
         versions(),
         made_from(protocol, library),
+        audit(pairs, moving, protocol.fps),
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import StimulusError
+from study.experiment.stimuli.audit import PairAudit
 from study.tasks.trial import Pair
 
 if TYPE_CHECKING:
@@ -100,7 +101,8 @@ class Stimulus:
 class StimulusSet:
     """All stimuli of a protocol on one library, each once, and the pairs that are shown.
 
-    `made_from` is a hash of all that they were made from; see `manifest.made_from`.
+    `made_from` is a hash of all that they were made from; see `manifest.made_from`. `audits` say how the stimuli of
+    each pair differ in what is not judged.
     """
 
     protocol: Protocol
@@ -111,6 +113,7 @@ class StimulusSet:
     pairs: tuple[Pair, ...]
     versions: Mapping[str, str] = field(default_factory=dict)
     made_from: str = ""
+    audits: tuple[PairAudit, ...] = ()
 
     @property
     def records(self) -> tuple[StimulusRecord, ...]:

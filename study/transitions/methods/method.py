@@ -212,7 +212,8 @@ class Make(MethodPart):
     """How the frames of a transition are made.
 
     `windows` is what it takes of a length (see `Length.windows`). `levels` says whether its blend can be lengthened and
-    shortened in a same-different study, `sets_span` whether what stands beside it in a pair is shown for as long, and
+    shortened in a same-different study, `moves` whether it can be made about the same moment as a blend of another
+    length (`match` in a protocol), `sets_span` whether what stands beside it in a pair is shown for as long, and
     `draws` how many points may be tried where it makes what the other method makes. In `words`, `{length}` and
     `{points}` are replaced by those of the other parts. `how` ends the sentence "Transitions by this method ..." of a
     Methods section, for makes that are neither blends by spherical linear interpolation nor cuts.
@@ -220,6 +221,7 @@ class Make(MethodPart):
 
     windows: ClassVar[int] = 1
     levels: ClassVar[bool] = False
+    moves: ClassVar[bool] = False
     sets_span: ClassVar[bool] = False
     draws: ClassVar[int] = CANDIDATES
     how: ClassVar[str] = ""

@@ -72,6 +72,7 @@ class Slerp(Blending):
     words = "blends {length} {points}"
     sources = (SHOEMAKE_1985,)
     levels = True
+    moves = True
 
     def way(self, place: Place, windows: tuple[int, int]) -> Way:
         """A blend of that many frames."""
@@ -95,6 +96,7 @@ class Cut(Make):
     words = "cuts {points}"
     sources = (WANG_2003,)
     windows = 0
+    moves = True
 
     def way(self, place: Place, windows: tuple[int, int]) -> Way:
         """No blended frames."""
