@@ -14,9 +14,11 @@ from study.apps.player.loop import LAYOUTS
 from study.apps.player.screens import ANSWERS
 from study.errors import AnalysisError
 from study.experiment.observers import person
+from study.experiment.procedures.constant_stimuli import Constant
+from study.experiment.procedures.registry import PROCEDURES
 from study.experiment.protocol.languages import languages, words
 from study.experiment.protocol.texts import Keys, Texts
-from study.power.registry import EFFECTS, WITHOUT_EFFECT
+from study.power.registry import EFFECTS, OF_PROCEDURES
 from study.report.sections.registry import SECTIONS
 from study.tasks.answer import Answer
 from study.tasks.observer import default_observer
@@ -52,9 +54,12 @@ def study_of(task: Task) -> Study:
 every_task = pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
 
 
-def test_every_task_has_an_analysis_and_an_effect_or_a_reason_for_none() -> None:
-    assert set(ANALYSES) == {*EFFECTS, *WITHOUT_EFFECT} == set(NAMES)
-    assert not set(EFFECTS) & set(WITHOUT_EFFECT)
+def test_every_task_has_an_analysis_and_an_effect() -> None:
+    assert set(ANALYSES) == set(EFFECTS) == set(NAMES)
+
+
+def test_every_procedure_that_waits_for_answers_has_an_effect() -> None:
+    assert set(OF_PROCEDURES) == set(PROCEDURES) - {Constant.name}
 
 
 def test_every_kind_of_result_has_a_section_and_keys_of_its_own() -> None:

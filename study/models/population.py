@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from study.errors import SessionError
 from study.models.differencing import detected
+from study.models.oddity import CHANCE, oddity_correct
 
 FloatArray = NDArray[np.float64]
 
@@ -50,6 +51,13 @@ def probability_different(observer: SameDifferentObserver, difference_frames: fl
     differences = np.asarray(difference_frames, dtype=np.float64)
     slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
     return _with_lapses(detected(np.abs(differences) * slope, observer.criterion), observer.lapse)
+
+
+def probability_odd_found(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
+    """Probability that one observer finds which of three differs, in the shape of the differences."""
+    differences = np.asarray(difference_frames, dtype=np.float64)
+    slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
+    return np.asarray(observer.lapse * CHANCE + (1 - observer.lapse) * oddity_correct(np.abs(differences) * slope))
 
 
 def population_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:

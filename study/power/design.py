@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis.exclusions import Rules, exclude
-from study.power.curve import Run
+from study.power.curve import PowerPoint, Run
 from study.tasks.observer import ObserverSettings
 from study.tasks.registry import task_of
 
@@ -65,6 +65,47 @@ class Design:
         return self.protocol.timing.answer_s if task_of(self.study).timed else None
 
 
+@dataclass(frozen=True)
+class PlannedStudy:
+    """How many participants a study needs, with all that this rests on.
+
+    Attributes
+    ----------
+    protocol, study, task
+        What is planned.
+    effect
+        Its numbers, by name, the share of trials without a response among them.
+    icc, test, aim
+        As in `Effect`.
+    points, target, needed, note
+        As in `Power`.
+    simulations
+        Simulated studies.
+    through
+        What each of them went through.
+    seed
+        Of the simulation.
+    answers_per_participant
+        On average, where trials depend on the responses.
+    """
+
+    protocol: str
+    study: str
+    task: str
+    effect: Mapping[str, float]
+    icc: float | None
+    test: str
+    aim: str
+    points: tuple[PowerPoint, ...]
+    target: float
+    needed: int | None
+    note: str
+    simulations: int
+    through: str
+    seed: int
+    answers_per_participant: int
+
+
 @dataclass(frozen=True, eq=False)
 class Effect:
     """What a study is to find.
@@ -85,6 +126,8 @@ class Effect:
         Whether the whole analysis of one study found it.
     slow
         Whether a study takes so long that fewer are simulated.
+    answers
+        How many trials of the study a participant answers, on average.
     """
 
     observer: ObserverSettings
@@ -95,6 +138,7 @@ class Effect:
     study: Callable[[Design], Run]
     found: Callable[[Analysis], bool]
     slow: bool = False
+    answers: Callable[[Design], int] = lambda design: len(design.trials()[0])
 
 
 def times(design: Design, rng: np.random.Generator, ease: FloatArray) -> tuple[FloatArray, BoolArray]:

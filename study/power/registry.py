@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 from study.errors import AnalysisError
 from study.power.design import Effect
+from study.power.oddity import oddity_effect
 from study.power.preference import preference_effect
 from study.power.ratings import rating_effect
 from study.power.same_different import same_different_effect
+from study.power.staircases import staircase_effect
 
 if TYPE_CHECKING:
     from study.experiment.protocol.studies import AnalysisSettings
@@ -22,10 +24,11 @@ EFFECTS: Mapping[str, Make] = {
     "same-different": same_different_effect,
     "preference": preference_effect,
     "rating": rating_effect,
+    "oddity": oddity_effect,
 }
 
-WITHOUT_EFFECT: Mapping[str, str] = {"oddity": "no effect on it can be stated yet"}
-"""Tasks for which no number of participants can be planned, and why."""
+OF_PROCEDURES: Mapping[str, Make] = {"staircase": staircase_effect}
+"""By the procedure, where trials depend on the responses."""
 
 
 def effect_of(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
@@ -36,8 +39,6 @@ def effect_of(study: StudySpec, options: Mapping[str, float], decided: AnalysisS
     AnalysisError
         When nothing can be planned for its task.
     """
-    if study.task in WITHOUT_EFFECT:
-        raise AnalysisError(f"{study.name}: expected another task than {study.task}: {WITHOUT_EFFECT[study.task]}")
     if study.task not in EFFECTS:
         raise AnalysisError(f"{study.name}: expected one of the tasks {', '.join(EFFECTS)}, found {study.task!r}")
-    return EFFECTS[study.task](study, options, decided)
+    return OF_PROCEDURES.get(study.procedure.name, EFFECTS[study.task])(study, options, decided)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import Counts
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.experiment.observers import person
-from study.models.population import probability_different
+from study.models.population import SameDifferentObserver, probability_different
 from study.power.curve import Run
 from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
 from study.tasks.observer import ObserverSettings, default_observer
@@ -60,31 +60,53 @@ def same_different_observer(shorter: float, longer: float, spread: float, missed
 
 def same_different_study(design: Design, precision: float, level: float) -> Run:
     """Whether the model's intervals of both thresholds are as narrow as asked (half their width, in frames)."""
+
+    def narrow(levels: FloatArray, different: FloatArray, shown: FloatArray) -> bool:
+        names = tuple(str(place) for place in range(len(shown)))
+        fit = fit_model(Counts(names, levels, different, shown), level=level) if names else None
+        return _narrow(fit, precision)
+
+    return level_study(design, probability_different, 0.5, narrow)
+
+
+def level_study(
+    design: Design,
+    probability: Callable[[SameDifferentObserver, FloatArray], FloatArray],
+    hardest: float,
+    found: Callable[[FloatArray, FloatArray, FloatArray], bool],
+) -> Run:
+    """Studies over differences of blend length.
+
+    Parameters
+    ----------
+    probability
+        Of the response that is counted ("different", or a right one), by an observer and differences in frames.
+    hardest
+        Where that response takes longest: the probability of an observer who does not know.
+    found
+        What a study found, from the differences and counts of the responses and of all, shape (participants, levels).
+    """
     asked = np.array([[float(trial.difference_frames or 0) for trial in own] for own in design.trials()])
     levels = np.unique(asked)
 
-    def narrow(different: FloatArray, shown: FloatArray) -> bool:
-        there = shown.sum(axis=1) > 0
-        names = tuple(str(place) for place in range(int(there.sum())))
-        fit = fit_model(Counts(names, levels, different[there], shown[there]), level=level) if names else None
-        return _narrow(fit, precision)
-
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
         people = max(sizes)
-        found = np.zeros((studies, len(sizes)), dtype=bool)
+        verdicts = np.zeros((studies, len(sizes)), dtype=bool)
         for number in range(studies):
             seed = int(rng.integers(2**31))
             who = [
                 person(design.settings, f"power-{place:03}", seed).settings.same_different for place in range(people)
             ]
-            chance = np.array([probability_different(one, own) for one, own in zip(who, asked, strict=False)])
-            different = rng.random(chance.shape) < chance
-            response_s, given = times(design, rng, np.abs(2 * chance - 1)[None])
+            chance = np.array([probability(one, own) for one, own in zip(who, asked, strict=False)])
+            counted = rng.random(chance.shape) < chance
+            response_s, given = times(design, rng, (np.abs(chance - hardest) / (1 - hardest))[None])
             kept = kept_of(design, rng, response_s, given)[0]
             at = asked[:people, :, None] == levels
             shown = (at & kept[:, :, None]).sum(axis=1).astype(float)
-            yes = (at & (kept & different)[:, :, None]).sum(axis=1).astype(float)
-            found[number] = [narrow(yes[:size], shown[:size]) for size in sizes]
-        return found
+            yes = (at & (kept & counted)[:, :, None]).sum(axis=1).astype(float)
+            for place, size in enumerate(sizes):
+                there = shown[:size].sum(axis=1) > 0
+                verdicts[number, place] = found(levels, yes[:size][there], shown[:size][there])
+        return verdicts
 
     return run

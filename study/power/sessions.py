@@ -52,10 +52,9 @@ def _session(design: Design, plan: Plan, seed: int) -> pd.DataFrame:
     from study.experiment.session import open_session, walk
 
     who = person(design.settings, plan.participant, seed)
-    own = [trial for trial in plan.trials if trial.study == design.study.name]
-    state = open_session(
-        design.protocol, replace(plan, trials=_renumbered(own), courses=()), passed=("consent", "form")
-    )
+    own = _renumbered([trial for trial in plan.trials if trial.study == design.study.name])
+    courses = tuple(replace(course, first=len(own) + 1) for course in plan.courses if course.study == design.study.name)
+    state = open_session(design.protocol, replace(plan, trials=own, courses=courses), passed=("consent", "form"))
     rows = [
         {"participant": plan.participant, **answer_columns(trial, answer)}
         for trial, answer in walk(state, partial(respond, who))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from study.models.oddity import CHANCE, HALFWAY, oddity_correct
+from study.models.population import probability_odd_found
 from study.tasks.answer import Answer
 from study.tasks.levels import level_conditions, level_practice, level_problems, levels_in_words
 from study.tasks.observer import ObserverSettings, Person
@@ -39,10 +40,7 @@ def _no_columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
 
 
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
-    observer, difference = who.settings.same_different, trial.difference_frames or 0
-    slope = observer.d_prime_shorter if difference < 0 else observer.d_prime_longer
-    seen = float(oddity_correct(slope * abs(difference)))
-    chance = observer.lapse * CHANCE + (1 - observer.lapse) * seen
+    chance = float(probability_odd_found(who.settings.same_different, float(trial.difference_frames or 0)))
     wrong = [place for place in legal if place != _right(trial)]
     answer = _right(trial) if rng.random() < chance else wrong[int(rng.integers(len(wrong)))]
     return answer, max((chance - CHANCE) / (1 - CHANCE), 0.0)

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from study.analysis.oddity.analyse import Oddity, analyse_oddity
 from study.analysis.study_result import Settings
-from study.errors import AnalysisError, ProtocolError
+from study.errors import ProtocolError
 from study.experiment.observers import truth
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import advanced, answered, current, open_session
 from study.experiment.simulation import simulate
-from study.experiment.store.frames import answers_frame
+from study.experiment.store.export import export
+from study.experiment.store.frames import answers_frame, export_csv
 from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import session_by_id
 from study.models.oddity import d_prime_of, oddity_correct
-from study.power.registry import effect_of
 from study.report.sections.oddity.section import KIND
 from study.report.sections.section import About
 from study.tasks.observer import default_observer
@@ -175,6 +178,26 @@ def test_a_simulated_study_finds_the_known_thresholds(protocol: Protocol, tmp_pa
     assert "<svg" in section.drawings[0].svg
 
 
-def test_power_says_that_it_does_not_plan_it(protocol: Protocol) -> None:
-    with pytest.raises(AnalysisError, match="odd: expected another task than oddity"):
-        effect_of(protocol.studies[0], {}, protocol.analysis)
+def test_every_export_has_all_three_stimuli_and_says_what_they_are(protocol: Protocol, tmp_path: Path) -> None:
+    class Stimuli:
+        pairs, library, synthetic = pairs_of(protocol), "toy", True
+
+    with open_responses(tmp_path / "results") as responses:
+        simulate(protocol, Stimuli(), responses, 1, seed=3)
+        plan = session_by_id(responses, 1).plan
+        export(protocol, responses, "psych-ds", tmp_path / "psych-ds")
+        export(protocol, responses, "bids", tmp_path / "bids")
+        export_csv(responses, tmp_path / "answers.csv")
+    shown = {trial.trial: trial.stimuli for trial in plan.trials}
+    files = [
+        tmp_path / "answers.csv",
+        *(tmp_path / "psych-ds").rglob("task-*.csv"),
+        *(tmp_path / "bids").rglob("*_beh.tsv"),
+    ]
+    assert len(files) == 3
+    for file in files:
+        table = pd.read_csv(file, sep=None, engine="python")
+        assert {row.trial: (row.first, row.second, row.third) for row in table.itertuples()} == shown
+    described = json.loads((tmp_path / "psych-ds" / "dataset_description.json").read_text())["variableMeasured"]
+    assert "third" in {one["name"] for one in described}
+    assert "third" in json.loads(files[2].with_suffix(".json").read_text())

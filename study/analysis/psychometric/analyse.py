@@ -138,6 +138,12 @@ def analyse_psychometric(
     )
 
 
+def typical_threshold(trials: pd.DataFrame, model: Model, confidence: float) -> TypicalThreshold | str:
+    """Return the threshold of a typical participant as `analyse_psychometric` finds it, alone; or why there is none."""
+    levels, yes, shown = (trials[column].to_numpy(dtype=np.float64) for column in ("level", "yes", "shown"))
+    return _typical(trials, model, fit_likelihood(levels, yes, shown, model, confidence=confidence), confidence)
+
+
 def function_of(trials: pd.DataFrame, model: Model, confidence: float) -> Function:
     """Return the function of all answers in a table, taken as one person's."""
     levels, yes, shown = (trials[column].to_numpy(dtype=np.float64) for column in ("level", "yes", "shown"))

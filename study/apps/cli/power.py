@@ -5,20 +5,20 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from study.analysis.to_json import to_json
 from study.apps.cli.console import emit, json_option, library_option, progress
-from study.counting import counted, noun
+from study.counting import counted
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     from study.experiment.plan import Plan
     from study.experiment.protocol.whole import Protocol, StudySpec
-    from study.power.curve import Power
+    from study.power.design import PlannedStudy
 
 AT_ONCE = 250
 """Studies drawn and analysed together: enough to be fast, few enough for little memory."""
@@ -39,20 +39,14 @@ def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
     Raises
     ------
     AnalysisError
-        When there is more than one to choose from, none of that name, or its trials depend on the responses.
+        When there is more than one to choose from, or none of that name.
     """
     names = ", ".join(study.name for study in protocol.studies)
     if name is None and len(protocol.studies) > 1:
         raise AnalysisError(f"{protocol.name}: expected --study with one of {names}")
     for study in protocol.studies:
-        if name not in (None, study.name):
-            continue
-        if study.procedure.trials(1, 1) is not None:
-            raise AnalysisError(
-                f"{protocol.name}: expected a study whose trials are known beforehand, found {study.procedure.title} "
-                f"in {study.name!r}; try numbers of participants with segue simulate and segue analyse"
-            )
-        return study
+        if name in (None, study.name):
+            return study
     raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
 
 
@@ -76,13 +70,13 @@ def _sizes(text: str) -> list[int]:
 @click.option("--difference", type=float, default=0.7, show_default=True,
               help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
 @click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=8.0, show_default=True,
-              help="Same-different: true threshold, frames shorter.")  # fmt: skip
+              help="Same-different, oddity: true threshold, frames shorter.")  # fmt: skip
 @click.option("--longer", type=click.FloatRange(min=0, min_open=True), default=7.0, show_default=True,
-              help="Same-different: true threshold, frames longer.")  # fmt: skip
+              help="Same-different, oddity: true threshold, frames longer.")  # fmt: skip
 @click.option("--spread", type=click.FloatRange(0, 1), default=0.15, show_default=True,
-              help="Same-different: how participants differ.")  # fmt: skip
+              help="Same-different, oddity: how participants differ.")  # fmt: skip
 @click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
-              help="Same-different: required half-width of the 95% intervals, frames.")  # fmt: skip
+              help="Same-different, oddity: required half-width of the 95% intervals, frames.")  # fmt: skip
 @click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=0.005, show_default=True,
               help="Share of trials without a response because of inattention, besides late responses.")  # fmt: skip
 @click.option("--studies", type=click.IntRange(min=10), help="Simulated studies.  [default: 1000; thresholds 200]")
@@ -105,11 +99,10 @@ def power(
 ) -> None:
     """How many participants a protocol needs for given effects, by simulation."""
     from study.analysis.exclusions import rules_of
-    from study.analysis.to_json import to_json
     from study.apps.cli.shared import load
     from study.files import check_place
     from study.power.curve import power_curve
-    from study.power.design import Design
+    from study.power.design import Design, PlannedStudy
     from study.power.registry import effect_of
     from study.power.sessions import whole_sessions
 
@@ -132,45 +125,44 @@ def power(
             at_once=10 if slow else AT_ONCE,
             progress=lambda done, total: report(done / total, f"{done} of {total}"),
         )
-    answers = sum(trial.study == study.name and trial.role == "trial" for trial in plans[0].trials)
-    result = {
-        "protocol": checked.name,
-        "study": study.name,
-        "task": study.task,
-        "effect": {**effect.stated, "missed": options["missed"]},
-        "icc": effect.icc,
-        "test": effect.test,
-        "aim": effect.aim,
-        **to_json(found),
-        "simulations": studies,
-        "through": "whole sessions" if options["sessions"] else "plan, observers, exclusions and default test",
-        "seed": options["seed"],
-        "answers_per_participant": answers,
-    }
+    result = PlannedStudy(
+        protocol=checked.name,
+        study=study.name,
+        task=study.task,
+        effect={**effect.stated, "missed": options["missed"]},
+        icc=effect.icc,
+        test=effect.test,
+        aim=effect.aim,
+        points=found.points,
+        target=found.target,
+        needed=found.needed,
+        note=found.note,
+        simulations=studies,
+        through="whole sessions" if options["sessions"] else "plan, observers, exclusions and default test",
+        seed=options["seed"],
+        answers_per_participant=effect.answers(design),
+    )
     if out is not None:
         _write(out, result)
-    emit(result, as_json, _in_words(found, effect.aim, answers))
+    emit(to_json(result), as_json, _in_words(result))
 
 
-def _write(folder: Path, result: Mapping[str, Any]) -> None:
+def _write(folder: Path, result: PlannedStudy) -> None:
     """The result as JSON, and its curve as CSV."""
     from study.files import write_whole
 
-    stem = folder / f"power_{result['study']}"
-    write_whole(stem.with_suffix(".json"), json.dumps(result, indent=1, ensure_ascii=False) + "\n")
+    stem = folder / f"power_{result.study}"
+    write_whole(stem.with_suffix(".json"), json.dumps(to_json(result), indent=1, ensure_ascii=False) + "\n")
     rows = io.StringIO()
     table = csv.writer(rows)
-    table.writerow(
-        ["study", "participants", "power", "low", "high", "simulations", "icc", "test", *result["effect"].keys()]
-    )
-    for point in result["points"]:
-        numbers = [point["participants"], point["power"], point["interval"]["low"], point["interval"]["high"]]
-        known = [result["simulations"], result["icc"], result["test"], *result["effect"].values()]
-        table.writerow([result["study"], *numbers, *known])
+    table.writerow(["study", "participants", "power", "low", "high", "simulations", "icc", "test", *result.effect])
+    for point in result.points:
+        numbers = [point.participants, point.power, point.interval.low, point.interval.high]
+        table.writerow([result.study, *numbers, result.simulations, result.icc, result.test, *result.effect.values()])
     write_whole(stem.with_suffix(".csv"), rows.getvalue())
 
 
-def _in_words(found: Power, aim: str, answers: int) -> str:
+def _in_words(found: PlannedStudy) -> str:
     """The curve as a table with bars, and the number."""
     lines = [f"{'participants':>12}  power  95% interval"]
     for point in found.points:
@@ -178,9 +170,8 @@ def _in_words(found: Power, aim: str, answers: int) -> str:
         bar = "#" * round(30 * point.power)
         lines.append(f"{point.participants:12}  {point.power:5.2f}  {low:.2f} to {high:.2f}   {bar}")
     who = counted(found.needed, "participant") if found.needed else "no number tried"
-    asked = noun(answers, "answer")
     lines.append(
-        f"To {aim} in {100 * found.target:g}% of studies, {answers} {asked} each: {who}"
-        + (f" ({found.note})." if found.note else ".")
+        f"To {found.aim} in {100 * found.target:g}% of studies, "
+        f"{counted(found.answers_per_participant, 'answer')} each: {who}" + (f" ({found.note})." if found.note else ".")
     )
     return "\n".join(lines)

@@ -20,10 +20,10 @@ from study.apps.server.hosting import Host, LiveSession
 from study.experiment.plan import questions
 from study.experiment.session import current
 from study.experiment.store import participants as people
-from study.experiment.store.frames import answers_frame
+from study.experiment.store.frames import answers_csv
 from study.experiment.store.sessions import session_by_id
 from study.experiment.store.tables import events, form_values, participants, presentations, sessions, withdrawals
-from study.spreadsheets import safe_cell, safe_table
+from study.spreadsheets import safe_cell
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -130,11 +130,6 @@ def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     return text.getvalue()
 
 
-def _answers(host: Host) -> str:
-    table = answers_frame(host.responses, all_attempts=True, roles=("trial", "practice", "check"))
-    return str(safe_table(table).to_csv(index=False))
-
-
 def _joined(host: Host, table: sa.Table, *columns: sa.Column[Any]) -> str:
     query = sa.select(sessions.c.participant, *columns).join(table, table.c.session_id == sessions.c.id)
     with host.responses.engine.connect() as connection:
@@ -144,7 +139,7 @@ def _joined(host: Host, table: sa.Table, *columns: sa.Column[Any]) -> str:
 
 
 TABLES: dict[str, Callable[[Host], str]] = {
-    "answers": _answers,
+    "answers": lambda host: answers_csv(host.responses),
     "form": lambda host: _joined(host, form_values, form_values.c.name, form_values.c.value, form_values.c.at),
     "presentations": lambda host: _joined(
         host, presentations, *(c for c in presentations.c if c.name not in ("id", "session_id", "detail_json"))

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 MADE_BY = "Segue"
 DESCRIPTION = "dataset_description.json"
 BIDS_VERSION = "1.10.0"
-ROLES = ("trial", "practice", "check")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +84,7 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
     import sqlalchemy as sa
 
     from study.experiment.store import tables as stored
-    from study.experiment.store.frames import answers_frame
+    from study.experiment.store.frames import ROLES, answers_frame
     from study.experiment.store.responses import rows_of
     from study.experiment.store.sessions import session_table
 

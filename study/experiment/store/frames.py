@@ -10,20 +10,19 @@ import sqlalchemy as sa
 
 from study.errors import SessionError
 from study.experiment.store.responses import Responses, rows_of
-from study.experiment.store.tables import (
-    answers,
-    sessions,
-)
+from study.experiment.store.tables import answer_stimuli, answers, sessions
 from study.files import write_whole
 from study.spreadsheets import safe_table
+from study.tasks.trial import PLACES
 
 if TYPE_CHECKING:
     import pandas as pd
 
+ROLES = ("trial", "practice", "check")
 # The seam with the analysis: one row an answer.
 ANSWER_COLUMNS = (
     "participant", "simulated", "study", "task", "trial", "attempt", "item", "repeat", "pair", "motion", "category",
-    "first", "second", "difference_frames", "reference_first", "method_a", "method_b", "a_first", "answer", "missed",
+    *PLACES, "difference_frames", "reference_first", "method_a", "method_b", "a_first", "answer", "missed",
     "correct", "chose_a", "response_s", "shown_well", "answered_at",
     "role", "expected",
 )  # fmt: skip
@@ -57,6 +56,11 @@ def answers_frame(
     query = sa.select(answers, sessions.c.participant, sessions.c.simulated, sessions.c.protocol_sha256).join(
         sessions, answers.c.session_id == sessions.c.id
     )
+    for slot, place in enumerate(PLACES[2:], start=3):  # the table of answers itself has two
+        own = answer_stimuli.alias(place)
+        same = [own.c[name] == answers.c[name] for name in ("session_id", "trial", "item", "attempt")]
+        query = query.outerjoin(own, sa.and_(*same, own.c.slot == slot))
+        query = query.add_columns(sa.func.coalesce(own.c.stimulus, "").label(place))
     if protocol_sha256 is not None:
         query = query.where(sessions.c.protocol_sha256 == protocol_sha256)
     query = query.where(answers.c.role.in_(roles))
@@ -81,8 +85,12 @@ def answers_frame(
     return table[list(ANSWER_COLUMNS)].reset_index(drop=True)
 
 
+def answers_csv(responses: Responses) -> str:
+    """All answers, every showing and every role, as CSV (ISO times, empty where nothing is meant)."""
+    return str(safe_table(answers_frame(responses, all_attempts=True, roles=ROLES)).to_csv(index=False))
+
+
 def export_csv(responses: Responses, path: str | Path) -> Path:
-    """Write all answers, every showing and every role, as CSV (UTF-8, ISO times, empty where nothing is meant)."""
-    table = answers_frame(responses, all_attempts=True, roles=("trial", "practice", "check"))
-    write_whole(path, safe_table(table).to_csv(index=False))
+    """Write `answers_csv` to a file."""
+    write_whole(path, answers_csv(responses))
     return Path(path)

@@ -36,6 +36,7 @@ ANSWERS: Mapping[str, Variable] = {
     "category": Variable("Type of motion."),
     "first": Variable("Stimulus shown first: the SHA-256 of its content."),
     "second": Variable("Stimulus shown second; empty where one was rated by itself."),
+    "third": Variable("Stimulus shown third; empty where fewer were shown."),
     "difference_frames": Variable("Blend length of the comparison minus that of the reference.", "number", "frames"),
     "reference_first": Variable("Whether the reference was shown first (same-different).", "boolean"),
     "method_a": Variable("Method of the reference, or of what was rated by itself."),
@@ -43,7 +44,9 @@ ANSWERS: Mapping[str, Variable] = {
     "a_first": Variable(
         "Whether the transition of method_a was shown first (preference, rating of a pair).", "boolean"
     ),
-    "answer": Variable("The answer: same, different, first, second, or a point of the scale; empty where missed."),
+    "answer": Variable(
+        "The answer: same, different, first, second, third, or a point of the scale; empty where missed."
+    ),
     "missed": Variable("Whether the time to answer ended without an answer.", "boolean"),
     "correct": Variable("Whether the answer was right, where one is.", "boolean"),
     "chose_a": Variable("Whether the transition of method_a was favoured (preference).", "boolean"),
@@ -76,7 +79,7 @@ PRESENTATIONS: Mapping[str, Variable] = {
     "participant": ANSWERS["participant"],
     "trial": ANSWERS["trial"],
     "attempt": ANSWERS["attempt"],
-    "place": Variable("Which stimulus of the trial: first or second."),
+    "place": Variable("Which stimulus of the trial: first, second or third."),
     "stimulus": Variable("The stimulus: the SHA-256 of its content."),
     "method": Variable("What timed its frames: a browser's requestVideoFrameCallback, a window's swap, or a fallback."),
     "frames_expected": Variable("Frames of the stimulus.", "number", "frames"),

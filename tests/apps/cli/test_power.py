@@ -171,13 +171,16 @@ def test_refusals(arguments: list[str], message: str, capsys: pytest.CaptureFixt
     assert message in capsys.readouterr().err
 
 
-def test_a_study_with_staircases_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_study_with_staircases_is_planned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = load("blend_length_jnd").text
     levels = next(line for line in text.splitlines() if line.startswith("differences_frames"))
     text = text.replace(f"{levels}\n", "").replace('order = "both"\n', "")
     protocol = tmp_path / "staircases.toml"
     protocol.write_text(f'{text}\n[studies.procedure]\nname = "staircase"\nstart_frames = 10\nmost_frames = 15\n')
-    assert run(["power", str(protocol)]) == 2
-    said = capsys.readouterr().err
-    assert "expected a study whose trials are known beforehand, found adaptive staircases in" in said
-    assert "segue simulate" in said
+    assert (
+        run(["power", str(protocol), "--participants", "3,12", "--studies", "10", "--precision", "1.5", "--json"]) == 0
+    )
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["points"][0]["power"] < printed["points"][1]["power"]
+    assert "staircases" in printed["aim"]
+    assert printed["answers_per_participant"] > 100

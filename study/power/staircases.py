@@ -1,0 +1,140 @@
+"""The effect of a study with staircases: the thresholds that they aim at, to be told with a stated precision.
+
+Participants go through the rule of the study's own procedure, staircase by staircase; the analysis of reversals reads
+their responses as it reads stored ones. How staircases are interleaved changes nothing of what each of them asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from study.analysis.exclusions import exclude
+from study.analysis.oddity.analyse import Oddity
+from study.analysis.same_different.analyse import SameDifferent
+from study.analysis.same_different.staircases import SIGNS, Staircases, staircase_thresholds
+from study.errors import AnalysisError
+from study.experiment.observers import person
+from study.experiment.procedures.staircase import Staircase
+from study.models.oddity import CHANCE
+from study.models.population import SameDifferentObserver, probability_different, probability_odd_found
+from study.models.up_down import Track, moved, stopped
+from study.power.curve import Run
+from study.power.design import BoolArray, Design, Effect, FloatArray, times
+from study.power.oddity import oddity_observer
+from study.power.same_different import same_different_observer
+from study.tasks.observer import ObserverSettings
+
+if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
+    from study.experiment.protocol.studies import AnalysisSettings
+    from study.experiment.protocol.whole import StudySpec
+
+OBSERVERS: Mapping[str, Callable[[float, float, float, float], ObserverSettings]] = {
+    "same-different": same_different_observer,
+    "oddity": oddity_observer,
+}
+RIGHT: Mapping[str, tuple[Callable[[SameDifferentObserver, FloatArray], FloatArray], float]] = {
+    "same-different": (probability_different, 0.5),
+    "oddity": (probability_odd_found, CHANCE),
+}
+"""The probability of a right response by the difference, and what it is for an observer who does not know."""
+
+
+def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
+    """Return thresholds shorter and longer, how participants differ, and how precisely all are to be told."""
+    del decided
+    if study.task not in OBSERVERS:
+        raise AnalysisError(f"{study.name}: expected one of the tasks {', '.join(OBSERVERS)}, found {study.task!r}")
+    shorter, longer, spread, precision = (options[name] for name in ("shorter", "longer", "spread", "precision"))
+    return Effect(
+        observer=OBSERVERS[study.task](shorter, longer, spread, options["missed"]),
+        stated={"shorter": shorter, "longer": longer, "spread": spread, "precision": precision},
+        icc=None,
+        test="width of the 95% intervals of the staircases' thresholds, Student's t over participants",
+        aim=f"tell the thresholds of the staircases to ± {precision:g} frames",
+        study=lambda design: staircase_study(design, precision),
+        found=lambda analysis: staircases_found(analysis, study.name, precision),
+        slow=True,
+        answers=trials_each,
+    )
+
+
+def staircases_found(analysis: Analysis, name: str, precision: float) -> bool:
+    """Return whether the intervals of the thresholds of all sides are as narrow as asked."""
+    result = analysis.of(SameDifferent).get(name) or analysis.of(Oddity).get(name)
+    return _narrow(result.staircases if result else None, precision)
+
+
+def _narrow(found: Staircases | None, precision: float) -> bool:
+    ends = [threshold.interval for threshold in found.thresholds.values()] if found else []
+    return bool(ends) and all(
+        end.low is not None and end.high is not None and end.high - end.low <= 2 * precision for end in ends
+    )
+
+
+def trials_each(design: Design) -> int:
+    """Return how many trials a participant answers on average, those without a difference among them."""
+    procedure = _procedure(design)
+    rng = np.random.default_rng(0)
+    moved_by = np.mean([sum(1 for _ in _responses(design, procedure, seed, 0, rng)) for seed in range(100)])
+    every = procedure.catch_every
+    return round(float(moved_by) * (every / (every - 1) if every else 1))
+
+
+def _procedure(design: Design) -> Staircase:
+    procedure = design.study.procedure
+    assert isinstance(procedure, Staircase), "the registry asks for studies with staircases"
+    return procedure
+
+
+def staircase_study(design: Design, precision: float) -> Run:
+    """Whether the intervals of the staircases' thresholds are as narrow as asked (half their width, in frames)."""
+    procedure = _procedure(design)
+
+    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        verdicts = np.zeros((studies, len(sizes)), dtype=bool)
+        for number in range(studies):
+            seed = int(rng.integers(2**31))
+            parts = [pd.DataFrame(_responses(design, procedure, seed, who, rng)) for who in range(max(sizes))]
+            for place, size in enumerate(sizes):
+                kept, _ = exclude(pd.concat(parts[:size], ignore_index=True), design.rules)
+                verdicts[number, place] = _narrow(staircase_thresholds(kept, procedure.rule), precision)
+        return verdicts
+
+    return run
+
+
+def _responses(
+    design: Design, procedure: Staircase, seed: int, who: int, rng: np.random.Generator
+) -> Iterator[dict[str, object]]:
+    """The rows of one participant's responses, staircase after staircase."""
+    name, rule = f"power-{who:03}", procedure.rule
+    observer = person(design.settings, name, seed).settings.same_different
+    probability, hardest = RIGHT[design.study.task]
+    course = next(course for course in design.plans[who].courses if course.study == design.study.name)
+    asked = {(pair.motion, pair.difference_frames > 0) for pair in course.pairs if pair.difference_frames}
+
+    @cache
+    def right_at(difference: int) -> float:
+        return float(probability(observer, np.array(float(difference))))
+
+    trial = 0
+    for repeat in range(1, course.repeats + 1):
+        for motion, longer in sorted(asked):
+            track, sign = Track(rule.start), SIGNS["longer" if longer else "shorter"]
+            while not stopped(track, rule):
+                share = right_at(sign * track.level)
+                response_s, given = times(design, rng, np.array(abs(share - hardest) / (1 - hardest)))
+                right = bool(rng.random() < share) if given else None
+                trial += 1
+                yield {
+                    "participant": name, "trial": trial, "motion": motion, "repeat": repeat,
+                    "difference_frames": sign * track.level, "answer": "given" if given else None,
+                    "correct": right, "response_s": float(response_s) if given else np.nan, "shown_well": True,
+                }  # fmt: skip
+                track = moved(track, rule, right)
