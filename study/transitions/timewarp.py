@@ -2,10 +2,15 @@
 
 In: two clips of one rig at one frame rate, a start frame and an end frame. Out: the cost of every pair of lengths, the
 cheapest pair, and the blend that follows. Wang & Bodenheimer 2004, section 3.1.4, Eqs. 5 and 6, Figure 4.
+
+The paper does not bound the ratio of the two windows. Without a bound, standing is drawn out without end, since nothing
+changes in it: 60 frames of one motion meet 6 of the other. So neither window is longer than `STEEPEST` times the other.
+Such a slope constraint is usual wherever motions are warped (Sakoe & Chiba 1978; Kovar & Gleicher 2003, section 3.1).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -25,6 +30,9 @@ from study.transitions.windows import check_frames, held
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+STEEPEST = 2.0
+"""The slope of a warp lies between one over this and this."""
+
 
 @dataclass(frozen=True)
 class WarpLength:
@@ -39,7 +47,7 @@ class WarpLength:
     cost
         Its cost.
     costs : (lengths, lengths)
-        The cost of each pair, by source length, then destination length.
+        The cost of each pair, by source length, then destination length; infinite where the slope is too steep.
     shortest
         The length of the first row and column, frames.
     note
@@ -71,6 +79,7 @@ def warp_length(
     longest: int | None = None,
     weights: str | Mapping[str, float] = "wang2003",
     average: bool = True,
+    steepest: float = STEEPEST,
 ) -> WarpLength:
     """The pair of blend lengths with the least cost (2004 Eqs. 5 and 6).
 
@@ -81,6 +90,9 @@ def warp_length(
     average
         Divide each sum by its number of terms, as Eq. 1 does, so that equal lengths cost what the geodesic method
         says. Eqs. 5 and 6 print the sum itself (False), which favours short blends for being short.
+    steepest
+        The longer window has at most this many times the frames of the shorter one, 1 or more; `math.inf` considers
+        all pairs, as the paper does.
 
     Raises
     ------
@@ -96,7 +108,9 @@ def warp_length(
     # A warped window also looks at the frame before its first.
     high, note = held(min(source.frames - start_frame, end_frame) if start_frame else 0, low, high)
     weight = joint_weights(source.skeleton, weights)
-    costs = warp_costs(source, destination, start_frame, end_frame, high, weight, average=average)[low - 1 :, low - 1 :]
+    costs = warp_costs(source, destination, start_frame, end_frame, high, weight, average=average, steepest=steepest)[
+        low - 1 :, low - 1 :
+    ]
     row, column = np.unravel_index(int(np.argmin(costs)), costs.shape)
     lengths = (low + int(row), low + int(column))
     return WarpLength(*lengths, max(lengths), max(lengths) / source.fps, float(costs[row, column]), costs, low, note)
@@ -111,10 +125,12 @@ def warp_costs(
     weights: FloatArray,
     *,
     average: bool = True,
+    steepest: float = STEEPEST,
 ) -> FloatArray:
     """The cost of every pair of lengths 1 to `longest` frames, `(longest, longest)`: source length, destination length.
 
-    Eq. 5 where the source's window is no longer than the destination's, else Eq. 6; see `warp_length`.
+    Eq. 5 where the source's window is no longer than the destination's, else Eq. 6; see `warp_length`. Infinite where
+    one length is more than `steepest` times the other.
 
     Raises
     ------
@@ -136,10 +152,13 @@ def warp_costs(
     source_moves = _Arcs(a, b[1:], weights[used])
     # Eq. 6: the destination's poses move, from frame j-b_to on; the source's are frames i to i+b_from-1.
     destination_moves = _Arcs(b, a[1:], weights[used])
-    costs = np.empty((longest, longest))
+    if steepest < 1.0:
+        raise TransitionError(f"Expected a steepest slope of at least 1, got {steepest}.")
+    costs = np.full((longest, longest), np.inf)
     for longer in range(1, longest + 1):
-        costs[:longer, longer - 1] = source_moves.sums(_pairs(longer, longest, False))
-        costs[longer - 1, :longer] = destination_moves.sums(_pairs(longer, longest, True))
+        least = max(1, math.ceil(longer / steepest - 1e-9))
+        costs[least - 1 : longer, longer - 1] = source_moves.sums(_pairs(least, longer, longest, False))
+        costs[longer - 1, least - 1 : longer] = destination_moves.sums(_pairs(least, longer, longest, True))
     if average:
         lengths = np.arange(1, longest + 1)
         costs /= np.maximum.outer(lengths, lengths)
@@ -148,13 +167,13 @@ def warp_costs(
 
 @dataclass(frozen=True, eq=False)
 class _Pairs:
-    """Which poses meet in all windows of one longer length, for each shorter length (rows) and each t (columns).
+    """Which poses meet in all windows of one longer length, for each of `shorter` lengths (rows) and each t (columns).
 
     A moving pose lies `share (poses,)` of the way from its `row (poses,)` to the next one; many pairs use the same
     pose, so `pose (pairs,)` says which one, and `cell (pairs,)` where its row and the fixed frame are in a table.
     """
 
-    longer: int
+    shorter: int
     row: IntArray
     share: FloatArray
     pose: IntArray
@@ -162,16 +181,19 @@ class _Pairs:
 
 
 @lru_cache(maxsize=512)
-def _pairs(longer: int, longest: int, from_end: bool) -> _Pairs:
-    """The pairs of Eq. 5, or with `from_end` those of Eq. 6, whose moving window ends at the last row."""
-    lengths, t = np.arange(1, longer + 1), np.arange(1, longer + 1)
+def _pairs(least: int, longer: int, longest: int, from_end: bool) -> _Pairs:
+    """The pairs of Eq. 5, or with `from_end` those of Eq. 6, whose moving window ends at the last row.
+
+    The shorter lengths are `least` to `longer`.
+    """
+    lengths, t = np.arange(least, longer + 1), np.arange(1, longer + 1)
     # In parts of 1 / longer of a frame, from the first row or to the last one.
     parts = np.outer(lengths, longer - t) if from_end else np.outer(lengths, t)
     found, pose = np.unique(parts, return_inverse=True)
     row, rest = np.divmod(longest * longer - found if from_end else found, longer)
     pose = pose.reshape(parts.shape)
     fixed = t - 1 if from_end else longest - longer + t - 1
-    return _Pairs(longer, row, rest / longer, pose.ravel(), (row[pose] * longest + fixed).ravel())
+    return _Pairs(len(lengths), row, rest / longer, pose.ravel(), (row[pose] * longest + fixed).ravel())
 
 
 class _Arcs:
@@ -202,7 +224,7 @@ class _Arcs:
         self.work = np.empty((3, len(fixed) ** 2, moving.shape[1]))
 
     def sums(self, pairs: _Pairs) -> FloatArray:
-        """The cost summed over t for each shorter length, `(longer,)`."""
+        """The cost summed over t for each shorter length, `(shorter,)`."""
         sine = np.sin(self.angles[pairs.row] * pairs.share[:, None])
         # Arcs between frames stay far below a quarter turn of the half angle, where this would lose digits.
         cosine = np.sqrt(1.0 - sine * sine)
@@ -213,7 +235,7 @@ class _Arcs:
         sine.take(pairs.pose, axis=0, out=rest, mode="clip")
         rest *= self.across.take(pairs.cell, axis=0, out=table, mode="clip")
         dots += rest
-        return np.asarray((half_angle_squares(dots) @ self.weights).reshape(pairs.longer, -1).sum(axis=1))
+        return np.asarray((half_angle_squares(dots) @ self.weights).reshape(pairs.shorter, -1).sum(axis=1))
 
 
 def _check_supply(

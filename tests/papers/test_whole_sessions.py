@@ -38,13 +38,14 @@ def published(name) -> Any:
 
 
 def test_the_session_of_2004_is_as_printed() -> None:
-    """Sections 4.1 to 4.5: four studies in one session; the first three as their own protocols have them."""
+    """Sections 4.1 to 4.5: four studies in one session, as their own protocols have them."""
     session = published("wang2004_session")
     one, two, three, four = session.studies
     for study, alone in (
         (one, published("blend_length_jnd")),
         (two, published("geodesic_vs_fixed")),
         (three, published("velocity_vs_fixed")),
+        (four, published("geodesic_vs_timewarp")),
     ):
         (own,) = alone.studies
         for key in ("task", "reference", "comparison", "differences_frames", "fixed_frames", "order", "question"):
@@ -78,7 +79,7 @@ def test_the_session_of_2004_has_42_and_three_times_8_pairs(library: str, tmp_pa
         lengths = [int(frames) for frames in windows]
         assert abs(lengths[0] - lengths[1]) >= 5
         assert warped.blend_frames == max(lengths)
-        assert warped.frames == 60 + warped.blend_frames + 60
+        assert warped.frames == plain.frames == 120 + max(warped.blend_frames, plain.blend_frames)
     with open_responses(tmp_path) as responses:
         simulate(protocol, prepared, responses, 35, seed=2)
         found = analyse(answers_frame(responses), Settings(resamples=50))

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,7 +41,7 @@ def pair(make_walk: Callable[..., Clip]) -> Any:
 @pytest.mark.parametrize("average", [True, False])
 def test_costs_are_those_of_the_plain_equations(pair, average: bool) -> None:
     weights = joint_weights(pair[0].skeleton)
-    costs = warp_costs(*pair, 20, 40, 9, weights, average=average)
+    costs = warp_costs(*pair, 20, 40, 9, weights, average=average, steepest=math.inf)
     for b_from in range(1, 10):
         for b_to in range(1, 10):
             expected = plain_cost(*pair, 20, 40, b_from, b_to, weights)
@@ -50,7 +52,7 @@ def test_costs_are_those_of_the_plain_equations(pair, average: bool) -> None:
 def test_long_windows_agree_at_a_sample_of_lengths(make_walk: Callable[..., Clip]) -> None:
     pair = make_walk(90, phase=0.4), make_walk(90, phase=2.1, cadence=1.4)
     weights = joint_weights(pair[0].skeleton)
-    costs = warp_costs(*pair, 25, 70, 60, weights, average=False)
+    costs = warp_costs(*pair, 25, 70, 60, weights, average=False, steepest=math.inf)
     for b_from, b_to in ((60, 60), (1, 60), (60, 1), (37, 59), (59, 37), (47, 13)):
         assert costs[b_from - 1, b_to - 1] == pytest.approx(plain_cost(*pair, 25, 70, b_from, b_to, weights), rel=1e-11)
 
@@ -59,6 +61,102 @@ def test_equal_lengths_cost_what_the_geodesic_method_says(pair) -> None:
     weights = joint_weights(pair[0].skeleton)
     warped = np.diag(warp_costs(*pair, 15, 45, 30, weights))
     np.testing.assert_allclose(warped, geodesic_costs(*pair, 15, 45, 30, weights), rtol=1e-12, atol=1e-15)
+
+
+def _turned(a: list[float], b: list[float]) -> float:
+    """Half the angle between two rotations, from their quaternions' cosine; plain Python."""
+    return math.acos(min(1.0, abs(sum(x * y for x, y in zip(a, b, strict=True)))))
+
+
+def _between(frames: list[list[float]], time: float) -> list[float]:
+    """One joint's rotation at a time between two frames, by the formula of Shoemake 1985; plain Python."""
+    first = min(math.floor(time + 1e-9), len(frames) - 1)
+    share = max(0.0, time - first)
+    a, b = frames[first], frames[min(first + 1, len(frames) - 1)]
+    dot = sum(x * y for x, y in zip(a, b, strict=True))
+    angle, sign = math.acos(min(1.0, abs(dot))), math.copysign(1.0, dot)
+    if angle < 1e-9:
+        return a
+    left, right = math.sin((1 - share) * angle) / math.sin(angle), sign * math.sin(share * angle) / math.sin(angle)
+    return [left * x + right * y for x, y in zip(a, b, strict=True)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("steepest", [1.0, 1.5, 2.0, 12.0])
+def test_the_search_finds_what_trying_every_pair_of_windows_finds(
+    make_walk: Callable[..., Clip], seed: int, steepest: float
+) -> None:
+    """Every pose of every pair of windows within the slope, in plain Python that shares no code with the search."""
+    rng = np.random.default_rng(seed)
+    clips = [make_walk(50, phase=float(rng.uniform(0, 6)), cadence=float(rng.uniform(0.6, 1.6))) for _ in range(2)]
+    start, end, longest = int(rng.integers(3, 30)), int(rng.integers(14, 45)), 12
+    weights = {"hip.L": 1.0, "hip.R": 0.7, "shoulder.L": float(rng.uniform(0, 1)), "knee.R": 0.3}
+    joints = {clips[0].skeleton.role(role): weight for role, weight in weights.items()}
+    source, destination = ([clip.rotations[:, joint].tolist() for joint in joints] for clip in clips)
+    costs = {}
+    for b_from in range(1, longest + 1):
+        for b_to in range(1, longest + 1):
+            longer = max(b_from, b_to)
+            if longer > steepest * min(b_from, b_to) + 1e-9:
+                continue
+            pairs = [(start - 1 + b_from * t / longer, end - b_to + b_to * t / longer) for t in range(1, longer + 1)]
+            costs[b_from, b_to] = (
+                sum(
+                    weight * _turned(_between(a, at_source), _between(b, at_destination)) ** 2
+                    for weight, a, b in zip(joints.values(), source, destination, strict=True)
+                    for at_source, at_destination in pairs
+                )
+                / longer
+            )
+    found = warp_length(*clips, start, end, longest=longest, weights=weights, steepest=steepest)
+    assert found.windows == min(costs, key=costs.__getitem__)
+    assert found.cost == pytest.approx(min(costs.values()), rel=1e-7, abs=1e-10)
+    assert int(np.isfinite(found.costs).sum()) == len(costs)
+
+
+def test_neither_window_is_more_than_twice_as_long_as_the_other(make_walk: Callable[..., Clip]) -> None:
+    """Standing meets walking as well in many frames as in few: without a bound it would be drawn out without end."""
+    stand, walk = make_walk(100, swing=0.0), make_walk(100, phase=1.0)
+    unbounded = warp_length(stand, walk, 20, 80, longest=40, shortest=3, steepest=math.inf)
+    assert max(unbounded.windows) > 2 * min(unbounded.windows)
+    bounded = warp_length(stand, walk, 20, 80, longest=40, shortest=3)
+    assert max(bounded.windows) <= 2 * min(bounded.windows)
+    assert bounded.cost >= unbounded.cost
+    with pytest.raises(TransitionError, match=r"steepest slope of at least 1, got 0\.5"):
+        warp_length(stand, walk, 20, 80, longest=9, steepest=0.5)
+
+
+@pytest.mark.parametrize("windows", [(9, 18), (18, 9), (12, 17), (17, 12), (10, 10)])
+def test_time_runs_on_within_a_warp_at_slopes_within_the_bound(
+    make_walk: Callable[..., Clip], windows: tuple[int, int]
+) -> None:
+    """Two clips whose elbows turn like clocks, one at each side, show which of their moments each blended frame has."""
+    rate = np.radians(2.0)
+    base = make_walk(70, swing=0.0)
+    moments = []
+    for side, other, at in (("elbow.L", "elbow.R", 0), ("elbow.R", "elbow.L", 1)):
+        joint, still = base.skeleton.role(side), base.skeleton.role(other)
+        turned = base.rotations.copy()
+        turned[:, still] = [1.0, 0.0, 0.0, 0.0]
+        turned[:, joint] = quat.from_axis_angle([1.0, 0.0, 0.0], rate * np.arange(70.0))
+        resting = base.rotations.copy()
+        resting[:, [joint, still]] = [1.0, 0.0, 0.0, 0.0]
+        clock, rest = replace(base, rotations=turned), replace(base, rotations=resting)
+        made = warped_blend(*((clock, rest) if at == 0 else (rest, clock)), 25, 45, *windows)
+        frames = slice(made.blend_start - 1, made.blend_stop + 1)
+        angle = 2 * quat.half_angle_between(made.clip.rotations[frames, joint], resting[0, joint])
+        share = np.linspace(0.0, 1.0, made.blend_frames + 2)
+        seen = share if at else 1.0 - share
+        # The source leaves from the frame before the blend, the destination arrives at the blend's last one.
+        own = slice(1, -1) if at else slice(0, -1)
+        moments.append(angle[own] / seen[own] / rate)
+    slopes = [np.diff(each) for each in moments]
+    longer = max(windows)
+    for slope, frames in zip(slopes, windows, strict=True):
+        assert slope.min() > 0
+        np.testing.assert_allclose(slope, frames / longer, atol=1e-6)
+    ratio = slopes[0].mean() / slopes[1].mean()
+    assert 0.5 - 1e-6 <= ratio <= 2.0 + 1e-6
 
 
 def test_another_tempo_of_the_same_motion_is_found(make_walk: Callable[..., Clip]) -> None:

@@ -14,6 +14,7 @@ from study.apps.cli.console import emit, json_option
 from study.apps.cli.films import film_options, film_size
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
+from study.transitions.methods.makes.blends import Slerp
 from study.transitions.methods.registry import METHODS
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from study.transitions.blending import Transition
     from study.transitions.timewarp import WarpLength
 
-LENGTHS = {name: one.length for name, one in METHODS.items() if one.length.windows and not one.make.sets_span}
+LENGTHS = {name: one.length for name, one in METHODS.items() if one.length.windows and isinstance(one.make, Slerp)}
 """Methods whose blend lies between two given frames, and the length of each."""
 
 
@@ -352,7 +353,7 @@ def show_warped(found: WarpLength, fps: float, out: Path, words: str) -> None:
         frames = {"source_frames": source, "destination_frames": destination}
         seconds = {"source_s": source / fps, "destination_s": destination / fps}
         columns = {**frames, **seconds, "cost": found.costs}
-        _write_csv(out, {name: column.ravel() for name, column in columns.items()})
+        _write_csv(out, {name: column[np.isfinite(found.costs)] for name, column in columns.items()})
         return
     from study.report.costs import cost_picture
 

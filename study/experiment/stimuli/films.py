@@ -148,9 +148,11 @@ def alike(study: StudySpec, settled: Settled, ways: Ways) -> bool:
 
 def _film(study: StudySpec, settled: Settled, method: str, difference: int, ways: Ways) -> Film:
     own, way = settled.at(method), ways.of(study, settled, method, difference)
-    # What stands beside a one-hop transition is shown for as long as that one takes.
-    spans = [name for name, each in ways.methods(study).items() if each.make.sets_span and name != method]
-    on = max(0, *(ways.of(study, settled, name).frames - way.frames for name in spans), 0)
+    methods = ways.methods(study)
+    # Beside some makes, the shorter of two transitions is shown for as long as the longer one takes.
+    alone = ways.protocol.stimuli.match == "none"
+    spans = methods if alone and any(each.make.sets_span for each in methods.values()) else ()
+    on = max((ways.of(study, settled, name).frames - way.frames for name in spans), default=0)
     if lacking := way.lacking(ways.protocol.entry_frames, ways.protocol.exit_frames + on):
         raise StimulusError(f"transition {settled.transition.name!r}, {method}: {lacking}.")
     added = (settled.source.added_before, settled.destination.added_before)

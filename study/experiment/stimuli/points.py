@@ -242,10 +242,10 @@ def _drawn(asked: _Asked, alike: Alike | None) -> Settled:
         start, end = int(starts[draw // len(ends)]), int(ends[draw % len(ends)])
         lengths = asked.lengths([judged], start, end)
         seen.append(lengths[judged.name].blend_frames)
-        reason = _unmet(asked, lengths[judged.name])
+        reason = _unmet(asked, judged, lengths[judged.name])
         if not reason and others:
             lengths |= asked.lengths(others, start, end)
-            reason = _unwarped(asked.points, lengths)
+            reason = next(filter(None, (_unmet(asked, each, lengths[each.name]) for each in others)), "")
         settled = asked.settled(start, end, lengths, tried)
         if not reason and _room_problem(asked, settled):
             reason = "no room for the longest blend"
@@ -263,31 +263,29 @@ def _patience(asked: _Asked, reason: str) -> int:
     """How many draws may fail for a reason: fewer where it takes long to see."""
     if reason == ONE_FILM:
         return min(asked.judged.length.draws, *(method.make.draws for method in asked.methods.values()))
-    slow = reason.startswith("warped")
+    slow = any(reason.startswith(f"{name}: ") for name in asked.methods)
     return min(each.length.draws for each in (asked.methods.values() if slow else (asked.judged,)))
 
 
-def _unmet(asked: _Asked, found: BlendLength | WarpLength) -> str:
-    """The first condition that a drawn transition doesn't meet; empty where all are met."""
+def _unmet(asked: _Asked, method: Method, found: BlendLength | WarpLength) -> str:
+    """The first condition that the blend of a method doesn't meet at drawn points; empty where all are met.
+
+    The conditions are about all methods whose length follows from the points: none of them is shown outside of them.
+    """
     points, length = asked.points, found.blend_frames
-    if length == 0:
+    whose = "" if method is asked.judged else f"{method.name}: "
+    if length == 0 or (whose and not method.length.follows):
         return ""
     least = max(points.shortest_frames or 1, 1 - min((0, *asked.study.differences_frames)))
     if length < least:
-        return f"shorter than {counted(least, 'frame')}"
+        return f"{whose}shorter than {counted(least, 'frame')}"
     if points.longest_frames is not None and length > points.longest_frames:
-        return f"longer than {counted(points.longest_frames, 'frame')}"
+        return f"{whose}longer than {counted(points.longest_frames, 'frame')}"
     if points.avoid_frames is not None and abs(length - points.avoid_frames) <= (points.avoid_within_frames or 0):
-        return f"within {counted(points.avoid_within_frames or 0, 'frame')} of {points.avoid_frames}"
-    return ""
-
-
-def _unwarped(points: Points, lengths: Mapping[str, BlendLength | WarpLength]) -> str:
-    """What a time-warped blend lacks to be accepted; empty where it lacks nothing."""
+        return f"{whose}within {counted(points.avoid_within_frames or 0, 'frame')} of {points.avoid_frames}"
     least = points.least_warp_frames or 0
-    for length in lengths.values():
-        if isinstance(length, WarpLength) and abs(length.source_frames - length.destination_frames) < least:
-            return f"warped by less than {counted(least, 'frame')}"
+    if isinstance(found, WarpLength) and abs(found.source_frames - found.destination_frames) < least:
+        return f"{whose}warped by less than {counted(least, 'frame')}"
     return ""
 
 

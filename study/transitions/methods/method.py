@@ -213,7 +213,7 @@ class Make(MethodPart):
 
     `windows` is what it takes of a length (see `Length.windows`). `levels` says whether its blend can be lengthened and
     shortened in a same-different study, `moves` whether it can be made about the same moment as a blend of another
-    length (`match` in a protocol), `sets_span` whether what stands beside it in a pair is shown for as long, and
+    length (`match` in a protocol), `sets_span` whether both stimuli of a pair with it are equally long, and
     `draws` how many points may be tried where it makes what the other method makes. In `words`, `{length}` and
     `{points}` are replaced by those of the other parts. `how` ends the sentence "Transitions by this method ..." of a
     Methods section, for makes that are neither blends by spherical linear interpolation nor cuts.

@@ -74,6 +74,7 @@ class Fixed(Length):
         return f"of {counted(self.frames(fps), 'frame')}"
 
 
+@dataclass(frozen=True)
 class Timewarp(Length):
     """The pair of windows that costs least, the shorter one slowed to the longer (Eqs. 5, 6)."""
 
@@ -84,13 +85,17 @@ class Timewarp(Length):
     # All pairs of lengths take a hundred times longer to cost than all lengths.
     draws = 150
 
+    steepest: Annotated[float, Ge(1), Le(10)] = setting(
+        2.0, "Length `timewarp`: the longer window has at most so many times the frames of the shorter one."
+    )
+
     def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> WarpLength:
         """The pair of windows of least cost."""
         from study.transitions.timewarp import warp_length
 
-        return warp_length(source, destination, start_frame, end_frame)
+        return warp_length(source, destination, start_frame, end_frame, steepest=self.steepest)
 
     def room(self, fps: float, longest_frames: int | None) -> Room:
-        """One frame more: a warped pose lies between two, of which one may be the frame before the window."""
+        """One frame more, since a warped pose may lie before the window's first; and the exit beside a longer blend."""
         room = super().room(fps, longest_frames)
-        return Room(room.blend + 1, room.search + 1, entry=1)
+        return Room(room.blend + 1, room.search + 1, entry=1, after=room.blend - 1)

@@ -87,6 +87,7 @@ class Warped(Slerp):
     words = "time-warped blends (2004) {points}"
     windows = 2
     levels = False
+    sets_span = True
 
 
 class Cut(Make):
