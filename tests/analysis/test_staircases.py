@@ -70,6 +70,8 @@ def test_reversals_are_those_that_happened(missed: float) -> None:
     for one in found.runs:
         rows, turns = made[one.participant, one.motion, 1 if one.side == "longer" else -1]
         assert (one.trials, one.reversals) == (len(rows), len(turns))
+        assert one.levels == tuple(level for level, _ in rows)
+        assert [one.levels[turn - 1] for turn in one.turns] == turns
         assert one.frames == pytest.approx(float(np.mean(turns[-6:])))
         assert one.spread == pytest.approx(float(np.std(turns[-6:], ddof=1)))
     for side, sign in (("longer", 1), ("shorter", -1)):

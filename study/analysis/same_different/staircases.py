@@ -36,6 +36,10 @@ class StaircaseRun:
         How many there were.
     frames, spread
         Mean and standard deviation of the last reversals; None where it stopped before it had as many.
+    levels
+        The difference that each trial showed, in frames without a sign.
+    turns
+        The trials, from 1, at which the direction changed.
     """
 
     participant: str
@@ -46,6 +50,8 @@ class StaircaseRun:
     reversals: int
     frames: float | None
     spread: float | None
+    levels: tuple[int, ...]
+    turns: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -119,9 +125,13 @@ def _runs(answers: pd.DataFrame, rule: UpDown) -> Iterator[StaircaseRun]:
     for (participant, motion, _, _), part in moved_rows.groupby(keys, sort=False):
         track = Track(rule.start)
         right = part["correct"].astype(object).where(part["answer"].notna(), None)
-        for level, answer in zip(part["difference_frames"].abs(), right, strict=True):
+        levels = tuple(int(level) for level in part["difference_frames"].abs())
+        turns: list[int] = []
+        for number, (level, answer) in enumerate(zip(levels, right, strict=True), start=1):
             # Where answers were excluded, the level that was shown tells where the staircase had come to.
-            track = moved(replace(track, level=int(level)), rule, None if answer is None else bool(answer))
+            before = len(track.reversals)
+            track = moved(replace(track, level=level), rule, None if answer is None else bool(answer))
+            turns += [number] * (len(track.reversals) - before)
         last = track.reversals[-rule.averaged :]
         enough = len(last) == rule.averaged
         yield StaircaseRun(
@@ -133,6 +143,8 @@ def _runs(answers: pd.DataFrame, rule: UpDown) -> Iterator[StaircaseRun]:
             len(track.reversals),
             float(np.mean(last)) if enough else None,
             float(np.std(last, ddof=1)) if enough and len(last) > 1 else None,
+            levels,
+            tuple(turns),
         )
 
 

@@ -12,6 +12,7 @@ from study.report import tables, words
 from study.report.drawing import BLUE, INK, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
 from study.report.references import MACMILLAN_2005
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.report.tables import Table
 
 if TYPE_CHECKING:
@@ -34,12 +35,16 @@ def oddity_section(result: Oddity, about: About) -> Section | None:
         anchor=f"study-{name}",
         title=about.title,
         headlines=(_headline(result, about.fps),),
-        drawings=(Drawing(f"{name}_right", oddity_figure(result, f"study-{name}-right", about.mark), caption),),
+        drawings=(
+            Drawing(f"{name}_right", oddity_figure(result, f"study-{name}-right", about.mark), caption),
+            *([tracks_drawing(name, result.staircases, about.mark)] if result.staircases else []),
+        ),
         tables=(_levels_table(name, result), _threshold_table(name, result, about.fps), *known),
         notes=(
             *([result.staircases.in_words("right")] if result.staircases else []),
             *(f"Blends that are {side}: {found.answer}" for side, found in result.functions.items()),
         ),
+        folded=(staircase_table(name, result.staircases),) if result.staircases else (),
         readings=tuple(_readings(result)),
     )
 

@@ -25,10 +25,10 @@ from study.report.sections.same_different.tables import (
     motion_table,
     percent_table,
     recovery_table,
-    staircase_table,
     threshold_table,
 )
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.transitions.methods.method import WANG_2004
 
 if TYPE_CHECKING:
@@ -93,7 +93,8 @@ def _drawings(result: SameDifferent, about: About) -> list[Drawing]:
         caption = "The same for every motion by itself: means ± one standard error, and the model."
         makers.append(("motions", lambda place: figures.motions_figure(result, place, about.mark), caption))
     name = about.name
-    return [Drawing(f"{name}_{part}", draw(f"study-{name}-{part}"), caption) for part, draw, caption in makers]
+    drawn = [Drawing(f"{name}_{part}", draw(f"study-{name}-{part}"), caption) for part, draw, caption in makers]
+    return [*drawn, *([tracks_drawing(name, result.staircases, about.mark)] if result.staircases else [])]
 
 
 # In words

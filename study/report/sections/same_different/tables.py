@@ -8,7 +8,6 @@ from typing import Any
 
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
 from study.analysis.same_different.counts import Side, Threshold
-from study.analysis.same_different.staircases import Staircases
 from study.report import words
 from study.report.tables import Table, make
 
@@ -124,19 +123,6 @@ def d_prime_table(name: str, result: SameDifferent) -> Table:
         "pooled, treated as independent; one half added to each count.",
         "difference_frames d_prime standard_error low high criterion",
         [vars(row) for row in result.d_prime],
-    )
-
-
-def staircase_table(name: str, found: Staircases) -> Table:
-    """Return every staircase."""
-    rows = [{**vars(run), "motion": words.readable(run.motion)} for run in found.runs]
-    return make(
-        f"{name}_staircases",
-        f"Every staircase: mean and standard deviation of its last {found.averaged} reversals, in frames. A dash where "
-        "it stopped before it had as many.",
-        "participant motion side repeat trials reversals frames spread",
-        rows,
-        headings={"spread": "standard deviation"},
     )
 
 

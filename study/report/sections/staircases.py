@@ -1,0 +1,81 @@
+"""Staircases on the page, for any task that they run: their tracks as small multiples, and a table of them all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from study.analysis.same_different.staircases import SIGNS, StaircaseRun, Staircases
+from study.counting import counted
+from study.report import words
+from study.report.drawing import BLUE, FAINT, INK, ORANGE, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.sections.section import Drawing
+from study.report.tables import Table, make
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLUMNS = 4
+MOST_DRAWN = 40
+"""Participants whose tracks are drawn; the table has all."""
+
+
+def staircase_table(name: str, found: Staircases) -> Table:
+    """Return every staircase."""
+    return make(
+        f"{name}_staircases",
+        f"Every staircase: mean and standard deviation of its last {found.averaged} reversals, in frames. A dash where "
+        "it stopped before it had as many.",
+        "participant motion side repeat trials reversals frames spread",
+        [{**vars(run), "motion": words.readable(run.motion)} for run in found.runs],
+        headings={"spread": "standard deviation"},
+    )
+
+
+def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
+    """Draw the difference that each trial of each staircase showed, participant by participant."""
+    people = sorted({run.participant for run in found.runs})
+    drawn = people[:MOST_DRAWN]
+    of_all = "" if drawn == people else f" The first {len(drawn)} of {counted(len(people), 'participant')} are drawn."
+    caption = (
+        "The course of every staircase: the difference from k in each of its trials. Points are reversals; the dashed "
+        f"lines are the mean of the last {found.averaged}, over the staircases of a participant and a side.{of_all}"
+    )
+    columns = min(len(drawn), COLUMNS)
+    lines = -(-len(drawn) // columns)
+    with style():
+        figure, grid = new_figure(7.2, 1.45 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)
+        for axes, participant in zip(grid.flat, drawn, strict=False):
+            _tracks(axes, [run for run in found.runs if run.participant == participant])
+            axes.set_title(participant)
+        for axes in grid.flat[len(drawn) :]:
+            axes.set_axis_off()
+        figure.supylabel("difference from k, frames", fontsize=9.5)
+        for axes in grid[-1]:
+            axes.set_xlabel("trial")
+        add_mark(figure, mark)
+        svg = to_svg(figure, f"study-{name}-tracks", "The course of every staircase", _spoken(drawn, found))
+    return Drawing(f"{name}_tracks", svg, caption)
+
+
+def _tracks(axes: Axes, runs: Sequence[StaircaseRun]) -> None:
+    quiet_grid(axes)
+    axes.axhline(0, color=FAINT, linewidth=0.8)
+    for side, sign in SIGNS.items():
+        own = [run for run in runs if run.side == side]
+        for run in own:
+            levels = [sign * level for level in run.levels]
+            axes.plot(range(1, len(levels) + 1), levels, color=BLUE, linewidth=0.9, drawstyle="steps-mid", alpha=0.75)
+            axes.plot(run.turns, [levels[turn - 1] for turn in run.turns], "o", color=INK, markersize=2.6)
+        means = [run.frames for run in own if run.frames is not None]
+        if means:
+            axes.axhline(sign * sum(means) / len(means), color=ORANGE, linewidth=1.0, linestyle=(0, (4, 2)))
+
+
+def _spoken(people: Sequence[str], found: Staircases) -> str:
+    parts = []
+    for participant in people:
+        runs = [run for run in found.runs if run.participant == participant]
+        trials, turns = sum(run.trials for run in runs), sum(run.reversals for run in runs)
+        parts.append(f"{participant}: {counted(len(runs), 'staircase')}, {trials} trials, {turns} reversals")
+    return "; ".join(parts)
