@@ -18,7 +18,7 @@ import numpy as np
 from study.errors import SessionError
 from study.experiment.chance import generator
 from study.experiment.procedures.constant_stimuli import ConstantStimuli, drawn_orders
-from study.experiment.procedures.procedure import Course, Draw, Procedure
+from study.experiment.procedures.procedure import Adaptive, Course, Draw, Procedure
 from study.experiment.procedures.registry import course_from_json, course_to_json
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.tasks.registry import task_of
@@ -141,9 +141,9 @@ def draw_plan(
         trials += [replace(trial, trial=place) for place, trial in enumerate(known, start=number)]
         number += len(known)
         # Numbers are reserved for all trials that may come, so that later studies do not depend on the answers.
-        if (course := study.procedure.course(draw, number)) is not None:
-            courses.append(course)
-            number += course.most
+        if isinstance(study.procedure, Adaptive):
+            courses.append(study.procedure.course(draw, number))
+            number += courses[-1].most
     return Plan(protocol.name, protocol.sha256, participant, seed, group, tuple(trials), tuple(courses))
 
 

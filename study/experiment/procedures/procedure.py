@@ -8,7 +8,7 @@ same as running it.
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -94,7 +94,7 @@ class Course:
     study: str
     first: int
     most: int
-    settings: Settings
+    settings: Adaptive
     pairs: tuple[Pair, ...]
     arrangements: tuple[Members, ...]
     repeats: int
@@ -141,11 +141,14 @@ class Settings(ABC):
         del draw, rng
         return []
 
-    def course(self, draw: Draw, first: int) -> Course | None:
-        """What a plan keeps where trials depend on the answers, numbered from `first` on; else None."""
-        del draw, first
-        return None
 
+class Adaptive(Settings):
+    """The settings of a procedure whose trials depend on the answers."""
+
+    @abstractmethod
+    def course(self, draw: Draw, first: int) -> Course:
+        """What a plan keeps of it, numbered from `first` on."""
+
+    @abstractmethod
     def begun(self, course: Course, rng: np.random.Generator) -> Procedure:
         """The procedure of a stored course; `rng` is the same whenever it is begun."""
-        raise NotImplementedError(f"{self.name} draws its trials beforehand")

@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from annotated_types import Ge, Le
 
-from study.experiment.procedures.procedure import Course, Draw, Members, Settings
+from study.experiment.procedures.procedure import Adaptive, Course, Draw, Members
 from study.models.up_down import Track, UpDown, fewest_trials, moved, reachable, stopped, target
 from study.settings import SettingsError, required, setting
 from study.tasks.answer import Answer
@@ -26,7 +26,7 @@ SIGNS = {"both": (-1, 1), "shorter": (-1,), "longer": (1,)}
 
 
 @dataclass(frozen=True)
-class Staircase(Settings):
+class Staircase(Adaptive):
     """The keys of `[studies.procedure]` with `name = "staircase"`."""
 
     name: ClassVar[str] = "staircase"

@@ -17,6 +17,7 @@ from study.experiment.protocol.stimuli import TransitionSpec
 from study.experiment.protocol.studies import StudySpec, check_once, repeated
 from study.experiment.protocol.texts import LONGEST_NAME
 from study.tasks.registry import task_of
+from study.transitions.methods.method import OwnPoints
 
 MOST_TRIALS = 100_000
 """Of one participant in one study: far beyond what anybody could answer."""
@@ -65,7 +66,7 @@ def _check_methods(protocol: Content, study: StudySpec, index: int) -> None:
             *where,
             "reference",
         )
-    if len({method.points.own for method in methods.values()}) > 1:
+    if len({isinstance(method.points, OwnPoints) for method in methods.values()}) > 1:
         raise KeyMismatchError(
             f"expected in {who} either cuts where a metric is least or methods at common points, found "
             f"{study.reference!r} and {study.comparison!r}; change one",
@@ -162,7 +163,7 @@ def _check_points(protocol: Content, study: StudySpec, transition: TransitionSpe
         points = protocol.points_for(study, transition)
     except ValidationError as error:
         raise KeyMismatchError(f"contradicting conditions {who}: {error.errors()[0]['ctx']['error']}", *where) from None
-    if points.choose == "given" and protocol.methods_of(study)[study.reference].points.own:
+    if points.choose == "given" and isinstance(protocol.methods_of(study)[study.reference].points, OwnPoints):
         raise KeyMismatchError(
             f"expected no given points {who}: {study.reference!r} finds its own; remove choose or change the method",
             *where,

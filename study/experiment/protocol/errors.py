@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import types
 import typing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
@@ -25,11 +25,22 @@ Location = Sequence[int | str]
 
 
 class KeyMismatchError(ValueError):
-    """What doesn't fit together in a protocol, and the key (a location within the part) where it shows."""
+    """What doesn't fit together in a protocol, and the key (a location within the part) where it shows.
+
+    `others` are further problems of the same part, to be told together with it.
+    """
 
     def __init__(self, message: str, *location: int | str) -> None:
         self.location = location
+        self.others: tuple[KeyMismatchError, ...] = ()
         super().__init__(message)
+
+
+def refuse_all(problems: Iterable[KeyMismatchError]) -> None:
+    """Raise all problems of a part as one, so that they are told together; nothing where there is none."""
+    if found := tuple(problems):
+        found[0].others = found[1:]
+        raise found[0] from None
 
 
 def full_location(detail: Mapping[str, Any]) -> Location:
@@ -41,8 +52,10 @@ def full_location(detail: Mapping[str, Any]) -> Location:
 def telling(model: type[BaseModel], details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
     """The findings that are about the protocol itself, without those that only follow from another one.
 
-    A list whose only part has a mistake is not empty; a misspelled key is not missing.
+    A list whose only part has a mistake is not empty; a misspelled key is not missing. A finding that stands for
+    several problems of one part becomes as many findings.
     """
+    details = [one for detail in details for one in _apart(detail)]
     faulty = [tuple(full_location(detail)) for detail in details]
     meant = set()
     for detail in details:
@@ -54,6 +67,13 @@ def telling(model: type[BaseModel], details: Sequence[ErrorDetails]) -> list[Err
         if not (detail["type"] == "missing" and detail["loc"] in meant)
         and not (detail["type"] == "too_short" and any(_within(other, detail["loc"]) for other in faulty))
     ]
+
+
+def _apart(detail: ErrorDetails) -> list[ErrorDetails]:
+    """A finding for each problem of a part."""
+    error = detail.get("ctx", {}).get("error")
+    others = error.others if isinstance(error, KeyMismatchError) else ()
+    return [detail, *(typing.cast("ErrorDetails", {**detail, "ctx": {"error": other}}) for other in others)]
 
 
 def _within(location: Location, part: Location) -> bool:

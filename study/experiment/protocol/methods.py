@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import Field, create_model, model_validator
 
-from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.errors import KeyMismatchError, refuse_all
 from study.experiment.protocol.settings import fields_of, member_of, values_in
 from study.experiment.protocol.texts import Part, Slug
 from study.transitions.methods.lengths.none import NoLength
@@ -58,13 +58,11 @@ class _OwnMethod(Part):
             found = repr(self.length) if self.length else "none"
             raise KeyMismatchError(f"expected {wanted} with the make {make.name!r}, found {found}; change it", "length")
         taken = [*points.setting_names(), *length.setting_names(), *make.setting_names()]
-        if strange := [key for key in self.settings if key not in taken]:
-            parts = ", ".join(part.name for part in (points, length, make) if part is not NoLength)
-            raise KeyMismatchError(
-                f"expected settings of its parts ({parts}), which are {', '.join(taken) or 'none'}, found this key; "
-                "remove it",
-                strange[0],
-            )
+        parts = ", ".join(part.name for part in (points, length, make) if part is not NoLength)
+        wanted = f"expected settings of its parts ({parts}), which are {', '.join(taken) or 'none'}"
+        refuse_all(
+            KeyMismatchError(f"{wanted}, found this key; remove it", key) for key in self.settings if key not in taken
+        )
         return self
 
     @property

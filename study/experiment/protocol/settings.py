@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import Field, ValidationError, create_model
 
-from study.experiment.protocol.errors import KeyMismatchError, finding, full_location, short, telling
+from study.experiment.protocol.errors import KeyMismatchError, finding, full_location, refuse_all, short, telling
 from study.experiment.protocol.texts import LONGEST_NAME, MOST_PARTS, Part
 from study.settings import SettingsError
 
@@ -39,14 +39,17 @@ def settings_in(described: type[Member], table: Mapping[str, Any]) -> Member:
     Raises
     ------
     KeyMismatchError
-        For the first key that is unknown (with the nearest one), missing, or has a bad value.
+        For every key that is unknown (with the nearest one), missing, or has a bad value.
     """
     model = table_of(described)  # type: ignore[arg-type]
     try:
         return described(**values_in(model.model_validate(table)))
     except ValidationError as error:
-        detail = telling(model, error.errors())[0]
-        raise KeyMismatchError(finding(model, detail).removesuffix("."), *full_location(detail)) from None
+        refuse_all(
+            KeyMismatchError(finding(model, detail).removesuffix("."), *full_location(detail))
+            for detail in telling(model, error.errors())
+        )
+        raise
     except SettingsError as error:
         raise KeyMismatchError(str(error), error.key) from None
 

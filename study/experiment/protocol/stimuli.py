@@ -70,10 +70,6 @@ class StimulusSettings(Part):
         "so a longer one makes a longer stimulus (2004).",
     )
     weight: Literal["linear", "sigmoid"] = Field(default="linear", description="How the blend weight runs from 0 to 1.")
-    specification: Literal["start-end"] = Field(
-        default="start-end",
-        description="What transition points mean: the first and last blended frame (2004 section 3).",
-    )
     clean_feet: bool = Field(default=True, description="Whether sliding of planted feet is removed after blending.")
     colours: Colours = Field(default=Colours(), description="Colours of the picture.")
 

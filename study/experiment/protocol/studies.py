@@ -14,7 +14,7 @@ from pydantic import Field, PlainValidator, model_validator
 from study.experiment.procedures.constant_stimuli import Constant
 from study.experiment.procedures.procedure import Settings
 from study.experiment.procedures.registry import PROCEDURES
-from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.errors import KeyMismatchError, refuse_all
 from study.experiment.protocol.settings import member_of, settings_in
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
@@ -170,8 +170,9 @@ class StudySpec(Part):
 
 def _check_task(study: StudySpec) -> None:
     """Refuse what doesn't fit between the task and the other keys of a study."""
-    for key, problem in (*study.procedure.problems(study), *problems_of(study)):
-        raise KeyMismatchError(problem, *filter(None, (key,)))
+    # What a procedure does not fit makes keys that the task would refuse.
+    for problems in (study.procedure.problems(study), problems_of(study)):
+        refuse_all(KeyMismatchError(problem, *filter(None, (key,))) for key, problem in problems)
     check_once(study.differences_frames, "difference", "differences_frames")
     check_once([item.name for item in study.items], "item's name", "items")
 

@@ -20,7 +20,7 @@ from study.experiment.protocol.stimuli import Points, TransitionSpec
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.supply import Needs, Supply, supply
 from study.motion.clip import retarget
-from study.transitions.methods.method import CANDIDATES, Method, Room
+from study.transitions.methods.method import CANDIDATES, Method, OwnPoints, Room
 from study.transitions.timewarp import WarpLength
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def settle(
     destination = supply(library, protocol.fps, transition.destination, destination_needs, points.destination_within)
     destination = _on_rig_of(source, destination, transition)
     asked = _Asked(protocol, study, transition, points, methods, source, destination)
-    if methods[study.reference].points.own:
+    if isinstance(methods[study.reference].points, OwnPoints):
         return _at_optima(asked, alike)
     return _drawn(asked, alike) if points.choose == "random" else _given(asked, alike)
 
@@ -131,7 +131,8 @@ def _needs(protocol: Protocol, study: StudySpec, points: Points, methods: Iterab
     entry, after = max(protocol.entry_frames, room.entry), protocol.exit_frames + room.after
     longest = room.blend + max((0, *study.differences_frames)) + room.stay
     plenty = max(longest, room.search)
-    blend, whole = f"blends of up to {counted(longest, 'frame')}", any(method.points.own for method in methods)
+    blend = f"blends of up to {counted(longest, 'frame')}"
+    whole = any(isinstance(method.points, OwnPoints) for method in methods)
     return (
         Needs(entry, plenty, entry, longest, f"{counted(entry, 'frame')} of entry and {blend}", whole),
         Needs(plenty - 1, after + 1, longest - 1, after + 1, f"{blend} and {counted(after, 'frame')} of exit", whole),
@@ -147,6 +148,7 @@ def _at_optima(asked: _Asked, alike: Alike | None) -> Settled:
     optima: dict[str, tuple[int, int]] = {}
     lengths: dict[str, BlendLength | WarpLength] = {}
     for name, method in asked.methods.items():
+        assert isinstance(method.points, OwnPoints), "a study whose methods differ in this is refused"
         optima[name] = method.points.best(source.clip, destination.clip, windows, shift)
         lengths |= asked.lengths([method], *optima[name])
     start, end = optima[asked.study.reference]

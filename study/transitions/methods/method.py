@@ -173,17 +173,19 @@ class MethodPart(ABC):
 class Points(MethodPart):
     """Where a transition is placed: at points that all methods of a study share, or at points of the method's own."""
 
-    own: ClassVar[bool] = False
 
+class OwnPoints(Points):
+    """Points of the method's own."""
+
+    @abstractmethod
     def best(
         self, source: Clip, destination: Clip, windows: tuple[tuple[int, int], tuple[int, int]], shift: int | None
     ) -> tuple[int, int]:
-        """The start and the end frame, for points of the method's own.
+        """The start and the end frame.
 
         `windows` are the frames of each clip that may be chosen, as slices count them. Where both clips show one
         motion, `shift` is the destination's frame number of the source's frame 0.
         """
-        raise NotImplementedError(f"{self.name} has no points of its own")
 
 
 class Length(MethodPart):

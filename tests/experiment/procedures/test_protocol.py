@@ -110,3 +110,27 @@ def test_check_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert run(["check", str(file), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert (result["fewest_trials"], result["trials"]) == (fewest + 2, most + 2)
+
+
+def test_all_problems_of_a_table_are_told_at_once() -> None:
+    text = with_staircases().replace("start_frames = 6", "strat_frames = 6").replace("reversals = 3", "reversals = 1")
+    with pytest.raises(ProtocolError) as refusal:
+        parse_protocol(text.replace("most_frames = 8\n", ""))
+    told = str(refusal.value).splitlines()
+    assert len(told) == 3
+    for line, problem in zip(
+        told, ("most_frames: expected", "reversals: expected at", "strat_frames: unk"), strict=True
+    ):
+        assert f"procedure.{problem}" in line
+
+
+def test_all_problems_of_a_study_are_told_at_once() -> None:
+    text = with_staircases().replace(
+        'task = "same-different"', 'task = "same-different"\nshow = "pair"\ncomparison = "cut"'
+    )
+    with pytest.raises(ProtocolError) as refusal:
+        parse_protocol(text)
+    assert [line.split("studies[0].")[1].split(":")[0] for line in str(refusal.value).splitlines()] == [
+        "show",
+        "comparison",
+    ]

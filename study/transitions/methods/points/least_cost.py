@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from study.settings import setting
-from study.transitions.methods.method import WANG_2003, Points
+from study.transitions.methods.method import WANG_2003, OwnPoints
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -19,13 +19,12 @@ _METRICS = {
 
 
 @dataclass(frozen=True)
-class LeastCost(Points):
+class LeastCost(OwnPoints):
     """The pair of frames that a metric says are nearest."""
 
     name = "least-cost"
     words = "of least cost"
     sources = (WANG_2003,)
-    own = True
 
     metric: Literal["lee2002", "wang2003", "pointcloud"] = setting(
         "wang2003", "Points `least-cost`: what says how far two frames are apart (2003 section 4.2)."
