@@ -25,6 +25,10 @@ from study.files import make_folder, refused
 BUSY_SECONDS = 10
 """How long a connection waits for another one's lock before it gives up."""
 
+CACHE_KIB = 256
+"""Of pages that a SQLite connection keeps. Its own default is eight times that for each of a server's connections, and
+hardly a page is read twice; what is needed again the system keeps."""
+
 ALONE_KEY = 0x5E60E
 """The number of the PostgreSQL advisory lock behind `alone`; any that other programs do not use would do."""
 
@@ -121,7 +125,10 @@ def shown(url: sa.URL) -> str:
 
 def _set_up_sqlite(connection: Any, _: object) -> None:
     cursor = connection.cursor()
-    for pragma in (f"busy_timeout={1000 * BUSY_SECONDS}", "journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+    for pragma in (
+        f"busy_timeout={1000 * BUSY_SECONDS}", "journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON",
+        f"cache_size={-CACHE_KIB}",
+    ):  # fmt: skip
         cursor.execute(f"PRAGMA {pragma}")
     cursor.close()
 

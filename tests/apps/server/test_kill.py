@@ -149,7 +149,7 @@ def run_clients(folder: Path, database: str, kills: int, kill: Callable[[Running
             time.sleep(dice.uniform(0.02, 0.6))
             before = sum(len(client.acknowledged) for client in clients)
             kill(running)
-            wait_for(lambda: sum(len(client.acknowledged) for client in clients) > before or stop.is_set())  # noqa: B023
+            wait_for(lambda: sum(len(client.acknowledged) for client in clients) > before + 3 or stop.is_set())  # noqa: B023
         time.sleep(0.3)
     finally:
         stop.set()
