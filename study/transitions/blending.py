@@ -197,9 +197,9 @@ def cut(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Tr
     destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
     destination = retarget(destination, source.skeleton)
-    turn = float(facing(_pick(source, [start_frame]))[0] - facing(_pick(destination, [end_frame]))[0])
-    alignment = _alignment(turn, source.root_positions[start_frame], destination.root_positions[end_frame])
-    clip = _assemble(source, start_frame, None, destination, end_frame, alignment, f"cut at frame {start_frame}")
+    turn = float(facing(picked(source, [start_frame]))[0] - facing(picked(destination, [end_frame]))[0])
+    alignment = alignment_of(turn, source.root_positions[start_frame], destination.root_positions[end_frame])
+    clip = assemble(source, start_frame, None, destination, end_frame, alignment, f"cut at frame {start_frame}")
     return Transition(
         clip, start_frame, start_frame, (start_frame, start_frame), (end_frame, end_frame), 0, alignment, "cut"
     )
@@ -220,10 +220,11 @@ class Stretch:
 def _margins(clip: Clip, start: int, blend_frames: int) -> Stretch:
     wanted = np.arange(start - 1, start + blend_frames + 1)
     inside = np.clip(wanted, 0, clip.frames - 1)
-    return Stretch(_pick(clip, inside), bool(wanted[0] >= 0), bool(wanted[-1] < clip.frames))
+    return Stretch(picked(clip, inside), bool(wanted[0] >= 0), bool(wanted[-1] < clip.frames))
 
 
-def _pick(clip: Clip, frames: NDArray[np.int64] | list[int]) -> Clip:
+def picked(clip: Clip, frames: NDArray[np.int64] | list[int]) -> Clip:
+    """A clip of these frames alone."""
     return replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
 
 
@@ -259,14 +260,14 @@ def join(
     rotations = slerp_one_way(source_stretch.clip.rotations[1:-1], destination_stretch.clip.rotations[1:-1], shares)
     positions, rotations[:, 0], end_facing, end_position = _blend_root(source_stretch, destination_stretch, share)
     last = count + (1 if destination_stretch.has_after else 0)
-    alignment = _alignment(
+    alignment = alignment_of(
         end_facing - float(facing(destination_stretch.clip)[last]),
         end_position,
         destination_stretch.clip.root_positions[last],
     )
     blended = replace(source, root_positions=positions, rotations=rotations)
     note = f"{note}, from source frame {source_frames[0]} to destination frame {destination_frames[1] - 1}"
-    clip = _assemble(source, source_frames[0], blended, destination, destination_frames[1], alignment, note)
+    clip = assemble(source, source_frames[0], blended, destination, destination_frames[1], alignment, note)
     return Transition(
         clip, source_frames[0], source_frames[0] + count, source_frames, destination_frames, count, alignment, note
     )
@@ -307,7 +308,7 @@ def _blend_root(
     # Where a clip has no frame on the far side of a step, the other clip's step serves alone.
     step_share[0] *= destination.has_before
     step_share[-1] = step_share[-1] if source.has_after else 1.0
-    steps = [_steps(part.clip, heading) for part, heading in zip((source, destination), headings, strict=True)]
+    steps = [steps_of(part.clip, heading) for part, heading in zip((source, destination), headings, strict=True)]
     turns = (1.0 - step_share) * steps[0][0] + step_share * steps[1][0]
     strides = (1.0 - step_share)[:, None] * steps[0][1] + step_share[:, None] * steps[1][1]
     first = 0 if source.has_before else 1
@@ -327,20 +328,20 @@ def _blend_root(
     return path[1:-1], rotations, float(heading[last]), path[last]
 
 
-def _steps(clip: Clip, heading: FloatArray) -> tuple[FloatArray, FloatArray]:
+def steps_of(clip: Clip, heading: FloatArray) -> tuple[FloatArray, FloatArray]:
     """From frame to frame: the turn, radians, and the step on the floor as seen in the facing halfway, metres."""
     strides = np.diff(clip.root_positions, axis=0) * np.array([1.0, 0.0, 1.0])
     return np.diff(heading), quat.rotate(quat.yaw(-0.5 * (heading[1:] + heading[:-1])), strides)
 
 
-def _alignment(turn: float, place: FloatArray, position: FloatArray) -> Alignment:
+def alignment_of(turn: float, place: FloatArray, position: FloatArray) -> Alignment:
     """The move on the floor that turns by `turn` and takes `position` above or below `place`."""
     turn = float(np.arctan2(np.sin(turn), np.cos(turn)))
     shift = place - quat.rotate(quat.yaw(turn), position)
     return Alignment(turn, (float(shift[0]), 0.0, float(shift[2])))
 
 
-def _assemble(
+def assemble(
     source: Clip,
     source_stop: int,
     blended: Clip | None,

@@ -56,7 +56,7 @@ def test_a_method_has_words_sources_a_utility_and_a_line_of_documentation(name: 
     assert [line for line in lines if line.startswith(f"| `{name}` |")], "a line in docs/transitions.md"
 
 
-def test_the_parts_of_a_method_are_those_of_the_papers() -> None:
+def test_the_parts_of_a_method_are_those_of_their_sources() -> None:
     triples = {name: (method.points.name, method.length.name, method.make.name) for name, method in METHODS.items()}
     assert triples == {
         "fixed": ("shared", "fixed", "slerp"),
@@ -67,6 +67,9 @@ def test_the_parts_of_a_method_are_those_of_the_papers() -> None:
         "cut-lee2002": ("least-cost", "none", "cut"),
         "cut-wang2003": ("least-cost", "none", "cut"),
         "cut-pointcloud": ("least-cost", "none", "cut"),
+        "inertialize": ("shared", "geodesic", "inertialize"),
+        "inertialize-quintic": ("shared", "geodesic", "inertialize-quintic"),
+        "dead-blend": ("shared", "geodesic", "dead-blend"),
         "one-hop": ("shared", "fixed", "one-hop"),
     }
 

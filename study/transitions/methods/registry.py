@@ -11,7 +11,9 @@ from collections.abc import Mapping
 from study.transitions.methods.lengths.none import NoLength
 from study.transitions.methods.lengths.wang2004 import Fixed, Geodesic, Timewarp, Velocity
 from study.transitions.methods.makes.blends import Cut, Slerp, Warped
+from study.transitions.methods.makes.dead_blend import DeadBlend
 from study.transitions.methods.makes.given import Given
+from study.transitions.methods.makes.inertialize import Inertialize, InertializeQuintic
 from study.transitions.methods.makes.one_hop import OneHop
 from study.transitions.methods.method import Length, Make, Method, Points
 from study.transitions.methods.points.least_cost import LeastCost
@@ -19,9 +21,12 @@ from study.transitions.methods.points.shared import Shared
 
 POINTS: Mapping[str, type[Points]] = {part.name: part for part in (Shared, LeastCost)}
 LENGTHS: Mapping[str, type[Length]] = {part.name: part for part in (Fixed, Geodesic, Velocity, Timewarp, NoLength)}
-MAKES: Mapping[str, type[Make]] = {part.name: part for part in (Slerp, Warped, Cut, OneHop, Given)}
+MAKES: Mapping[str, type[Make]] = {
+    part.name: part for part in (Slerp, Warped, Cut, Inertialize, InertializeQuintic, DeadBlend, OneHop, Given)
+}
 
-# Utilities by 2004 Table 2; of cuts at two optima, the distance that gives 2003's F of 6.39 in ratings.
+# Utilities by 2004 Table 2; of cuts at two optima, the distance that gives 2003's F of 6.39 in ratings. Of methods of
+# games no comparison is known: they are taken for as natural as a blend of fixed length.
 METHODS: Mapping[str, Method] = {
     method.name: method
     for method in (
@@ -33,6 +38,9 @@ METHODS: Mapping[str, Method] = {
         Method("cut-lee2002", LeastCost("lee2002"), NoLength(), Cut(), -2.6),
         Method("cut-wang2003", LeastCost("wang2003"), NoLength(), Cut(), -0.2),
         Method("cut-pointcloud", LeastCost("pointcloud"), NoLength(), Cut(), -1.4),
+        Method("inertialize", Shared(), Geodesic(), Inertialize(), 0.0),
+        Method("inertialize-quintic", Shared(), Geodesic(), InertializeQuintic(), 0.0),
+        Method("dead-blend", Shared(), Geodesic(), DeadBlend(), 0.0),
         Method("one-hop", Shared(), Fixed(), OneHop(), 1.5),
     )
 }

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from study.settings import setting
 from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Made, Make, Place, Way
+
+if TYPE_CHECKING:
+    from study.transitions.blending import Transition
+
+
+def finished(made: Transition, place: Place, clean_feet: bool) -> Made:
+    """A transition as it is shown, with its feet planted or not."""
+    from study.transitions.footskate import plant_feet
+
+    if clean_feet:
+        # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
+        made, _ = plant_feet(made, place.source, place.destination)
+    return Made(made.clip, made.blend_start, made.blend_stop, made.note)
 
 
 @dataclass(frozen=True)
@@ -25,7 +38,6 @@ class Blended(Way):
     def made(self, place: Place) -> Made:
         """Cut, blend, or warp and blend; then plant the feet."""
         from study.transitions.blending import blend, cut
-        from study.transitions.footskate import plant_feet
         from study.transitions.timewarp import warped_blend
 
         clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
@@ -35,10 +47,7 @@ class Blended(Way):
             made = warped_blend(*clips, *points, *self.windows, weight=self.weight)
         else:
             made = blend(*clips, *points, self.blend_frames, weight=self.weight)
-        if self.clean_feet and self.blend_frames:
-            # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
-            made, _ = plant_feet(made, *clips)
-        return Made(made.clip, made.blend_start, made.blend_stop, made.note)
+        return finished(made, place, self.clean_feet and self.blend_frames > 0)
 
     def longer_than(self, other: Way) -> int | None:
         """The larger difference of the two windows; a cut differs from a blend in its length alone."""
@@ -50,19 +59,29 @@ class Blended(Way):
 
 
 @dataclass(frozen=True)
-class Blending(Make):
-    """What all makes that blend can be told."""
+class CleaningFeet(Make):
+    """What all makes that change the clips' own frames can be told."""
 
-    weight: Literal["linear", "sigmoid"] = setting(
-        "linear", "How the blend weight runs from 0 to 1; by default as in `[stimuli]`."
-    )
     clean_feet: bool = setting(
         True, "Whether sliding of planted feet is removed after blending; by default as in `[stimuli]`."
     )
 
     def details(self) -> str:
+        """The feet."""
+        return f"sliding of planted feet {'removed' if self.clean_feet else 'left in'}"
+
+
+@dataclass(frozen=True)
+class Blending(CleaningFeet):
+    """What all makes that blend can be told."""
+
+    weight: Literal["linear", "sigmoid"] = setting(
+        "linear", "How the blend weight runs from 0 to 1; by default as in `[stimuli]`."
+    )
+
+    def details(self) -> str:
         """The weight and the feet."""
-        return f"{self.weight} weight, sliding of planted feet {'removed' if self.clean_feet else 'left in'}"
+        return f"{self.weight} weight, {super().details()}"
 
 
 class Slerp(Blending):

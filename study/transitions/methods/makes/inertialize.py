@@ -1,0 +1,121 @@
+"""Inertialization: the destination plays at once, and what it lacks of the source's pose and velocity decays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+from annotated_types import Ge, Le
+
+from study.settings import setting
+from study.transitions.methods.makes.blends import CleaningFeet, finished
+from study.transitions.methods.method import Length, Made, Place, Room, Way
+
+BOLLO_2018 = (
+    "Bollo, D. (2018). Inertialization: High-performance animation transitions in Gears of War. Game Developers "
+    "Conference."
+)
+HOLDEN_2021 = "Holden, D. (2021). Spring-It-On: The game developer's spring-roll-call. theorangeduck.com."
+
+
+@dataclass(frozen=True)
+class Inertialized(Way):
+    """An offset that decays by a spring of a half-life in seconds, or by Bollo's polynomial where it has none.
+
+    The destination is placed as by a blend of `placed_frames`.
+    """
+
+    placed_frames: int
+    blend: int
+    halflife_s: float | None
+    clean_feet: bool
+
+    @property
+    def frames(self) -> int:
+        """Frames with an offset."""
+        return self.blend
+
+    def made(self, place: Place) -> Made:
+        """Inertialize, then plant the feet."""
+        from study.transitions.switching import inertialized, quintic, spring
+
+        seconds = (self.blend + 1) / place.source.fps
+        decay = quintic(seconds) if self.halflife_s is None else spring(self.halflife_s, seconds)
+        clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
+        made = inertialized(*clips, *points, self.blend, decay, placed_frames=self.placed_frames)
+        return finished(made, place, self.clean_feet)
+
+    def longer_than(self, other: Way) -> int | None:
+        """The difference of two decays by the polynomial, which has no other setting."""
+        if not isinstance(other, Inertialized) or self.halflife_s is not None or other.halflife_s is not None:
+            return None
+        return self.blend - other.blend if self.clean_feet == other.clean_feet else None
+
+
+class Switching(CleaningFeet):
+    """What makes that switch at once have in common: they need the frame before the switch in both clips."""
+
+    def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
+        """One frame of each clip before the switch, which says how fast it moves."""
+        room = super().room(length, fps, longest_frames)
+        return replace(room, blend=room.blend + 1, search=room.search + 1, entry=max(room.entry, 1))
+
+
+class InertializeQuintic(Switching):
+    """Decay over the blend length by a polynomial that never overshoots (Bollo 2018)."""
+
+    name = "inertialize-quintic"
+    words = "inertialized transitions {length} {points}"
+    how = (
+        "let the difference of pose and velocity decay after a switch to the destination, by a polynomial (Bollo 2018)"
+    )
+    sources = (BOLLO_2018,)
+    levels = True
+
+    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+        """A decay over that many frames."""
+        del place
+        return Inertialized(windows[1], windows[1], None, self.clean_feet)
+
+
+@dataclass(frozen=True)
+class Inertialize(Switching):
+    """Decay by a critically damped spring."""
+
+    name = "inertialize"
+    words = "inertialized transitions (critically damped spring) {points}"
+    how = (
+        "let the difference of pose and velocity decay after a switch to the destination, by a critically damped spring"
+    )
+    sources = (BOLLO_2018, HOLDEN_2021)
+
+    halflife_s: Annotated[float | None, Ge(0.01), Le(2.0)] = setting(
+        None,
+        "Make `inertialize`: half-life of the spring; by default the one that leaves as much of the source, on average "
+        "over time, as a blend of the method's length. [seconds]",
+    )
+
+    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+        """A spring of the half-life that is set, or that matches so many frames; until one hundredth is left."""
+        placed, frames, halflife_s = self._spring(windows[1], place.source.fps)
+        return Inertialized(placed, frames, halflife_s, self.clean_feet)
+
+    def _spring(self, blend_frames: int, fps: float) -> tuple[int, int, float]:
+        """Frames of the blend that it matches, frames until one hundredth is left, and its half-life."""
+        from study.transitions.switching import matched_blend_s, matching_halflife_s, spring_s
+
+        halflife_s = self.halflife_s or matching_halflife_s((blend_frames + 1) / fps)
+        placed = max(1, round(matched_blend_s(halflife_s) * fps) - 1)
+        return placed, max(placed, round(spring_s(halflife_s) * fps)), halflife_s
+
+    def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
+        """The blend that it matches, and after it the frames that a spring lasts longer."""
+        room = super().room(length, fps, longest_frames)
+        placed, frames, _ = self._spring(room.search, fps)
+        blend = max(room.blend, placed + 1) if self.halflife_s else room.blend
+        return replace(room, blend=blend, search=max(blend, room.search), after=room.after + frames - placed)
+
+    def details(self) -> str:
+        """The half-life, and the feet."""
+        spring = f"half-life {self.halflife_s:g} s" if self.halflife_s else "half-life matched to the blend length"
+        return f"{spring}, {super().details()}"
