@@ -15,7 +15,8 @@ from study.apps.cli.films import film_options, film_size
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
 from study.transitions.methods.makes.blends import Slerp
-from study.transitions.methods.registry import METHODS
+from study.transitions.methods.makes.inertialize import Switching
+from study.transitions.methods.registry import MAKES, METHODS
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 LENGTHS = {name: one.length for name, one in METHODS.items() if one.length.windows and isinstance(one.make, Slerp)}
 """Methods whose blend lies between two given frames, and the length of each."""
+
+SWITCHES = {name: make for name, make in MAKES.items() if issubclass(make, Switching)}
+"""Makes that switch to the destination at the start frame."""
 
 
 def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -93,6 +97,7 @@ def blend_length(
 
     SRC and DST are motion files, or names of motions in --library.
     """
+    from study.apps.cli.lengths import show_lengths, show_warped
     from study.transitions.blend_length import blend_length as choose
     from study.transitions.blend_length import major_joint_differences
     from study.transitions.timewarp import warp_length
@@ -147,6 +152,10 @@ def _check_two_windows(method: str, specification: str) -> None:
 @clip_options
 @click.option("--method", type=click.Choice(list(LENGTHS)), help="Choose the blend length by this method.")
 @click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
+@click.option("--make", type=click.Choice([Slerp.name, *SWITCHES]), default=Slerp.name, show_default=True,
+              help="How the frames are made: a blend, or a switch as game engines make it.")  # fmt: skip
+@click.option("--halflife", type=click.FloatRange(0.01, 2.0),
+              help="With --make inertialize: seconds; by default it matches the blend length.")  # fmt: skip
 @click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
 @specification_option
 @click.option(
@@ -172,6 +181,8 @@ def transition(
     fps: float,
     method: str | None,
     frames: int | None,
+    make: str,
+    halflife: float | None,
     weight: str,
     specification: str,
     joints: tuple[str, ...],
@@ -198,14 +209,21 @@ def transition(
         raise click.UsageError("expected either --method or --frames; give one of them.")
     wanted = film_size(size)
     first, second = clip_pair(source, destination, library, fps)
-    joined, found = join(first, second, (start, end), method, frames, weight, specification, joint_frames(joints))
+    switch = switch_of(make, halflife, method, specification, joints)
+    joined, found = join(
+        first, second, (start, end), method, frames, weight, specification, joint_frames(joints), switch=switch
+    )
     points = {**moment(first, start, "start"), **moment(second, end, "end")}
     where = f"from {in_words(first, start, source)} to {in_words(second, end, destination)}"
     slide = {}
     told = click.get_current_context().get_parameter_source("fps") is not ParameterSource.DEFAULT
     if out.suffix.lower() == ".bvh" and not told and first.file_fps:
         first, second = clip_pair(source, destination, library, first.file_fps, tell=False)
-        joined = remade(joined, first, second, weight=weight, joint_frames=joint_frames(joints))
+        if switch is None:
+            joined = remade(joined, first, second, weight=weight, joint_frames=joint_frames(joints))
+        else:
+            count = frames if found is None else found.blend_frames
+            joined = switched(switch, first, second, (start, end), count or 1, fps)
     if not keep_slide:
         joined, planted = plant_feet(joined, first, second)
         slide = {"slide_before_m": planted.slide_before_m, "slide_after_m": planted.slide_after_m}
@@ -226,6 +244,7 @@ def transition(
         "fps": rate,
         **points,
         "method": method,
+        "make": make,
         "cost": None if found is None else found.cost,
         "unclipped_s": getattr(found, "unclipped_s", None),
         "note": "; ".join(filter(None, (joined.note, "" if found is None else found.note))),
@@ -248,10 +267,12 @@ def join(
     weight: str,
     specification: str = "start-end",
     shorter: dict[str, int] | None = None,
+    *,
+    switch: Switching | None = None,
 ) -> tuple[Transition, BlendLength | WarpLength | None]:
     """The transition of a given or a method's length, and the method's result.
 
-    `shorter` has blends of joints' own, by role.
+    `shorter` has blends of joints' own, by role; `switch` takes the place of the blend.
     """
     from study.transitions.blend_length import blend_length as choose
     from study.transitions.blending import blend
@@ -267,8 +288,38 @@ def join(
     if frames is None:
         chosen = choose(source, destination, *points, method=method or "geodesic", specification=specification)
         frames = chosen.blend_frames
+    if switch is not None:
+        return switched(switch, source, destination, points, frames, source.fps), chosen
     made = blend(source, destination, *points, frames, weight=weight, specification=specification, joint_frames=shorter)
     return made, chosen
+
+
+def switch_of(
+    make: str, halflife: float | None, method: str | None, specification: str, joints: Sequence[str]
+) -> Switching | None:
+    """The make that switches, if `--make` names one; with options that it does not know, a usage error."""
+    if halflife is not None and make != "inertialize":
+        raise click.UsageError(f"expected no --halflife with --make {make}; it belongs to --make inertialize.")
+    if make not in SWITCHES:
+        return None
+    if joints or specification != "start-end":
+        raise click.UsageError(f"expected neither --joint nor --specification with --make {make}, which is no blend.")
+    if method is not None and LENGTHS[method].windows == 2:
+        raise click.UsageError(f"expected another --method than {method} with --make {make}: it has one length.")
+    return SWITCHES[make]().with_settings({} if halflife is None else {"halflife_s": halflife})
+
+
+def switched(
+    switch: Switching, source: Clip, destination: Clip, points: tuple[int, int], frames: int, fps: float
+) -> Transition:
+    """The transition in place of a blend of so many frames; points and frames count at `fps`, the clips at theirs."""
+    ratio = source.fps / fps
+    counted_at, made_at = (switch.switch(count, rate) for count, rate in (
+        (frames, fps), (max(1, round((frames + 1) * ratio) - 1), source.fps)
+    ))  # fmt: skip
+    start = round((points[0] - 1) * ratio) + 1
+    end = round((points[1] - counted_at.placed_frames) * ratio) + made_at.placed_frames
+    return made_at.joined(source, destination, start, end)
 
 
 def joint_frames(given: Sequence[str]) -> dict[str, int]:
@@ -284,93 +335,3 @@ def joint_frames(given: Sequence[str]) -> dict[str, int]:
             )
         found[role] = int(frames)
     return found
-
-
-def show_lengths(
-    source: Clip,
-    destination: Clip,
-    points: tuple[int, int],
-    chosen: BlendLength,
-    out: Path,
-    options: tuple[str, str],
-    words: str,
-) -> None:
-    """The geodesic cost of each length, of all joints and of each (2004 Figures 2, 3, 5), as a picture or as CSV."""
-    import numpy as np
-
-    from study.transitions.blend_length import blend_length as choose
-    from study.transitions.blend_length import joint_costs
-    from study.transitions.distances import frame_distance
-    from study.transitions.weights import MAJOR_ROLES, joint_weights
-    from study.transitions.windows import window
-
-    weights, specification = options
-    longest = None if chosen.blend_frames <= 2 * source.fps else chosen.blend_frames
-    curve = choose(
-        source,
-        destination,
-        *points,
-        longest=longest,
-        weights=weights,
-        specification=specification,
-    )
-    if curve.lengths is None or curve.costs is None:
-        raise AssertionError("the geodesic method gives the cost of every length")
-    joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
-    by_joint = joint_costs(source, destination, *points, int(curve.lengths[-1]), joints, specification)
-    named = {role: row[curve.lengths - 1] for role, row in zip(MAJOR_ROLES, by_joint, strict=True)}
-    if out.suffix.lower() == ".csv":
-        columns = {"blend_frames": curve.lengths, "blend_s": curve.lengths / source.fps, "cost": curve.costs, **named}
-        _write_csv(out, columns)
-        return
-    from study.report.costs import curve_picture
-
-    span = window(*points, chosen.blend_frames, specification)
-    differences = frame_distance(
-        source.rotations[span.source_start : span.source_stop],
-        destination.rotations[span.destination_start : span.destination_stop],
-        joint_weights(source.skeleton, weights),
-    )
-    curve_picture(
-        curve.lengths,
-        curve.costs,
-        out,
-        chosen=chosen.blend_frames,
-        fps=source.fps,
-        joints=named,
-        frames=(differences, span.source_start),
-        words=words,
-    )
-
-
-def show_warped(found: WarpLength, fps: float, out: Path, words: str) -> None:
-    """The cost of each pair of lengths (2004 Eqs. 5, 6), as a picture or as CSV."""
-    import numpy as np
-
-    lengths = np.arange(found.shortest, found.shortest + len(found.costs))
-    if out.suffix.lower() == ".csv":
-        source, destination = np.meshgrid(lengths, lengths, indexing="ij")
-        frames = {"source_frames": source, "destination_frames": destination}
-        seconds = {"source_s": source / fps, "destination_s": destination / fps}
-        columns = {**frames, **seconds, "cost": found.costs}
-        _write_csv(out, {name: column[np.isfinite(found.costs)] for name, column in columns.items()})
-        return
-    from study.report.costs import cost_picture
-
-    cost_picture(
-        found.costs,
-        out,
-        least=(found.source_frames, found.destination_frames),
-        span=(len(lengths), len(lengths)),
-        names=("source frames in the blend", "destination frames in the blend"),
-        label=f"cost; {words}",
-        first=found.shortest,
-    )
-
-
-def _write_csv(out: Path, columns: dict[str, Any]) -> None:
-    import pandas as pd
-
-    from study.files import write_whole
-
-    write_whole(out, pd.DataFrame(columns).to_csv(index=False))

@@ -3,43 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Gt, Le
 
-from study.settings import setting
-from study.transitions.methods.makes.blends import finished
-from study.transitions.methods.makes.inertialize import Switching
-from study.transitions.methods.method import Made, Place, Way
+from study.settings import SettingsError, setting
+from study.transitions.methods.makes.inertialize import Switch, Switching
+from study.transitions.methods.method import Way
+
+if TYPE_CHECKING:
+    from study.motion.clip import Clip
+    from study.transitions.blending import Transition
 
 HOLDEN_2023 = "Holden, D. (2023). Dead blending. theorangeduck.com."
 
 
 @dataclass(frozen=True)
-class DeadBlended(Way):
-    """A cross-fade of so many frames; the half-lives of the source's velocity lie within bounds, in seconds."""
+class DeadBlended(Switch):
+    """A cross-fade; the half-lives of the source's velocity lie within bounds, in seconds."""
 
-    blend: int
     shortest_s: float
     longest_s: float
-    clean_feet: bool
 
-    @property
-    def frames(self) -> int:
-        """Frames of the cross-fade."""
-        return self.blend
-
-    def made(self, place: Place) -> Made:
-        """Blend, then plant the feet."""
+    def joined(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Transition:
+        """The transition, its feet as they come."""
         from study.transitions.switching import Extrapolation, dead_blended
 
-        clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
-        way = Extrapolation(shortest_s=self.shortest_s, longest_s=self.longest_s)
-        return finished(dead_blended(*clips, *points, self.blend, way), place, self.clean_feet)
+        bounds = Extrapolation(shortest_s=self.shortest_s, longest_s=self.longest_s)
+        return dead_blended(source, destination, start_frame, end_frame, self.blend, bounds)
 
     def longer_than(self, other: Way) -> int | None:
         """The difference of two cross-fades that are else alike."""
-        if not isinstance(other, DeadBlended) or replace(other, blend=self.blend) != self:
+        if not isinstance(other, DeadBlended):
+            return None
+        if replace(other, blend=self.blend, placed_frames=self.placed_frames) != self:
             return None
         return self.blend - other.blend
 
@@ -61,11 +58,19 @@ class DeadBlend(Switching):
         1.0, "Make `dead-blend`: longest half-life of the source's velocity. [seconds]"
     )
 
-    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+    def __post_init__(self) -> None:
+        if self.shortest_halflife_s > self.longest_halflife_s:
+            raise SettingsError(
+                "shortest_halflife_s",
+                f"expected at most longest_halflife_s = {self.longest_halflife_s:g}, found "
+                f"{self.shortest_halflife_s:g}; change one of them",
+            )
+
+    def switch(self, blend_frames: int, fps: float) -> Switch:
         """A cross-fade over that many frames."""
-        del place
-        bounds = sorted((self.shortest_halflife_s, self.longest_halflife_s))
-        return DeadBlended(windows[1], bounds[0], bounds[1], self.clean_feet)
+        del fps
+        bounds = self.shortest_halflife_s, self.longest_halflife_s
+        return DeadBlended(blend_frames, blend_frames, self.clean_feet, *bounds)
 
     def details(self) -> str:
         """The half-lives, and the feet."""

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge, Le
 
 from study.settings import setting
 from study.transitions.methods.makes.blends import CleaningFeet, finished
 from study.transitions.methods.method import Length, Made, Place, Room, Way
+
+if TYPE_CHECKING:
+    from study.motion.clip import Clip
+    from study.transitions.blending import Transition
 
 BOLLO_2018 = (
     "Bollo, D. (2018). Inertialization: High-performance animation transitions in Gears of War. Game Developers "
@@ -19,31 +24,45 @@ HOLDEN_2021 = "Holden, D. (2021). Spring-It-On: The game developer's spring-roll
 
 
 @dataclass(frozen=True)
-class Inertialized(Way):
-    """An offset that decays by a spring of a half-life in seconds, or by Bollo's polynomial where it has none.
+class Switch(Way):
+    """A switch after which `blend` frames hold what is left of the source.
 
     The destination is placed as by a blend of `placed_frames`.
     """
 
-    placed_frames: int
     blend: int
-    halflife_s: float | None
+    placed_frames: int
     clean_feet: bool
 
     @property
     def frames(self) -> int:
-        """Frames with an offset."""
+        """Frames that hold something of the source."""
         return self.blend
 
+    @abstractmethod
+    def joined(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Transition:
+        """The transition, its feet as they come."""
+
     def made(self, place: Place) -> Made:
-        """Inertialize, then plant the feet."""
+        """Join the motions, then plant the feet."""
+        joined = self.joined(place.source, place.destination, place.start_frame, place.end_frame)
+        return finished(joined, place, self.clean_feet)
+
+
+@dataclass(frozen=True)
+class Inertialized(Switch):
+    """An offset that decays by a spring of a half-life in seconds, or by Bollo's polynomial if it has none."""
+
+    halflife_s: float | None = None
+
+    def joined(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Transition:
+        """The transition, its feet as they come."""
         from study.transitions.switching import inertialized, quintic, spring
 
-        seconds = (self.blend + 1) / place.source.fps
+        seconds = (self.blend + 1) / source.fps
         decay = quintic(seconds) if self.halflife_s is None else spring(self.halflife_s, seconds)
-        clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
-        made = inertialized(*clips, *points, self.blend, decay, placed_frames=self.placed_frames)
-        return finished(made, place, self.clean_feet)
+        placed = self.placed_frames
+        return inertialized(source, destination, start_frame, end_frame, self.blend, decay, placed_frames=placed)
 
     def longer_than(self, other: Way) -> int | None:
         """The difference of two decays by the polynomial, which has no other setting."""
@@ -54,6 +73,14 @@ class Inertialized(Way):
 
 class Switching(CleaningFeet):
     """What makes that switch at once have in common: they need the frame before the switch in both clips."""
+
+    @abstractmethod
+    def switch(self, blend_frames: int, fps: float) -> Switch:
+        """How a transition is made in place of a blend of so many frames."""
+
+    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+        """In place of a blend of that many frames."""
+        return self.switch(windows[1], place.source.fps)
 
     def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
         """One frame of each clip before the switch, which says how fast it moves."""
@@ -72,10 +99,10 @@ class InertializeQuintic(Switching):
     sources = (BOLLO_2018,)
     levels = True
 
-    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+    def switch(self, blend_frames: int, fps: float) -> Switch:
         """A decay over that many frames."""
-        del place
-        return Inertialized(windows[1], windows[1], None, self.clean_feet)
+        del fps
+        return Inertialized(blend_frames, blend_frames, self.clean_feet)
 
 
 @dataclass(frozen=True)
@@ -95,25 +122,21 @@ class Inertialize(Switching):
         "over time, as a blend of the method's length. [seconds]",
     )
 
-    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+    def switch(self, blend_frames: int, fps: float) -> Switch:
         """A spring of the half-life that is set, or that matches so many frames; until one hundredth is left."""
-        placed, frames, halflife_s = self._spring(windows[1], place.source.fps)
-        return Inertialized(placed, frames, halflife_s, self.clean_feet)
-
-    def _spring(self, blend_frames: int, fps: float) -> tuple[int, int, float]:
-        """Frames of the blend that it matches, frames until one hundredth is left, and its half-life."""
         from study.transitions.switching import matched_blend_s, matching_halflife_s, spring_s
 
         halflife_s = self.halflife_s or matching_halflife_s((blend_frames + 1) / fps)
         placed = max(1, round(matched_blend_s(halflife_s) * fps) - 1)
-        return placed, max(placed, round(spring_s(halflife_s) * fps)), halflife_s
+        return Inertialized(max(placed, round(spring_s(halflife_s) * fps)), placed, self.clean_feet, halflife_s)
 
     def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
         """The blend that it matches, and after it the frames that a spring lasts longer."""
         room = super().room(length, fps, longest_frames)
-        placed, frames, _ = self._spring(room.search, fps)
-        blend = max(room.blend, placed + 1) if self.halflife_s else room.blend
-        return replace(room, blend=blend, search=max(blend, room.search), after=room.after + frames - placed)
+        way = self.switch(room.search, fps)
+        blend = max(room.blend, way.placed_frames + 1) if self.halflife_s else room.blend
+        after = room.after + way.frames - way.placed_frames
+        return replace(room, blend=blend, search=max(blend, room.search), after=after)
 
     def details(self) -> str:
         """The half-life, and the feet."""
