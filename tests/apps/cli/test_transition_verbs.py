@@ -208,3 +208,45 @@ def test_a_joint_can_blend_for_a_time_of_its_own(capsys: pytest.CaptureFixture[s
             == 2
         )
         assert "ROLE=FRAMES" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("make", "blended"), [("inertialize", 20), ("inertialize-quintic", 11), ("dead-blend", 11)])
+def test_a_switch_takes_the_place_of_a_blend(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, make: str, blended: int
+) -> None:
+    points = ("transition", "walk", "jog", "--start", 60, "--end", 120, "--method", "geodesic")
+    answer = ask(capsys, *points, "--make", make, "--out", tmp_path / "made.bvh")
+    assert (answer["make"], answer["blend_start"], answer["blend_frames"]) == (make, 60, blended)
+    assert "switched after source frame 59 to destination frame 110" in str(answer["note"])
+    assert ask(capsys, "motions", "inspect", tmp_path / "made.bvh")["frames"] == answer["frames"]
+
+
+def test_a_switch_is_written_at_the_rate_of_its_file_with_the_same_moments(
+    capsys: pytest.CaptureFixture[str], mocap: Path, tmp_path: Path
+) -> None:
+    verb = ("transition", "walk", "walk_fast", "--library", mocap / "cmu", "--start", 60, "--end", 40, "--frames", 12)
+    switch = (*verb, "--make", "inertialize", "--halflife", 0.08)
+    coarse = ask(capsys, *switch, "--fps", 30, "--out", tmp_path / "coarse.bvh")
+    fine = ask(capsys, *switch, "--out", tmp_path / "fine.bvh")
+    assert fine["fps"] == 120
+    for answer in (coarse, fine):
+        answer["switch_s"] = (answer["blend_start"] - 1) / answer["fps"]  # type: ignore[operator]
+        answer["rest_s"] = (answer["frames"] - answer["blend_start"]) / answer["fps"]  # type: ignore[operator]
+    assert fine["switch_s"] == pytest.approx(coarse["switch_s"], abs=0.004)
+    assert fine["rest_s"] == pytest.approx(coarse["rest_s"], abs=0.04)
+    assert fine["blend_s"] == pytest.approx(0.0798 * 4.789, abs=0.005)
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (("--make", "dead-blend", "--halflife", "0.1"), "expected no --halflife with --make dead-blend"),
+    (("--halflife", "0.1"), "expected no --halflife with --make slerp"),
+    (("--make", "inertialize", "--joint", "hip.L=3"), "expected neither --joint nor --specification"),
+    (("--make", "inertialize", "--specification", "centre"), "expected neither --joint nor --specification"),
+])  # fmt: skip
+def test_options_that_a_switch_does_not_know_are_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, options: tuple[str, ...], said: str
+) -> None:
+    verb = ["transition", "walk", "jog", "--start", "60", "--end", "120", "--frames", "9", *options]
+    assert run([*verb, "--out", str(tmp_path / "x.bvh")]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
