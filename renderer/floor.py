@@ -22,6 +22,9 @@ _FLOOR_SHADE = 0.90
 """Luma of the floor before the camera, as a share of the background's."""
 _GRID_SHADE = 0.90
 _GRID_HALF_WIDTH_M = 0.009
+_EDGES = (0.5, 0.65, 0.12)
+"""Within so much of the picture's height from its sides, its top and its bottom the floor fades into the background, so
+that a picture on a larger screen has no edge."""
 _SHADOW_SHADE = 0.30
 _CONTACT_OPACITY, _CONTACT_HEIGHT_M = 0.34, 0.16
 _BODY_OPACITY, _BODY_RADIUS_M = 0.20, 0.42
@@ -43,7 +46,8 @@ class Floor:
         down = np.where(falls, way[1], -1.0)
         far = np.where(falls, (floor - camera.eye[1]) / down, 0.0)
         reach = far * np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-        self._seen = np.where(falls, np.exp(-np.log(2.0) * (reach / _half_faded(figure, camera)) ** 2), 0.0)
+        far_off = np.exp(-np.log(2.0) * (reach / _half_faded(figure, camera)) ** 2)
+        self._seen = np.where(falls, far_off, 0.0) * _within(camera.size)
         self._lines = []
         for axis in (0, 2):
             # How far on the floor one pixel aside and one pixel up lead.
@@ -100,6 +104,7 @@ def uniforms(figure: Figure, camera: Camera) -> dict[str, float | tuple[float, .
         "focal": camera.focal_pixels,
         "floor_m": _height(figure),
         "half_faded": _half_faded(figure, camera),
+        "edges": tuple(share * camera.size[1] for share in _EDGES),
         "ground": tuple(value / 255.0 for value in to_ycbcr(figure.background)),
         "half_width": _GRID_HALF_WIDTH_M,
         "shades": (_FLOOR_SHADE, _GRID_SHADE),
@@ -114,6 +119,22 @@ def _half_faded(figure: Figure, camera: Camera) -> float:
     """The distance at which the floor is half way faded: twice that to where the camera looks."""
     above = abs(float(camera.eye[1] - _height(figure)))
     return 2.0 * float(np.hypot(*camera.eye[[0, 2]])) + 2.0 * above + 1.0
+
+
+def _within(size: tuple[int, int]) -> FloatArray:
+    """How much of the floor is left towards the edges of the picture, `(height, width)`: nothing at the edges."""
+    side, top, bottom = (share * size[1] for share in _EDGES)
+    across, down = (np.arange(pixels, dtype=np.float64) + 0.5 for pixels in size)
+    sides = _ramp(np.minimum(across, size[0] - across) / side)
+    upright = _ramp(down / top) * _ramp((size[1] - down) / bottom)
+    within: FloatArray = upright[:, None] * sides[None, :]
+    return within
+
+
+def _ramp(share: FloatArray) -> FloatArray:
+    """From 0 to 1 without a corner."""
+    within: FloatArray = np.clip(share, 0.0, 1.0)
+    return within * within * (3.0 - 2.0 * within)
 
 
 def _rays(camera: Camera, axes: FloatArray) -> list[FloatArray]:

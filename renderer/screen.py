@@ -42,8 +42,10 @@ class Picture:
 class Drawing:
     """A motion laid out for a window, to be drawn frame by frame; made by `Screen.drawing`."""
 
-    def __init__(self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, fill: bool) -> None:
-        self.positions, self.figure, self.fps, self._made_for, self._fill = positions, figure, fps, camera, fill
+    def __init__(
+        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, height: float
+    ) -> None:
+        self.positions, self.figure, self.fps, self._made_for, self._height = positions, figure, fps, camera, height
         self.frames = len(positions)
         self.path = camera_path(positions, camera, fps)
         self.size: Size | None = None
@@ -55,7 +57,7 @@ class Drawing:
         """Lay the motion out for a window of that size; False where that was done before."""
         if self.size == size:
             return False
-        self.camera = fitted_camera(self._made_for, size, self._fill)
+        self.camera = fitted_camera(self._made_for, size, self._height)
         width, height = self.camera.size
         self.place = ((size[0] - width) // 2, (size[1] - height) // 2, width, height)
         self.shapes = lay_out(self.positions, self.figure, self.camera, self.fps)
@@ -64,14 +66,12 @@ class Drawing:
         return True
 
 
-def fitted_camera(camera: Camera, size: Size, fill: bool) -> Camera:
-    """The camera with its picture as large as a window allows, or no larger than it was made (`fill` False)."""
-    width, height = camera.size
-    scale = min(size[0] / width, size[1] / height)
-    if not fill:
-        scale = min(scale, 1.0)
-    wide, high = (max(16, int(edge * scale) // 2 * 2) for edge in (width, height))
-    return replace(camera, size=(wide, high), focal_pixels=camera.focal_pixels * min(wide / width, high / height))
+def fitted_camera(camera: Camera, size: Size, height: float) -> Camera:
+    """The camera with its picture `height` pixels high, or as high as the window allows where that is less."""
+    made = camera.size
+    scale = min(size[0] / made[0], size[1] / made[1], height / made[1])
+    wide, high = (max(16, int(edge * scale + 1e-6) // 2 * 2) for edge in made)
+    return replace(camera, size=(wide, high), focal_pixels=camera.focal_pixels * min(wide / made[0], high / made[1]))
 
 
 class Screen:
@@ -97,10 +97,10 @@ class Screen:
         return Picture(_sharp(texture))
 
     def drawing(
-        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, size: Size, fill: bool
+        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, size: Size, height: float
     ) -> Drawing:
         """Lay out a motion for a window of that size, floor included."""
-        made = Drawing(check_positions(positions), figure, camera, fps, fill)
+        made = Drawing(check_positions(positions), figure, camera, fps, height)
         made.fit(size)
         if figure.floor_m is not None:
             self._floor_picture(made, 0)

@@ -17,6 +17,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 from typing import Any, Self
 
 import numpy as np
@@ -174,13 +175,13 @@ class Window:
         return self._screen.picture(rgb)
 
     def drawing(
-        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, *, fill: bool = True
+        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, *, height: float = inf
     ) -> Drawing:
         """Lay out a motion `(frames, points, 3)` for this window, which takes a while; before the trial, that is.
 
-        `fill` makes the picture as large as the window allows; else it has the size that the camera was made for.
+        `height` is that of the picture in pixels; it is no larger than the window allows.
         """
-        return self._screen.drawing(positions, figure, camera, fps, self.size, fill)
+        return self._screen.drawing(positions, figure, camera, fps, self.size, height)
 
     def clear(self, colour: RGB) -> None:
         """Make the whole window one colour."""

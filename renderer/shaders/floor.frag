@@ -7,6 +7,7 @@ uniform vec2 middle;      // of the frame, pixels
 uniform float focal;      // pixels
 uniform float floor_m;    // its height
 uniform float half_faded; // metres from the eye
+uniform vec3 edges;       // how far from sides, top and bottom of the frame it fades, pixels
 uniform vec2 shift;       // how far the camera has come, metres
 uniform vec3 ground;      // luma and chromas of the background, 0..1 of the 8-bit range
 uniform float half_width; // of a line, metres
@@ -27,7 +28,11 @@ void main() {
     float down = falls ? way.y : -1.0;
     float far = falls ? (floor_m - eye.y) / down : 0.0;
     float reach = far * length(way) / half_faded;
-    float seen = falls ? exp2(-reach * reach) : 0.0;
+    vec2 size = 2.0 * middle;
+    float side = min(gl_FragCoord.x, size.x - gl_FragCoord.x);
+    vec3 within = clamp(vec3(side, gl_FragCoord.y, size.y - gl_FragCoord.y) / edges, 0.0, 1.0);
+    within *= within * (3.0 - 2.0 * within);
+    float seen = falls ? exp2(-reach * reach) * within.x * within.y * within.z : 0.0;
     vec2 place = eye.xz + far * way.xz + shift;
     vec2 footprint = abs(far * (right.xz - way.xz * right.y / down)) + abs(far * (above.xz - way.xz * above.y / down));
     footprint = max(footprint / focal, 1e-6);

@@ -38,6 +38,7 @@ class Shown:
 
     def __init__(self, rgb: NDArray[np.uint8] | None, frames: int = 0) -> None:
         self.rgb, self.frames, self.released = rgb, frames, False
+        self.place = (0, 0, 0, 0)
 
     def release(self) -> None:
         """Nothing to free; remembered, to find what is shown after it was freed."""
@@ -123,10 +124,13 @@ class ScriptedWindow:
         """Keeps the picture."""
         return Shown(rgb)
 
-    def drawing(self, positions: Any, figure: Any, camera: Any, fps: float, *, fill: bool = True) -> Shown:
-        """Keeps how many frames there are."""
-        del figure, camera, fps, fill
-        return Shown(None, len(positions))
+    def drawing(self, positions: Any, figure: Any, camera: Any, fps: float, *, height: float) -> Shown:
+        """Keeps how many frames there are, and how large they are."""
+        del figure, fps
+        shown = Shown(None, len(positions))
+        wide, high = camera.size
+        shown.place = (0, 0, round(height * wide / high), round(height))
+        return shown
 
     def clear(self, colour: tuple[int, int, int]) -> None:
         """The next flip shows nothing."""

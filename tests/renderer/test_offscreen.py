@@ -330,3 +330,17 @@ def test_bad_positions_are_refused_before_anything_is_drawn() -> None:
         next(render_frames(points((0, 0, 0), (np.nan, 0, 0)), figure, CAMERA))
     with pytest.raises(RendererError, match="at least one frame"):
         next(render_frames(np.zeros((0, 2, 3)), figure, CAMERA))
+
+
+@pytest.mark.parametrize("size", [(320, 180), (160, 160)])
+def test_a_floor_has_no_edge_on_a_larger_page(size: tuple[int, int]) -> None:
+    """Its outermost pixels are the background's, so that the picture ends nowhere; it is darker below the figure."""
+    figure = replace(capsules([(0.1, 0.1)], [BLACK]), floor_m=-0.6)
+    camera = Camera(np.array([0.0, 1.5, 9.0]), view_axes(0.0, 0.16), 3.0 * size[1], size)
+    luma = next(render_frames(points((0, 0.2, 0), (0, 0.5, 0)), figure, camera))[: size[1]].astype(int)
+    ground = round(to_ycbcr(figure.background)[0])
+    edges = (luma[0], luma[-1], luma[:, 0], luma[:, -1])
+    assert max(np.abs(edge - ground).max() for edge in edges) <= 1
+    assert ground - np.median(luma[int(0.8 * size[1]), size[0] // 2 - 20 : size[0] // 2 + 20]) > 10
+    steps = np.abs(np.diff(luma[int(0.8 * size[1])], axis=0))
+    assert steps[: size[0] // 4].max() <= 8

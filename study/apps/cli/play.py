@@ -17,7 +17,7 @@ from study.counting import counted
 
 if TYPE_CHECKING:
     from renderer.window import Window
-    from study.apps.player.loop import Outcome
+    from study.apps.player.loop import Outcome, Setting
     from study.apps.player.pages import Look
     from study.apps.player.store import Store
     from study.experiment.plan import Plan
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from study.experiment.session import Session
     from study.experiment.stimuli.stimulus import StimulusSet
     from study.experiment.store.responses import Responses
+
+
+CENTIMETRES = click.FloatRange(1, 1000)
 
 
 @click.command()
@@ -38,7 +41,9 @@ if TYPE_CHECKING:
 @click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Monitor to use.")
 @click.option("--windowed", is_flag=True, help="Use a window instead of the full screen.")
 @click.option("--size", default="1280x800", show_default=True, metavar="WIDTHxHEIGHT", help="Of the window.")
-@click.option("--actual-size", is_flag=True, help="Show stimuli in the protocol's pixels instead of as large as fits.")
+@click.option("--actual-size", is_flag=True, help="Show stimuli in their own pixels instead of as `[screen]` states.")
+@click.option("--screen-cm", type=CENTIMETRES, help="Width of the screen in cm, measured (default: as it reports).")
+@click.option("--distance-cm", type=CENTIMETRES, help="Viewing distance in cm (default: the protocol's).")
 @click.option("--font", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Font for other scripts.")
 @json_option
 def play(
@@ -53,6 +58,8 @@ def play(
     windowed: bool,
     size: str,
     actual_size: bool,
+    screen_cm: float | None,
+    distance_cm: float | None,
     font: Path | None,
     as_json: bool,
 ) -> None:
@@ -61,6 +68,7 @@ def play(
     If it was stopped or killed, the same command resumes it. Escape asks whether to stop.
     """
     from renderer.window import check_display
+    from study.apps.player.loop import Setting
     from study.experiment.stimuli.manifest import record
     from study.experiment.store.responses import open_responses
 
@@ -73,7 +81,8 @@ def play(
     record(stimuli, folder)
     with open_responses(database or folder) as responses:
         plan = the_plan(responses, loaded, stimuli, participant, seed, group)
-        place = Place(pixels if windowed else None, monitor, not actual_size, font)
+        setting = Setting(actual_size, screen_cm, distance_cm)
+        place = Place(pixels if windowed else None, monitor, setting, font)
         outcome, window = _sit(responses, loaded, stimuli, plan, place)
     where = {"folder": str(folder), "database": responses.place}
     result = {**asdict(outcome), "participant": participant, **where, "window": window}
@@ -110,11 +119,11 @@ def the_plan(
 
 @dataclass(frozen=True)
 class Place:
-    """Where a session is shown: the size of a window, or None for the full screen of a monitor; how pictures fit it."""
+    """Where a session is shown: a window's size, or None for the full screen of a monitor; how large pictures are."""
 
     window_size: tuple[int, int] | None
     monitor: int
-    fill: bool
+    setting: Setting
     font: Path | None
 
 
@@ -145,7 +154,7 @@ def _sit(
     ) as window:
         _tell_of_timing(window)
         window.when_lost(lambda: _leave_a_lost_display(store))
-        return play(window, session, stimuli.stimulus, store, look, fill=place.fill, say=say), window.describe()
+        return play(window, session, stimuli.stimulus, store, look, setting=place.setting, say=say), window.describe()
 
 
 def _leave_a_lost_display(store: Store) -> None:

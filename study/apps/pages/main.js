@@ -7,9 +7,11 @@ import { ask, heading, sleep, status, top } from "./dom.js";
 import { hasFrameCallback, refreshRate } from "./playing.js";
 import * as screens from "./screens.js";
 import { Refused, begin, hasKept, keepAlive, send, sendKept, study as getStudy } from "./server.js";
+import { measure } from "./sizes.js";
 import { trial } from "./trial.js";
 
 const WITH_PROGRESS = ["trial", "feedback"];
+const WITH_FILMS = ["trial", "instructions"];
 const LAST = ["done", "declined", "full", "taken", "elsewhere"];
 
 async function display() {
@@ -74,6 +76,7 @@ async function run(study) {
   while (!LAST.includes(view.kind)) {
     top(view.label ?? "", WITH_PROGRESS.includes(view.kind) ? screens.progress(view, study) : "");
     try {
+      if (WITH_FILMS.includes(view.kind)) await measure(study);
       view = await act(view, study, state);
     } catch (error) {
       if (!(error instanceof Refused)) throw error;

@@ -3,7 +3,8 @@
 import { ask, element, heading, paragraph, show, status, top } from "./dom.js";
 import { load, release } from "./film.js";
 import { play } from "./playing.js";
-import { matchBackground, stage } from "./trial.js";
+import { stage } from "./sizes.js";
+import { matchBackground } from "./trial.js";
 
 function texts(view, study) {
   // As in most plain text: an empty line parts paragraphs, a single line break is only where a line was full.

@@ -6,19 +6,9 @@ import { ask, element, heading, secondClick, show, sleep, status } from "./dom.j
 import { FilmFault, forget, load, loadAhead, release } from "./film.js";
 import { play } from "./playing.js";
 import { tell } from "./server.js";
+import { stage } from "./sizes.js";
 
 const MOST_RESTARTS = 3;
-
-export function stage(study) {
-  const [width, height] = study.size;
-  const room = [Math.min(window.innerWidth - 16, width * 1.5), Math.max(160, window.innerHeight - 150)];
-  // Never larger than the film is, except for very small ones: what is seen is what was rendered.
-  const scale = Math.min(1, room[0] / width, room[1] / height);
-  const made = element("div", { class: "stage", "data-focus": true, tabindex: "-1" });
-  made.style.width = `${Math.floor(width * scale)}px`;
-  made.style.height = `${Math.floor(height * scale)}px`;
-  return made;
-}
 
 const NEAR = 12; // of 255: what decoding may change of a colour
 
@@ -77,14 +67,15 @@ async function inTurn(view, videos, restarts) {
 
 async function showFilms(view, study, { restarts, pauseOver, onFault }) {
   const { place, videos } = await loadAll(view, study, onFault);
-  const scale = place.clientWidth / study.size[0]; // of the film's own size
+  // `scale` is that of the film's own pixels in pixels of the page.
+  const size = { ...place.size, scale: place.size.width_css / study.size[0] };
   matchBackground(videos[0], study);
   await pauseOver;
   await visible();
   if (restarts === MOST_RESTARTS) attend();
   filmsOn(true);
   try {
-    return { ...(await LAYOUTS[view.layout](view, videos, restarts)), scale };
+    return { ...(await LAYOUTS[view.layout](view, videos, restarts)), size };
   } finally {
     filmsOn(false);
     videos.forEach(release);
@@ -202,7 +193,7 @@ export async function trial(view, study, pauseOver, earlier) {
     response_s: value === null ? null : Math.max(0, (at - began) / 1000),
     shown_well: why === "" && (films?.shown ?? []).every((one) => one.shown_well),
     shown: withFilms ? films.shown : [],
-    timing: { last_frame_ms: began, answer_ms: at, time_origin_ms: performance.timeOrigin, faults: why, scale: films?.scale ?? null },
+    timing: { last_frame_ms: began, answer_ms: at, time_origin_ms: performance.timeOrigin, faults: why, ...(films?.size ?? {}) },
   };
   return { message, films };
 }

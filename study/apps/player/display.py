@@ -49,8 +49,8 @@ class Display(Protocol):
     def picture(self, rgb: NDArray[np.uint8]) -> Any:
         """Load a picture; it has a `release`."""
 
-    def drawing(self, positions: Any, figure: Any, camera: Any, fps: float, *, fill: bool = True) -> Any:
-        """Prepare a motion; it has `frames`."""
+    def drawing(self, positions: Any, figure: Any, camera: Any, fps: float, *, height: float) -> Any:
+        """Prepare a motion, in a picture of that height in pixels; it has `frames` and `place`."""
 
     def clear(self, colour: RGB) -> None:
         """One colour."""

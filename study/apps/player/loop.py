@@ -23,6 +23,7 @@ from study.apps.player.pages import Look
 from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, find_rate, frame_at
 from study.apps.player.store import Store
+from study.experiment.picture_size import Sight, seen_degrees, wanted_px
 from study.experiment.session import Session, advanced, answered, current, filled, missed, progress, restarted
 from study.experiment.steps import Step
 from study.experiment.stimuli.stimulus import Stimulus
@@ -42,6 +43,19 @@ class Outcome:
     faulty_trials: int
 
 
+@dataclass(frozen=True)
+class Setting:
+    """How large pictures are shown: `actual_size` in the stimuli's own pixels, else as the protocol states.
+
+    `screen_cm` is the width of the screen, by default as it says itself; `distance_cm` the viewing distance, by default
+    the protocol's.
+    """
+
+    actual_size: bool = False
+    screen_cm: float | None = None
+    distance_cm: float | None = None
+
+
 def play(
     window: Display,
     session: Session,
@@ -49,7 +63,7 @@ def play(
     store: Store,
     look: Look,
     *,
-    fill: bool = True,
+    setting: Setting | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Outcome:
     """Walk a session to its end, or until the participant leaves.
@@ -66,13 +80,13 @@ def play(
         Takes answers and events; each is committed when the call returns.
     look
         Colours and font of the pages.
-    fill
-        Show stimuli as large as the window allows, not at the protocol's size.
+    setting
+        The screen and the distance from which it is seen, as far as they are known.
     say
         Told in a few words of every answer that was stored.
     """
     with settled():
-        return _Player(window, session, stimulus, store, look, fill, say).run()
+        return _Player(window, session, stimulus, store, look, setting or Setting(), say).run()
 
 
 class _Player(Desk):
@@ -85,11 +99,11 @@ class _Player(Desk):
         stimulus: Callable[[str], Stimulus],
         store: Store,
         look: Look,
-        fill: bool,
+        setting: Setting,
         say: Callable[[str], None],
     ) -> None:
         super().__init__(window, session, store, look)
-        self._stimulus, self._fill, self._say = stimulus, fill, say
+        self._stimulus, self._setting, self._say = stimulus, setting, say
         self._drawings: dict[str, Any] = {}
         self._rate = find_rate(self.protocol.fps, window.pacing.refresh_hz)
         self._monitor = window.monitor
@@ -98,6 +112,8 @@ class _Player(Desk):
     def run(self) -> Outcome:
         """Step after step."""
         self._check_pages()
+        if not self._setting.actual_size:
+            wanted_px(self.protocol.screen, self._sight())  # refuses now what can't be shown as stated
         self._note_display()
         end = "finished"
         try:
@@ -213,10 +229,33 @@ class _Player(Desk):
     def _drawing(self, identifier: str) -> Any:
         if identifier not in self._drawings:
             one = self._stimulus(identifier)
+            high = one.camera.size[1] if self._setting.actual_size else wanted_px(self.protocol.screen, self._sight())
             self._drawings[identifier] = self.window.drawing(
-                one.positions, one.figure, one.camera, self.protocol.fps, fill=self._fill
+                one.positions, one.figure, one.camera, self.protocol.fps, height=high
             )
         return self._drawings[identifier]
+
+    def _sight(self) -> Sight:
+        """The screen that the window is on; its millimetres are what it says itself, unless somebody measured it."""
+        known, setting = self.window.describe(), self._setting
+        wide_px, high_px = known.get("display_pixels", self.window.size)
+        wide_cm = setting.screen_cm or known.get("display_mm", (0, 0))[0] / 10
+        distance_cm = setting.distance_cm or self.protocol.screen.distance_cm
+        return Sight(high_px, wide_px / wide_cm if wide_cm else None, distance_cm)
+
+    def _size_shown(self, identifier: str) -> dict[str, Any]:
+        """How large a stimulus is shown, for the record."""
+        _, _, wide, high = self._drawing(identifier).place
+        sight = self._sight()
+        degrees = seen_degrees(high, sight)
+        return {
+            "width_px": wide,
+            "height_px": high,
+            "height_degrees": None if degrees is None else round(degrees, 3),
+            "screen_height_px": sight.screen_px,
+            "px_per_cm": None if sight.px_per_cm is None else round(sight.px_per_cm, 4),
+            "distance_cm": sight.distance_cm,
+        }
 
     def _show(self, identifier: str) -> Showing | None:
         """Play a stimulus to its end; None where the participant interrupted it and stays."""
@@ -323,7 +362,11 @@ class _Player(Desk):
         method = "own clock" if self.window.pacing.own_clock else "swap"
         rows = []
         for place, showing in zip(PLACES, self.showings, strict=False):
-            detail: Mapping[str, Any] = {**showing.detail(), "faults": [*showing.faults, *self.faults]}
+            detail: Mapping[str, Any] = {
+                **showing.detail(),
+                **self._size_shown(showing.stimulus),
+                "faults": [*showing.faults, *self.faults],
+            }
             rows.append(
                 Presentation(
                     step.trial,

@@ -92,7 +92,7 @@ class Answered(Message):
 class Happened(Message):
     """Another event than a response."""
 
-    kind: Literal["focus-lost", "focus-back", "resized", "fault", "interrupted", "waited"]
+    kind: Literal["focus-lost", "focus-back", "resized", "fault", "interrupted", "waited", "screen-measured"]
     detail: Annotated[dict[Annotated[str, Field(max_length=40)], float | Text | None], Field(max_length=20)] = {}
 
 

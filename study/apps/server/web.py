@@ -120,6 +120,7 @@ def _about(host: Host) -> dict[str, Any]:
         "declined": protocol.consent.declined,
         "touch": protocol.touch,
         "size": [protocol.stimuli.width, protocol.stimuli.height],
+        "screen": protocol.screen.model_dump(),
         "background": _background(protocol.stimuli),
         "parameters": host.settings.parameters,
     }

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from study.errors import ProtocolError
 from study.experiment.protocol.methods import OwnMethod
-from study.experiment.protocol.stimuli import Points, StimulusSettings, Timing, TransitionSpec
+from study.experiment.protocol.stimuli import Points, Screen, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
 from study.models.up_down import UpDown
@@ -36,6 +36,7 @@ class Content(Part):
         default="as-listed", description="Order of the studies in a session."
     )
     stimuli: StimulusSettings = Field(default=StimulusSettings(), description="How stimuli are built and drawn.")
+    screen: Screen = Field(default=Screen(), description="How large stimuli are shown.")
     timing: Timing = Field(default=Timing(), description="Times of a trial.")
     points: Points = Field(default=Points(), description="How transition points are chosen.")
     language: Annotated[str, Field(pattern=r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$")] = Field(

@@ -95,6 +95,40 @@ class StimulusSettings(Part):
         return self
 
 
+class Screen(Part):
+    """How large stimuli are shown, in the window and in the browser alike."""
+
+    height_share: float = Field(
+        default=0.7, ge=0.05, le=1, description="Height of the picture as a share of the screen's height."
+    )
+    height_degrees: float | None = Field(
+        default=None,
+        gt=0,
+        le=90,
+        description="Height of the picture in degrees of visual angle, in place of `height_share`; browsers then ask "
+        "participants to measure their screen with a bank card. [degrees]",
+    )
+    distance_cm: float | None = Field(
+        default=None,
+        gt=10,
+        le=1000,
+        description="Viewing distance, which participants are asked to keep. [centimetres]",
+    )
+    ask_distance: Literal["no", "typed", "blind-spot"] = Field(
+        default="no",
+        description="Whether browsers ask for the viewing distance: as a number, or by finding the blind spot.",
+    )
+
+    @model_validator(mode="after")
+    def _distance(self) -> Self:
+        if self.height_degrees is not None and self.distance_cm is None and self.ask_distance == "no":
+            raise KeyMismatchError(
+                "expected distance_cm or ask_distance with height_degrees, found neither; state the viewing distance",
+                "height_degrees",
+            )
+        return self
+
+
 class Timing(Part):
     """What a participant's time is spent on."""
 

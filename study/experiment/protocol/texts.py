@@ -217,6 +217,24 @@ class Texts(Part):
         "without.",
         description="When a participant's device asks for reduced motion.",
     )
+    card: str = Field(
+        default="Hold a bank card against the screen and move the slider until the frame is as large as the card.",
+        description="Above the frame with which the size of the screen is measured.",
+    )
+    distance_keep: str = Field(
+        default="Please sit so that your eyes are {cm} cm from the screen, and keep this distance.",
+        description="Below that frame, where the protocol states the viewing distance; {cm} is the distance.",
+    )
+    distance_ask: str = Field(
+        default="How far are your eyes from the screen, in centimetres?",
+        description="Where browsers ask for the viewing distance.",
+    )
+    blind_spot: str = Field(
+        default="Now we measure how far you sit from the screen. Close your right eye and look only at the square, "
+        "with your left eye. A red dot moves away from it. Press the space bar as soon as the dot disappears; it will "
+        "come five times.",
+        description="Before the viewing distance is found by the blind spot.",
+    )
     withdrawal: str = Field(
         default="With this code you can have your answers deleted at any time:",
         description="Above the code, at the end.",
@@ -258,10 +276,12 @@ _NEEDED_SLOTS = {
     "practice_wrong": {"answer"},
     "progress": {"done", "total"},
     "press": {"key"},
+    "distance_keep": {"cm"},
 }
 _MEANINGS = {
     "answer": "which says what to answer",
     "done": "the number of trials done",
     "total": "the number of all trials",
     "key": "which key it is",
+    "cm": "the viewing distance",
 }

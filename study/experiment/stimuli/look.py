@@ -157,7 +157,8 @@ def _rgb(text: str) -> tuple[int, int, int]:
 def _content_hash(fps: float, positions: FloatArray, figure: Figure, camera: Camera) -> str:
     """Hash of all that is seen: points, figure, camera, size, frame rate and the renderer's look; 16 digits."""
     digest = hashlib.sha256(f"look {LOOK_VERSION}; {fps:g} fps; {camera.size}; {figure.style}; ".encode())
-    digest.update(f"{figure.background}; {figure.lit}; {figure.floor_m}; {camera.track_seconds}; ".encode())
+    floor = "" if figure.floor_m is None else f"{figure.floor_m}, fading"
+    digest.update(f"{figure.background}; {figure.lit}; {floor}; {camera.track_seconds}; ".encode())
     digest.update(np.round(positions * 1e4).astype("<i4").tobytes())
     for array in (figure.ends, figure.along, figure.beyond, figure.radii, figure.colours):
         digest.update(np.round(np.asarray(array, dtype=np.float64) * 1e6).astype("<i8").tobytes())

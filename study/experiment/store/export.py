@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import study
 from study.counting import counted
 from study.errors import SessionError
-from study.experiment.store.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, STIMULI, Variable
+from study.experiment.store.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, SHOWN_TO, STIMULI, Variable
 from study.files import whole_folder
 from study.spreadsheets import safe_table
 
@@ -96,20 +96,28 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
     form = rows_of(responses, sa.select(stored.form_values))
 
     def whole(table: sa.Table, variables: Mapping[str, Variable]) -> pd.DataFrame:
-        wanted = (table.c[name] for name in variables if name != "participant")
-        rows = rows_of(responses, sa.select(table.c.session_id, *wanted))
-        return pd.DataFrame([{**row, "participant": names[row["session_id"]]} for row in rows], columns=list(variables))
+        wanted = [table.c[name] for name in variables if name in table.c]
+        detail = [table.c.detail_json] if "detail_json" in table.c else []
+        rows = rows_of(responses, sa.select(table.c.session_id, *wanted, *detail))
+        listed = [
+            {**json.loads(row.get("detail_json") or "{}"), **row, "participant": names[row["session_id"]]}
+            for row in rows
+        ]
+        return pd.DataFrame(listed, columns=list(variables))
 
     stimuli = whole(stored.answer_stimuli, STIMULI)
     presentations = whole(stored.presentations, PRESENTATIONS)
     participants = sessions[list(PARTICIPANTS)].copy()
+    for column in SHOWN_TO:
+        size = pd.to_numeric(presentations[column.removeprefix("shown_")])
+        participants[column] = participants["participant"].map(size.groupby(presentations["participant"]).median())
     labels = {f"form_{field.name}": field.label for field in protocol.form}
     for column in labels:
         said = {row["session_id"]: row["value"] for row in form if f"form_{row['name']}" == column}
         participants[column] = sessions["id"].map(said)
     asked = {column: Variable(f"Asked in the form: {label}") for column, label in labels.items()}
     tables: dict[str, Mapping[str, Variable]] = {"answers": ANSWERS, "stimuli": STIMULI, "presentations": PRESENTATIONS}
-    tables["participants"] = {**PARTICIPANTS, **asked}
+    tables["participants"] = {**PARTICIPANTS, **SHOWN_TO, **asked}
     frames = {"answers": answers, "stimuli": stimuli, "presentations": presentations, "participants": participants}
     return Shared(protocol, variables=tables, **{name: safe_table(frame) for name, frame in frames.items()})
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from study.tasks.registry import NAMES, TASKS
@@ -75,6 +75,18 @@ STIMULI: Mapping[str, Variable] = {
     "method": Variable("Method by which its transition was made."),
 }
 
+SIZE_SHOWN: Mapping[str, Variable] = {
+    "width_px": Variable("Width of the picture on the screen.", "number", "pixels of the screen"),
+    "height_px": Variable("Height of the picture on the screen.", "number", "pixels of the screen"),
+    "width_css": Variable("Width of the picture in a browser's page.", "number", "CSS pixels"),
+    "height_css": Variable("Height of the picture in a browser's page.", "number", "CSS pixels"),
+    "height_degrees": Variable("Height of the picture as it was seen; empty where not known.", "number", "degrees"),
+    "screen_height_px": Variable("Height of the whole screen.", "number", "pixels of the screen"),
+    "px_per_cm": Variable("Pixels of the screen in a centimetre; empty where not known.", "number", "1/cm"),
+    "distance_cm": Variable("Viewing distance, measured or stated; empty where not known.", "number", "cm"),
+}
+"""How large a presentation was; kept in its details."""
+
 PRESENTATIONS: Mapping[str, Variable] = {
     "participant": ANSWERS["participant"],
     "trial": ANSWERS["trial"],
@@ -86,6 +98,7 @@ PRESENTATIONS: Mapping[str, Variable] = {
     "frames_presented": Variable("Frames that were seen to be presented.", "number", "frames"),
     "longest_gap_frames": Variable("Longest time between two frames; 1 is perfect.", "number", "frames"),
     "shown_well": Variable("Whether no gap was too long and no frame was missing.", "boolean"),
+    **SIZE_SHOWN,
     "at": Variable("When it was recorded, with its time zone.", "time"),
 }
 
@@ -97,3 +110,9 @@ PARTICIPANTS: Mapping[str, Variable] = {
     "library": Variable("Library of motions that was shown."),
     "library_synthetic": Variable("Whether its motions are synthetic, not captured.", "boolean"),
 }
+
+SHOWN_TO: Mapping[str, Variable] = {
+    f"shown_{name}": replace(SIZE_SHOWN[name], description=f"Median over presentations. {SIZE_SHOWN[name].description}")
+    for name in ("height_px", "height_degrees")
+}
+"""What the table of participants says of the size of the pictures that each of them saw."""

@@ -6,14 +6,16 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from scripted import Act, ScriptedWindow, click, press
 
 from renderer.events import CloseAsked, Focus, Key, Resized, Typed
 from study.apps.player.lettering import default_font
-from study.apps.player.loop import Outcome, play
+from study.apps.player.loop import Outcome, Setting, play
 from study.apps.player.pages import Look
 from study.errors import SessionError
+from study.experiment.protocol.stimuli import Screen
 from study.experiment.session import open_session
 
 LOOK = Look((222, 223, 225), (default_font(),))
@@ -408,3 +410,28 @@ def test_everything_is_prepared_before_a_trial_starts(make_small: Any, store: An
         assert kinds[number - 1] != "frame" if number else True
         if kinds[number - 1] == "blank":
             assert kinds[number - 2] == "page"  # a pause after an answer, not a gap between stimuli
+
+
+def test_pictures_are_as_high_as_the_protocol_states_and_on_record(make_small: Any, store: Any) -> None:
+    """A full-HD screen 53 cm wide, seen from 60 cm."""
+    small, window = make_small(), ScriptedWindow(whole([press("s")] * 6))
+    window.describe = lambda: {"display": "scripted", "display_pixels": [1920, 1080], "display_mm": [530, 298]}
+    session = open_session(small.protocol, small.plan)
+    play(window, session, small.stimuli.stimulus, store, LOOK, setting=Setting(distance_cm=60.0))
+    shown = [row.detail for row in store.all("shown")]
+    assert {row["height_px"] for row in shown} == {756}
+    assert {row["screen_height_px"] for row in shown} == {1080}
+    centimetres = 756 / (1920 / 53.0)
+    assert shown[0]["height_degrees"] == pytest.approx(np.degrees(2 * np.arctan(centimetres / 2 / 60)), abs=1e-3)
+
+
+def test_actual_size_is_that_of_the_stimuli_and_degrees_need_a_known_screen(make_small: Any, store: Any) -> None:
+    small = make_small()
+    window = ScriptedWindow(whole([press("s")] * 6))
+    session = open_session(small.protocol, small.plan)
+    play(window, session, small.stimuli.stimulus, store, LOOK, setting=Setting(actual_size=True))
+    assert {row.detail["height_px"] for row in store.all("shown")} == {small.protocol.stimuli.height}
+    screen = Screen(height_degrees=15.0, distance_cm=60.0)
+    other = replace(session, protocol=small.protocol.model_copy(update={"screen": screen}))
+    with pytest.raises(SessionError, match="Expected the width of the screen"):
+        play(ScriptedWindow([]), other, small.stimuli.stimulus, store, LOOK)

@@ -142,3 +142,38 @@ def test_labels_hold_letters_and_digits_and_stay_apart() -> None:
     made = labels(["p-1", "p_1", "p1", "..."])
     assert len(set(made.values())) == 4
     assert all(re.fullmatch("[A-Za-z0-9]+", name) for name in made.values())
+
+
+def test_the_size_of_each_presentation_is_exported_with_its_meaning(
+    tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli
+) -> None:
+    size = {
+        "width_px": 1344,
+        "height_px": 756,
+        "height_degrees": 15.5,
+        "px_per_cm": None,
+        "distance_cm": None,
+        "frames": [0, 1],
+    }
+    with open_responses(tmp_path / "answers.sqlite") as opened:
+        record = begin_session(opened, toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p1"))
+        shown = [
+            Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True, size),
+            Presentation(1, 1, "second", "y", "swap", 9, 9, 1.0, True),  # as older versions stored it
+        ]
+        keep_answer(opened, record, Answer(1, "", 1, "same", 0.75), shown)
+        folder = export(toy_protocol, opened, "psych-ds", tmp_path / "out")
+        bids = export(toy_protocol, opened, "bids", tmp_path / "bids")
+    first, second = rows(folder / "data" / "description-presentations_data.csv", ",")
+    assert (first["width_px"], first["height_px"], first["height_degrees"]) == ("1344.0", "756.0", "15.5")
+    assert (first["px_per_cm"], second["height_px"]) == ("", "")
+    described = json.loads((folder / "dataset_description.json").read_text(encoding="utf-8"))["variableMeasured"]
+    units = {one["name"]: one.get("unitText") for one in described}
+    assert (units["height_px"], units["height_degrees"], units["height_css"]) == (
+        "pixels of the screen",
+        "degrees",
+        "CSS pixels",
+    )
+    (person,) = rows(bids / "participants.tsv", "\t")
+    assert (person["shown_height_px"], person["shown_height_degrees"]) == ("756.0", "15.5")
+    assert "Median" in json.loads((bids / "participants.json").read_text())["shown_height_px"]["Description"]
