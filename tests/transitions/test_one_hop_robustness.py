@@ -18,8 +18,10 @@ from study.motion.mending import mend
 from study.motion.readers.registry import read_clip
 from study.motion.synthetic import synthesize
 from study.transitions.cost_matrix import cost_matrix
+from study.transitions.one_hop.adaptive import adaptive, lengths_at
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.joint_distance import JointDistance
+from study.transitions.one_hop.play import Played, Segment
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
 from study.transitions.point_cloud import point_cloud, window_distances
 
@@ -150,3 +152,48 @@ def test_sampled_entries_of_captured_dance_equal_trying_everything(mocap: Path, 
 
 def benchmark_like(exact: dict[tuple[int, int], np.ndarray], unit: float) -> dict[tuple[int, int], np.ndarray]:
     return {pair: np.rint(values / unit).astype(np.int32) for pair, values in exact.items()}
+
+
+def test_blends_of_their_own_length_cost_no_more_and_are_no_cuts(
+    dances: tuple[Clip, ...], robustness: ModuleType
+) -> None:
+    settings = Settings.at(30.0)
+    switches = robustness.robustness_set(dances, settings, 6)
+    weight = weight_in_counts(robustness.WEIGHT, PointCloudDistance())
+    problem = Problem(dances, switches, settings, weight)
+    own = adaptive(replace(problem, settings=replace(settings, lengths=lengths_at(30.0, 15)), weight=weight // 2))
+    costs, blends = [], []
+    for asked in (problem, own):
+        tables = [build_table(replace(asked, switches=(switch,))) for switch in switches]
+        costs.append([robustness.strain(own, *pair) for pair in zip(tables, switches, strict=True)])
+        blends = [table.entries[0, 4:] for table in tables]
+    assert np.mean(costs[1]) <= np.mean(costs[0])
+    assert np.median(np.concatenate(blends)) >= 9
+
+
+def test_smoothness_is_that_of_the_joints(robustness: ModuleType) -> None:
+    """A body that falls for a stretch of its blend and slides at 0.6 m/s: both are read off."""
+    clip = synthesize("stand", seconds=2.0, fps=30.0)
+    still = replace(
+        clip,
+        root_positions=np.tile(clip.root_positions[:1], (clip.frames, 1)),
+        rotations=np.tile(clip.rotations[:1], (clip.frames, 1, 1)),
+    )
+    path = still.root_positions.copy()
+    path[:, 2] += 0.02 * np.arange(clip.frames)  # 0.6 m/s
+    segments = Segment("state", 0, 0, 20, 0), Segment("blend", 1, 20, 35, 0)
+    played = Played(replace(still, root_positions=path), segments)
+    floor = robustness.floor_of((still,))
+    hops = still.root_positions.copy()
+    hops[25, 1] += 0.02
+    clips = replace(still, root_positions=hops), still
+    found = robustness.smoothness_of(played, clips, 10, floor)
+    assert found.seconds == pytest.approx(25 / 30)
+    assert found.slide_m == pytest.approx(15 * 0.02)
+    assert found.skating == 1.0
+    assert found.joint_acceleration == pytest.approx(0.0, abs=1e-6)
+    path[28, 1] += 0.01  # a hop of a centimetre in one frame: 0.01 * 900 * 2 at its top
+    found = robustness.smoothness_of(replace(played, clip=replace(still, root_positions=path)), clips, 10, floor)
+    assert found.joint_acceleration == pytest.approx(18.0, rel=1e-6)
+    assert found.toe_acceleration == pytest.approx(18.0, rel=1e-6)
+    assert found.over_clips == pytest.approx(0.5)  # the clip that goes on hops by two centimetres

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -13,16 +14,14 @@ from study.motion import quaternions as quat
 from study.motion.clip import Clip, trim
 from study.motion.skeleton import Skeleton
 from study.motion.synthetic import synthesize
-from study.transitions.blend_length import blend_length
 from study.transitions.one_hop import beats as on_beat
-from study.transitions.one_hop.adaptive import UNIT, build_adaptive, geodesic_blends
+from study.transitions.one_hop.adaptive import StrainDistance, adaptive
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.chains import find_chains
 from study.transitions.one_hop.connect import connect
 from study.transitions.one_hop.parts import part_joints, part_weights, put_together
 from study.transitions.one_hop.play import Step, Trigger, play, play_steps
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch
-from study.transitions.weights import joint_weights
 
 DISTANCE = PointCloudDistance()
 
@@ -202,65 +201,141 @@ def test_hops_kept_near_to_direct_are_the_destination() -> None:
     assert (table.costs[some] <= table.direct_costs[some]).all()
 
 
-# Blend lengths by the geodesic method (section 5, Blending duration)
+# Blends of their own length (section 5, Blending duration)
 
 
-def test_each_blend_has_the_length_of_the_geodesic_method() -> None:
-    a, b = one_rig(40, 45)
-    weights = joint_weights(a.skeleton, "wang2003")
-    blends = geodesic_blends(a, b, weights, 3, 20)
-    assert (blends.counts[38:] >= 2**29).all()
-    for i, j in ((0, 0), (5, 17), (12, 3), (18, 25)):
-        one = blend_length(a, b, i, j, method="geodesic", shortest=3, longest=20, specification="left")
-        assert blends.counts[i, j] * UNIT == pytest.approx(one.cost, abs=UNIT)
-        assert one.costs is not None
-        assert one.costs[blends.lengths[i, j] - 3] == pytest.approx(one.cost, abs=2 * UNIT)
-
-
-@pytest.mark.parametrize("alignment", [Alignment(offset=-2), Alignment(destination_frame=4)])
-def test_adaptive_entries_equal_exhaustive_search(alignment: Alignment) -> None:
-    clips, low, high, stay_most, weight = one_rig(22, 25, 20), 2, 7, 3, 400
-    table = build_adaptive(
-        clips,
-        [Switch(0, 1, alignment)],
-        weight * UNIT,
-        settings=Settings(1, stay_most, stay_most),
-        shortest=low,
-        longest=high,
+@pytest.mark.parametrize("seed", range(50))
+def test_blends_of_their_own_length_equal_exhaustive_search(seed: int) -> None:
+    """Every hop, frame, stay and pair of lengths is tried; each entry and cost is the search's, ties included."""
+    rng = np.random.default_rng(seed)
+    frames = [int(n) for n in rng.integers(11, 18, 3)]
+    clips, stay = one_rig(*frames), int(rng.integers(0, 4))
+    lengths = tuple(sorted({int(n) for n in rng.integers(2, 10, 3)}))
+    fixed = bool(rng.integers(2))
+    alignment = (
+        Alignment(offset=int(rng.integers(-4, 5))) if fixed else Alignment(destination_frame=int(rng.integers(6)))
     )
-    weights = joint_weights(clips[0].skeleton, "wang2003")
-    blends = {(k, hop): geodesic_blends(clips[k], clips[hop], weights, low, high) for k in (0, 1) for hop in range(3)}
+    weight, extra = int(rng.choice([0, 400, 40_000])), {int(rng.integers(3)): int(rng.integers(0, 50_000))}
+    switches = (Switch(0, 1, alignment), Switch(1, 0, alignment))
+    settings = Settings(5, stay, stay, lengths=lengths)
+    problem = adaptive(Problem(clips, switches, settings, weight, DISTANCE, hop_costs=extra))
+    table = build_table(problem, workers=1, memory_bytes=int(rng.choice([2**20, 2**26])))
+    prepared = [problem.distance.prepare(clip, 5) for clip in clips]
+    costs = {
+        (a, hop, b): problem.distance.counts(
+            prepared[a], prepared[hop], b, range(frames[a] - b + 1), range(frames[hop] - b + 1)
+        )
+        for a, hop, b in product(range(2), range(3), lengths)
+        if min(frames[a], frames[hop]) >= b
+    }
+
+    def blend(a: int, at: int, hop: int, frame: int, length: int) -> int | None:
+        known = costs.get((a, hop, length))
+        if known is None or not (0 <= at < known.shape[0] and 0 <= frame < known.shape[1]):
+            return None
+        if known[at, frame] >= 2**29:
+            return None
+        return int(known[at, frame]) + weight * (length - lengths[0])
+
     assert table.columns[4:] == ("blend_first", "blend_second")
-    for trigger in range(22):
+    every = [(row, trigger) for row in table.rows for trigger in range(row.triggers)]
+    for row, trigger in every:
         to = alignment.offset_at(trigger)
-        found = []
-        for s, hop in product(range(stay_most + 1), range(3)):
-            first, second = blends[0, hop], blends[1, hop]
-            for u in range(clips[hop].frames):
-                if trigger + s >= 22 or first.counts[trigger + s, u] >= 2**29:
+        found, straight = [], []
+        for s, hop, b1 in product(range(stay + 1), range(3), lengths):
+            for u in range(frames[hop]):
+                first = blend(row.source, trigger + s, hop, u, b1)
+                if first is None:
                     continue
-                b = int(first.lengths[trigger + s, u])
-                c = int(first.counts[trigger + s, u]) + weight * (s + b - low)
-                e, v = trigger + s + b - to, u + b
-                if hop == 1 and e == v and 0 <= e <= 25:
-                    found.append((c, s, hop, u, 0, b, 0))
-                for h in range(stay_most + 1):
-                    if 0 <= e + h < 25 and v + h < clips[hop].frames and second.counts[e + h, v + h] < 2**29:
-                        b2 = int(second.lengths[e + h, v + h])
-                        cost = c + int(second.counts[e + h, v + h]) + weight * (h + b2 - low)
-                        found.append((cost, s, hop, u, h, b, b2))
-        entry = table.entries[trigger].tolist()
+                cost, e, v = first + weight * s + extra.get(hop, 0), trigger + s + b1 - to, u + b1
+                if hop == row.destination and e == v and e <= frames[hop]:
+                    found.append((cost, s, hop, u, 0, b1, 0))
+                    straight += [first] if s == 0 else []
+                for h, b2 in product(range(stay + 1), lengths):
+                    second = blend(row.destination, e + h, hop, v + h, b2)
+                    if second is not None:
+                        found.append((cost + second + weight * h, s, hop, u, h, b1, b2))
+        at = row.first_entry + trigger
+        entry = table.entries[at].tolist()
         if not found:
             assert entry == [-1, 0, 0, 0, 0, 0]
             continue
-        cost, s, hop, u, h, b, b2 = min(found)
-        assert entry == [hop, trigger + s - u, s, h, b, b2]
-        assert table.costs[trigger] == cost * UNIT
-        assert table.costs[trigger] <= table.direct_costs[trigger]
-    played = play(clips, table, [Trigger(3, 1)])
-    entry = table.look_up(0, 1, 3)
+        cost, s, hop, u, h, b1, b2 = min(found)
+        assert entry == [hop, trigger + s - u, s, h, b1, b2]
+        assert table.costs[at] == cost * problem.distance.unit
+        if straight:
+            assert table.direct_costs[at] == min(straight) * problem.distance.unit
+
+
+def test_no_transition_costs_more_than_with_any_one_length() -> None:
+    clips = one_rig(70, 80, 60)
+    switches = (Switch(0, 1, Alignment(offset=3)), Switch(2, 0, Alignment(destination_frame=5)))
+    settings = Settings(6, 10, 10, lengths=(3, 6, 12))
+    problem = adaptive(Problem(clips, switches, settings, 3000, DISTANCE))
+    table = build_table(problem)
+    for length in (3, 6, 12):
+        one = replace(problem, settings=Settings(length, 10, 10))
+        paid = 2 * 3000 * (length - 3) * problem.distance.unit
+        known = build_table(one)
+        some = np.isfinite(known.costs)
+        assert (table.costs[some] <= known.costs[some] + paid).all()
+    # The fixed length costs what it does without adaptive blends.
+    rows = range(40)
+    alike = [
+        distance.counts(*(distance.prepare(clip, 6) for clip in clips[:2]), 6, rows, rows)
+        for distance in (problem.distance, DISTANCE)
+    ]
+    np.testing.assert_array_equal(*alike)
+    played = play(clips, table, [Trigger(13, 1)])
+    entry = table.look_up(0, 1, 13)
     assert entry is not None
-    assert played.segments[1].stop - played.segments[1].start == entry.blend_first
+    blends = [segment.stop - segment.start for segment in played.segments if segment.kind == "blend"]
+    assert blends == [length for length in (entry.blend_first, entry.blend_second) if length]
+
+
+def test_motions_that_cross_are_not_alike_for_being_at_one_place_for_a_moment() -> None:
+    """Two legs that swing against each other and meet: a cut there costs nothing by the mean over its own frames."""
+    rest = one_rig(80)[0]
+    clips = []
+    for sign in (1.0, -1.0):
+        turns = np.zeros((80, 9, 3))
+        turns[:, 1, 0] = sign * 0.02 * (np.arange(80) - 40.0)
+        clips.append(Clip(rest.skeleton, np.zeros((80, 3)), quat.exp(turns), 30.0))
+    asked = Problem(tuple(clips), (Switch(0, 1, Alignment(offset=0), 25, 25),), Settings(15, 20, 20), 0, DISTANCE)
+    problem = adaptive(asked)
+    short = problem.settings.lengths[0]
+    prepared = [DISTANCE.prepare(clip, short) for clip in clips]
+    assert problem.settings.lengths[-1] == 30
+    mean = {b: DISTANCE.counts(*prepared, b, range(66), range(66))[40 - b // 2, 40 - b // 2] for b in (short, 15)}
+    assert mean[short] < 0.1 * mean[15]
+    prepared = [problem.distance.prepare(clip, short) for clip in clips]
+    costs = [
+        int(problem.distance.counts(*prepared, b, range(51), range(51))[40 - b // 2, 40 - b // 2]) for b in (short, 15)
+    ]
+    assert costs[0] > costs[1]
+    entry = build_table(replace(problem, hops=(1,))).look_up(0, 1, 25)
+    assert entry is not None
+    assert entry.blend_first is not None
+    assert entry.blend_first >= 15
+
+
+@pytest.mark.parametrize("blend", [2, 4, 15, 30])
+def test_a_blend_costs_what_it_bends_and_what_it_adds_to_the_velocities(blend: int) -> None:
+    clips = one_rig(120, 100)
+    problem = adaptive(Problem(clips, (), Settings(15, 0, 0), 0, DISTANCE))
+    strain, window = problem.distance, max(blend, 15)
+    assert isinstance(strain, StrainDistance)
+    prepared = [strain.prepare(clip, blend) for clip in clips]
+    found = strain.counts(*prepared, blend, range(121 - blend), range(101 - blend))
+    plain = [DISTANCE.prepare(clip, window) for clip in clips]
+    distance = DISTANCE.counts(*plain, window, range(121 - window), range(101 - window))
+    factor = (1 + (strain.own_time / (blend + 1)) ** 2) / (1 + (strain.own_time / 16) ** 2)
+    supplied = found[: 121 - window, : 101 - window]
+    np.testing.assert_allclose(supplied, np.minimum(distance * factor, 2**26), atol=0.51)
+    assert (found[121 - window :] == 2**29).all()
+    assert (found[:, 101 - window :] == 2**29).all()
+    with pytest.raises(TransitionError, match=r"ascending, got \(6, 3\)"):
+        Settings(6, lengths=(6, 3))
 
 
 # More than one hop (section 5, Multiple hops)

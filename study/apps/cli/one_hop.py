@@ -76,7 +76,7 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
 @click.option("--times", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Multiply that weight.")
 @click.option("--seed", type=int, default=0, show_default=True, help="For the weight of Eq. 5.")
 @click.option("--distance", type=click.Choice(["pointcloud", "joint"]), default="pointcloud", show_default=True)
-@click.option("--adaptive", is_flag=True, help="Blend lengths by the geodesic method of 2004; needs --weight.")
+@click.option("--adaptive", is_flag=True, help="Each blend has a length of its own, up to 1 s.")
 @click.option("--on-beat", is_flag=True, help="Align beats with beats, estimated from the motions or given by --beats.")
 @click.option(
     "--beats", type=(str, TABLE), multiple=True, metavar="CLIP FILE", help="Times of a clip's beats, seconds."
@@ -103,7 +103,7 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as
     loaded = load_clips(clips, library, fps)
     check_place(out)
     options["known_beats"] = known_beats(clips, library, loaded)
-    table = build_adaptive_table(loaded, options) if options["adaptive"] else build_fixed_table(loaded, out, options)
+    table = built(loaded, out, options)
     files = write_table(table, out)
     both = np.isfinite(table.costs) & np.isfinite(table.direct_costs)
     result = {
@@ -139,6 +139,7 @@ def switches_of(clips: tuple[Clip, ...], options: dict[str, Any]) -> tuple[Switc
 
 def settings_of(fps: float, options: dict[str, Any]) -> Settings:
     """Blend and stays from the options."""
+    from study.transitions.one_hop.adaptive import lengths_at
     from study.transitions.one_hop.problem import Settings
 
     usual = Settings.at(fps)
@@ -147,18 +148,22 @@ def settings_of(fps: float, options: dict[str, Any]) -> Settings:
     longest = options["longest"]
     if longest is not None and longest < 2 * blend:
         raise click.UsageError(f"expected --longest of at least two blends, {2 * blend} frames, found {longest}.")
-    return Settings(blend, stay, stay, None if longest is None else longest - 2 * blend)
+    lengths = lengths_at(fps, blend) if options["adaptive"] else ()
+    return Settings(blend, stay, stay, None if longest is None else longest - 2 * blend, lengths)
 
 
-def build_fixed_table(clips: tuple[Clip, ...], out: Path, options: dict[str, Any]) -> OneHopTable:
+def built(clips: tuple[Clip, ...], out: Path, options: dict[str, Any]) -> OneHopTable:
     """The search of the paper, with the variants that leave its structure as it is."""
     from numpy.random import default_rng
 
+    from study.transitions.one_hop.adaptive import adaptive
     from study.transitions.one_hop.build import build_table
     from study.transitions.one_hop.default_weight import default_weight
     from study.transitions.one_hop.joint_distance import JointDistance
     from study.transitions.one_hop.problem import Distance, PointCloudDistance, Problem, weight_in_counts
 
+    if options["adaptive"] and options["longest"]:
+        raise click.UsageError("expected no --longest with --adaptive; it bounds both stays, whatever the blends take.")
     settings, memory = settings_of(clips[0].fps, options), int(options["memory_gb"] * 2**30)
     distance: Distance = JointDistance() if options["distance"] == "joint" else PointCloudDistance()
     switches = switches_of(clips, options)
@@ -178,29 +183,12 @@ def build_fixed_table(clips: tuple[Clip, ...], out: Path, options: dict[str, Any
     )
     with progress("hops") as report:
         return build_table(
-            problem,
+            adaptive(problem) if options["adaptive"] else problem,
             workers=options["workers"],
             memory_bytes=memory,
             checkpoint=out.with_name(f"{out.stem}.unfinished.npz"),
             progress=lambda done, total: report(done / total, f"{done} of {total}"),
         )
-
-
-def build_adaptive_table(clips: tuple[Clip, ...], options: dict[str, Any]) -> OneHopTable:
-    """Blend lengths by the geodesic method."""
-    from study.transitions.one_hop.adaptive import build_adaptive
-    from study.transitions.one_hop.problem import Settings
-
-    if options["weight"] is None:
-        raise click.UsageError("expected --weight with --adaptive, squared radians a frame, such as 0.0005.")
-    for name in ("longest", "on_beat", "near_direct", "blend"):
-        if options[name]:
-            raise click.UsageError(
-                f"expected no --{name.replace('_', '-')} with --adaptive; it has no part in that search."
-            )
-    stay = Settings.at(clips[0].fps).longest_stay_source if options["stay"] is None else options["stay"]
-    weight = options["weight"] * options["times"]
-    return build_adaptive(clips, switches_of(clips, options), weight, settings=Settings(1, stay, stay))
 
 
 def known_beats(specs: tuple[str, ...], library: str | None, clips: tuple[Clip, ...]) -> list[OffsetArray]:
@@ -239,14 +227,15 @@ def beat_offsets(
 @json_option
 def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -> None:
     """The content of a table, and single entries of it."""
-    from study.transitions.one_hop.table import header, read_table
+    from study.transitions.one_hop.table import COLUMNS, header, read_table
 
     held = read_table(table)
+    blends = "their own" if len(held.columns) > len(COLUMNS) else held.blend_frames
     entries = []
     lines = [
         f"{table}: {counted(len(held.entries), 'entry', 'entries')} of {', '.join(held.columns)}; "
         f"{counted(len(held.clips), 'clip')} at "
-        f"{held.fps:g} fps, blends of {held.blend_frames or 'their own'} frames, weight {held.weight:.4g}",
+        f"{held.fps:g} fps, blends of {blends} frames, weight {held.weight:.4g}",
         *(
             f"{held.clips[row.source]} to {held.clips[row.destination]}: frames {row.first_trigger} to "
             f"{row.first_trigger + row.triggers - 1}"

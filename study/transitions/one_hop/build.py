@@ -75,7 +75,7 @@ def build_table(
     waiting = [number for number in range(len(jobs)) if not state.done[number]]
     saved = time.monotonic()
     with one_blas_thread(), ThreadPoolExecutor(max_workers=workers) as pool:
-        running: dict[Future[dict[int, Found]], int] = {}
+        running: dict[Future[list[Found]], int] = {}
         try:
             while waiting or running:
                 while waiting and len(running) < workers:
@@ -109,14 +109,15 @@ class _State:
             number: np.full(length, FORBIDDEN, dtype=np.int32) for number, length in enumerate(lengths)
         }
 
-    def take(self, number: int, found: dict[int, Found]) -> None:
+    def take(self, number: int, found: list[Found]) -> None:
         """A job's findings."""
-        for switch, part in found.items():
+        for part in found:
             # A copy that is changed and then put in place: jobs that are reading the old one see it whole.
-            best = Best(*(getattr(self.best[switch], field.name).copy() for field in fields(Best)))
+            best = Best(*(getattr(self.best[part.switch], field.name).copy() for field in fields(Best)))
             best.offer(part.where, part.best)
-            self.best[switch] = best
-            self.direct[switch][part.direct_where] = part.direct
+            self.best[part.switch] = best
+            direct = self.direct[part.switch]
+            direct[part.direct_where] = np.minimum(direct[part.direct_where], part.direct)
         self.done[number] = True
 
     def write(self, path: Path, key: str) -> None:

@@ -61,6 +61,7 @@ def default_weight(
         How many (2019: 100).
     settings
         Blend and longest stays (2019: 30 and 60 frames at 60 fps); the paper's at the clips' frame rate unless given.
+        Where blends may have several lengths, what the stays gain is that of the fixed length.
 
     Raises
     ------
@@ -69,13 +70,16 @@ def default_weight(
 
     Notes
     -----
-    Eq. 5 divides by `2 s_max`; here by the longest stays of the source and of the hop together, which is the same
-    where they are equal. A condition is drawn such that both stays and blends fit wherever the clips are that long.
+    Eq. 5 divides by `2 s_max`, the most that the responsiveness cost can be; here by the longest stays of the source
+    and of the hop together, which is the same where they are equal, and by what both blends can take beyond the
+    shortest. A condition is drawn such that both stays and blends fit wherever the clips are that long.
     """
     settings = settings or Settings.at(clips[0].fps if clips else 60.0)
     distance = distance or PointCloudDistance()
     if settings.longest_stay_source + settings.longest_stay_hop == 0:
         raise TransitionError("Expected stays of some frames to find a default weight for; there is none without.")
+    longest = settings.longest_stay_source + settings.longest_stay_hop + 2 * (settings.blends[-1] - settings.blends[0])
+    settings = replace(settings, lengths=())
     drawn = tuple(draw_condition(clips, settings, rng) for _ in range(conditions))
     problem = Problem(tuple(clips), drawn, settings, 0, distance)
     still = Settings(settings.blend_frames, 0, 0)
@@ -87,8 +91,7 @@ def default_weight(
     if not both.any():
         raise TransitionError("Expected transitions that fit in the clips, found none; use longer clips.")
     without, with_stays = (float(table.costs[both].mean()) for table in tables)
-    weight = (without - with_stays) / (settings.longest_stay_source + settings.longest_stay_hop)
-    return DefaultWeight(weight, without, with_stays, drawn)
+    return DefaultWeight((without - with_stays) / longest, without, with_stays, drawn)
 
 
 def draw_condition(clips: Sequence[Clip], settings: Settings, rng: np.random.Generator) -> Switch:

@@ -1,13 +1,15 @@
 """One job of a search: everything that one stretch of one hop clip contributes to every transition.
 
-In: a problem and a job. Out: for each transition of the state machine the best with this hop, by triggered frame. Jobs
+In: a problem and a job. Out: for each transition of the state machine the best with this hop, by triggered frame. Where
+blends may have several lengths, the search is done for each length of the first blend, and the second leg is the least
+over all lengths of the second one. Jobs
 don't depend on each other, so they run in any order, on any number of cores or machines, and give the same table.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -30,10 +32,12 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a job found for one switch.
+    """What a job found for one switch with one length of the first blend.
 
     Parameters
     ----------
+    switch
+        Its number.
     where : (n,)
         Triggers, counted from the switch's first.
     best
@@ -42,6 +46,7 @@ class Found:
         The cost in counts of the direct transition, where this job knows it.
     """
 
+    switch: int
     where: NDArray[np.int64]
     best: Best
     direct_where: NDArray[np.int64]
@@ -53,16 +58,16 @@ def make_jobs(problem: Problem, memory_bytes: int) -> tuple[Job, ...]:
 
     The cost of the direct transition, known from the destination as hop, saves much of the work for the others.
     """
-    blend = problem.settings.blend_frames
-    rows = sum(max(clip.frames - blend + 1, 0) for clip in _used_clips(problem))
+    blends = problem.settings.blends
+    rows = sum(max(clip.frames - blend + 1, 0) for clip in _used_clips(problem) for blend in blends)
     longest = max((clip.frames for clip in problem.clips), default=0)
-    overhang = blend + problem.settings.longest_stay_hop
+    overhang = blends[-1] + problem.settings.longest_stay_hop
     # Matrices of all clips in use, then a second leg, a masked first leg, and what sums and bounds take.
     width = max(16, memory_bytes // (4 * (rows + 4 * longest)) - overhang)
     jobs = []
     destinations = {switch.destination for switch in problem.switches}
     for hop in sorted(problem.hop_numbers, key=lambda number: (number not in destinations, number)):
-        starts = problem.clips[hop].frames - blend + 1
+        starts = problem.clips[hop].frames - blends[0] + 1
         pieces = -(-starts // width) if starts > 0 else 0
         edges = [starts * piece // pieces for piece in range(pieces + 1)] if pieces else []
         jobs += [Job(hop, start, stop) for start, stop in pairwise(edges)]
@@ -74,8 +79,8 @@ def _used_clips(problem: Problem) -> list[Any]:
     return [problem.clips[number] for number in sorted(numbers)]
 
 
-def run_job(problem: Problem, prepared: Sequence[Any], job: Job, limits: Mapping[int, Best]) -> dict[int, Found]:
-    """What a job finds, by switch.
+def run_job(problem: Problem, prepared: Sequence[Any], job: Job, limits: Mapping[int, Best]) -> list[Found]:
+    """What a job finds, by switch and length of the first blend.
 
     Parameters
     ----------
@@ -86,26 +91,65 @@ def run_job(problem: Problem, prepared: Sequence[Any], job: Job, limits: Mapping
     limits
         The best known so far, by switch: only what may beat it needs to be found. Older knowledge does no harm.
     """
-    blend, stay_hop = problem.settings.blend_frames, problem.settings.longest_stay_hop
-    hop_windows = problem.clips[job.hop].frames - blend + 1
-    columns = range(job.start, min(job.stop + blend + stay_hop, hop_windows))
-    needed = _needed_rows(problem)
-    legs = {
-        number: Table(
-            problem.distance.counts(prepared[number], prepared[job.hop], blend, rows, columns),
-            rows.start,
-            columns.start,
-        )
-        for number, rows in needed.items()
-    }
-    found: dict[int, Found] = {}
-    for alignment, numbers in _by_destination(problem).items():
-        to_hop = legs[alignment[0]]
-        second = _SecondLegs(problem, job, to_hop, [problem.switches[number] for number in numbers])
-        for number in numbers:
-            switch = problem.switches[number]
-            found[number] = _search(problem, job, switch, legs[switch.source], second, limits[number])
+    blends = problem.settings.blends
+    legs = {blend: _legs(problem, prepared, job, blend) for blend in blends}
+    groups = _by_destination(problem)
+    to_hop = {clip: _to_hop(problem, {blend: legs[blend][clip] for blend in blends}) for clip, _ in groups}
+    found: list[Found] = []
+    for blend in blends:
+        one = replace(problem, settings=replace(problem.settings, blend_frames=blend))
+        for (clip, _), numbers in groups.items():
+            second = _SecondLegs(one, job, to_hop[clip], [problem.switches[number] for number in numbers])
+            for number in numbers:
+                leg = legs[blend][problem.switches[number].source]
+                found.append(_search(one, job, number, leg, second, limits[number]))
     return found
+
+
+def _legs(problem: Problem, prepared: Sequence[Any], job: Job, blend: int) -> dict[int, Table]:
+    """Costs of blends of one length between each clip in use (rows) and the hop (columns)."""
+    settings, hop_windows = problem.settings, problem.clips[job.hop].frames - blend + 1
+    last = min(job.stop + settings.blends[-1] + settings.longest_stay_hop, hop_windows)
+    columns = range(job.start, max(job.start, last))
+    legs = {}
+    for number, rows in _needed_rows(problem, blend).items():
+        none = np.zeros((len(rows), len(columns)), dtype=np.int32)
+        counts = (
+            problem.distance.counts(prepared[number], prepared[job.hop], blend, rows, columns) if none.size else none
+        )
+        legs[number] = Table(counts, rows.start, columns.start)
+    return legs
+
+
+@dataclass(frozen=True, eq=False)
+class _ToHop:
+    """Blends between a destination and the hop: the least cost over their lengths, and the shortest that has it."""
+
+    costs: Table
+    lengths: Table | int
+
+    def lengths_at(self, times: OffsetArray, frames: OffsetArray) -> IntArray:
+        """The lengths of single blends."""
+        if isinstance(self.lengths, int):
+            return np.full(len(times), self.lengths, dtype=np.int32)
+        return self.lengths.at(times, frames)
+
+
+def _to_hop(problem: Problem, legs: Mapping[int, Table]) -> _ToHop:
+    """The second blends into one destination, from those of each length; a longer one pays for its frames."""
+    (shortest, first), *longer = legs.items()
+    if not longer:
+        return _ToHop(first, shortest)
+    ends = [leg.first_row + len(leg.counts) for leg in legs.values()]
+    rows = range(min(leg.first_row for leg in legs.values()), max(ends))
+    columns = range(first.first_column, first.first_column + first.counts.shape[1])
+    least = first.block(rows, columns)
+    lengths = np.full(least.shape, shortest, dtype=np.int32)
+    for blend, leg in longer:
+        costs = leg.block(rows, columns) + np.int32(problem.weight * (blend - shortest))
+        lengths[costs < least] = blend
+        np.minimum(least, costs, out=least)
+    return _ToHop(Table(least, rows.start, columns.start), Table(lengths, rows.start, columns.start))
 
 
 def _by_destination(problem: Problem) -> dict[tuple[int, Alignment], list[int]]:
@@ -116,13 +160,14 @@ def _by_destination(problem: Problem) -> dict[tuple[int, Alignment], list[int]]:
     return groups
 
 
-def _needed_rows(problem: Problem) -> dict[int, range]:
-    """Which windows of each clip the switches need, as a source or as a destination."""
-    blend, settings = problem.settings.blend_frames, problem.settings
+def _needed_rows(problem: Problem, blend: int) -> dict[int, range]:
+    """Which windows of `blend` frames of each clip the switches need, as a source or as a destination."""
+    settings = problem.settings
     needed: dict[int, range] = {}
     for switch in problem.switches:
-        frames = _source_frames(problem, switch)
-        times = _times(problem, switch)
+        frames = _source_frames(problem, switch, blend)
+        spans = [_times(problem, switch, first) for first in settings.blends]
+        times = range(min(span.start for span in spans), max(span.stop for span in spans))
         for clip, rows in (
             (switch.source, frames),
             (switch.destination, range(times.start, times.stop + settings.longest_stay_hop)),
@@ -138,21 +183,21 @@ def _needed_rows(problem: Problem) -> dict[int, range]:
     return needed
 
 
-def _source_frames(problem: Problem, switch: Switch) -> range:
-    """Source frames at which the first blend may start."""
+def _source_frames(problem: Problem, switch: Switch, blend: int) -> range:
+    """Source frames at which a first blend of `blend` frames may start."""
     triggers = problem.triggers(switch)
-    windows = max(problem.clips[switch.source].frames - problem.settings.blend_frames + 1, 0)
+    windows = max(problem.clips[switch.source].frames - blend + 1, 0)
     stop = min(triggers.stop + problem.settings.longest_stay_source, windows)
     return range(min(triggers.start, stop), stop)
 
 
-def _times(problem: Problem, switch: Switch) -> range:
-    """The destination's frames at which the first blend may end."""
-    blend, settings = problem.settings.blend_frames, problem.settings
+def _times(problem: Problem, switch: Switch, blend: int) -> range:
+    """The destination's frames at which a first blend of `blend` frames may end."""
+    settings = problem.settings
     if switch.alignment.destination_frame is not None:
         first = switch.alignment.destination_frame + blend
         return range(first, first + settings.longest_stay_source + 1)
-    frames = _source_frames(problem, switch)
+    frames = _source_frames(problem, switch, blend)
     shift = blend - switch.alignment.offset_at(0)
     last = problem.clips[switch.destination].frames + 1
     start = max(frames.start + shift, -settings.longest_stay_hop)
@@ -167,14 +212,14 @@ class _SecondLegs:
     is fixed. Where both stays share a bound and the alignment is fixed, they are made when asked for.
     """
 
-    def __init__(self, problem: Problem, job: Job, to_hop: Table, switches: Sequence[Switch]) -> None:
+    def __init__(self, problem: Problem, job: Job, to_hop: _ToHop, switches: Sequence[Switch]) -> None:
         settings = problem.settings
         self.problem, self.job, self.to_hop = problem, job, to_hop
         self.destination, self.alignment = switches[0].destination, switches[0].alignment
         self.ends = range(job.start + settings.blend_frames, job.stop + settings.blend_frames)
         self.stays = np.arange(settings.longest_stay_source + 1)
         self.bounds = np.minimum(settings.longest_stay_hop, settings.stay_both - self.stays)
-        spans = [_times(problem, switch) for switch in switches]
+        spans = [_times(problem, switch, settings.blend_frames) for switch in switches]
         self.times = range(min(span.start for span in spans), max(span.stop for span in spans))
         self.by_time: Table | None = None
         self.by_stay: IntArray | None = None
@@ -187,7 +232,7 @@ class _SecondLegs:
 
     def bounded_by(self, longest: int) -> Table:
         """All second legs with one longest stay, by the destination's frame."""
-        table = search.second_leg(self.to_hop, self.times, self.ends, longest, self.problem.weight)
+        table = search.second_leg(self.to_hop.costs, self.times, self.ends, longest, self.problem.weight)
         self._mend(table.counts, np.arange(self.times.start, self.times.stop))
         return table
 
@@ -200,7 +245,7 @@ class _SecondLegs:
         return self._rows(times, self.bounds[stays])
 
     def _rows(self, times: OffsetArray, longest: OffsetArray) -> IntArray:
-        rows = search.second_rows(self.to_hop, times, self.ends, longest, self.problem.weight)
+        rows = search.second_rows(self.to_hop.costs, times, self.ends, longest, self.problem.weight)
         self._mend(rows, times)
         rows[longest < 0] = FORBIDDEN
         return rows
@@ -220,11 +265,16 @@ class _SecondLegs:
             rows[(apart > self.problem.nearest_to_direct) | (self.job.hop != self.destination)] = FORBIDDEN
 
 
-def _search(problem: Problem, job: Job, switch: Switch, leg: Table, second: _SecondLegs, limit: Best) -> Found:
-    """What a job finds for one switch."""
-    triggers = problem.triggers(switch)
-    extra = np.int32(problem.hop_costs.get(job.hop, 0))
+def _search(problem: Problem, job: Job, number: int, leg: Table, second: _SecondLegs, limit: Best) -> Found:
+    """What a job finds for one switch with one length of the first blend."""
+    switch = problem.switches[number]
+    triggers, settings = problem.triggers(switch), problem.settings
+    longer = np.int32(problem.weight * (settings.blend_frames - settings.blends[0]))
+    extra = np.int32(problem.hop_costs.get(job.hop, 0)) + longer
     own = Table(leg.counts[:, : job.stop - job.start], leg.first_row, job.start)
+    if own.counts.shape[1] < job.stop - job.start:  # the hop ends before so long a blend does
+        rows = range(leg.first_row, leg.first_row + len(leg.counts))
+        own = Table(own.block(rows, range(job.start, job.stop)), leg.first_row, job.start)
     first = _allowed(problem, job, switch, own)
     paid = (second.stays * problem.weight).astype(np.int32)
     if second.by_stay is not None:
@@ -242,8 +292,8 @@ def _search(problem: Problem, job: Job, switch: Switch, leg: Table, second: _Sec
         every = np.arange(triggers.start, triggers.stop)
         costs = own.at(every, every - _offsets(switch, every))
         direct_where = np.flatnonzero(costs < FORBIDDEN)
-        direct = costs[direct_where]
-    return Found(where, best, direct_where, direct)
+        direct = costs[direct_where] + longer
+    return Found(number, where, best, direct_where, direct)
 
 
 def _offsets(switch: Switch, triggers: OffsetArray) -> OffsetArray:
@@ -271,7 +321,7 @@ def _sums_with_fixed_alignment(problem: Problem, switch: Switch, first: Table, s
 
     It depends on the source's frame alone: trigger plus stay. Only a bound on both stays makes a difference by stay.
     """
-    triggers, frames = problem.triggers(switch), _source_frames(problem, switch)
+    triggers, frames = problem.triggers(switch), _source_frames(problem, switch, problem.settings.blend_frames)
     shift = problem.settings.blend_frames - switch.alignment.offset_at(0)
     sums = np.full((len(triggers), len(second.stays)), FORBIDDEN, dtype=np.int32)
     for bound in sorted({int(bound) for bound in second.bounds if bound >= 0}):
@@ -306,8 +356,10 @@ def _entries(
         frame[some] = total.argmin(axis=1)
     frame += job.start
     longest = second.bounds[stay]
-    stay_hop = search.stays_in_hop(second.to_hop, times, frame + blend, longest, problem.weight)
+    stay_hop = search.stays_in_hop(second.to_hop.costs, times, frame + blend, longest, problem.weight)
+    blend_second = second.to_hop.lengths_at(times + stay_hop, frame + blend + stay_hop)
     if job.hop == switch.destination:
-        stay_hop[frame + blend == times] = 0
-    hop = np.full(len(where), job.hop, dtype=np.int32)
-    return Best(cost, hop, frame.astype(np.int32), stay, stay_hop)
+        own = frame + blend == times
+        stay_hop[own], blend_second[own] = 0, 0
+    hop, blend_first = (np.full(len(where), value, dtype=np.int32) for value in (job.hop, blend))
+    return Best(cost, hop, frame.astype(np.int32), stay, stay_hop, blend_first, blend_second)

@@ -24,8 +24,8 @@ from study.transitions import point_cloud as clouds
 IntArray = NDArray[np.int32]
 OffsetArray = NDArray[np.int64]
 
-# The count of what can't be. Two distances, two penalties and a hop's cost, each at most `LARGEST_COUNT` = 2^26, stay
-# below it; twice FORBIDDEN and three of them still fit an int32.
+# The count of what can't be. Two distances, the penalties of two stays and of two blends, and a hop's cost, each at
+# most `LARGEST_COUNT` = 2^26, stay below it; twice FORBIDDEN and three of them still fit an int32.
 FORBIDDEN = 2**29
 _LARGEST_PENALTY = clouds.LARGEST_COUNT
 
@@ -90,12 +90,17 @@ class Settings:
     longest_stay_both
         The most frames for both stays together, where that is less: a bound on the duration of the transition,
         which is both stays and both blends (2019, section 5, Higher responsiveness).
+    lengths
+        The frames that each blend may take, ascending, where its length is searched for as well (2019, section 5,
+        Blending duration). Every frame beyond the shortest then costs as much as one of a stay. `build_table` alone
+        takes them.
     """
 
     blend_frames: int = 30
     longest_stay_source: int = 60
     longest_stay_hop: int = 60
     longest_stay_both: int | None = None
+    lengths: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         stays = (self.longest_stay_source, self.longest_stay_hop, self.longest_stay_both or 0)
@@ -104,12 +109,19 @@ class Settings:
                 f"Expected a blend of at least 1 frame and longest stays of at least 0, got {self.blend_frames} and "
                 f"{', '.join(map(str, stays))}."
             )
+        if list(self.lengths) != sorted({frames for frames in self.lengths if frames > 0}):
+            raise TransitionError(f"Expected lengths of blends of 1 frame or more, ascending, got {self.lengths}.")
 
     @staticmethod
     def at(fps: float) -> Settings:
         """The paper's settings at a frame rate: blends of 0.5 s and stays of at most 1 s."""
         blend, stay = max(1, round(BLEND_S * fps)), round(LONGEST_STAY_S * fps)
         return Settings(blend, stay, stay)
+
+    @property
+    def blends(self) -> tuple[int, ...]:
+        """The frames that a blend may take, ascending."""
+        return self.lengths or (self.blend_frames,)
 
     @property
     def stay_both(self) -> int:
@@ -206,7 +218,8 @@ class Problem:
 
     def __post_init__(self) -> None:
         check_clips(self.clips)
-        most = max(self.settings.longest_stay_source, self.settings.longest_stay_hop, 1)
+        blends = self.settings.blends
+        most = max(self.settings.longest_stay_source, self.settings.longest_stay_hop, blends[-1] - blends[0], 1)
         if not 0 <= self.weight * most <= _LARGEST_PENALTY:
             raise TransitionError(
                 f"Expected a weight from 0 to {_LARGEST_PENALTY // most * self.distance.unit:g} a frame for stays of "

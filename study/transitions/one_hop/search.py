@@ -11,12 +11,12 @@ for each source frame; with a fixed frame of the destination at the trigger ther
 bounds leave most of them out.
 
 Ties: of transitions that cost the same, the one with the least stay in the source, then the first hop clip, then the
-first frame of the hop, then the least stay in the hop.
+first frame of the hop, then the least stay in the hop, then the shortest first blend, then the shortest second one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,9 @@ class Best:
 
     Parameters
     ----------
-    cost, hop, frame, stay_source, stay_hop : (triggers,)
+    cost, hop, frame, stay_source, stay_hop, blend_first, blend_second : (triggers,)
         Cost in counts (`FORBIDDEN` or more where there is none), hop clip (-1 where there is none), the hop's frame at
-        the start of the first blend, and both stays.
+        the start of the first blend, both stays, and the frames of both blends.
     """
 
     cost: IntArray
@@ -44,13 +44,15 @@ class Best:
     frame: IntArray
     stay_source: IntArray
     stay_hop: IntArray
+    blend_first: IntArray
+    blend_second: IntArray
 
     @staticmethod
     def none(triggers: int) -> Best:
         """Nothing found yet."""
         cost = np.full(triggers, FORBIDDEN, dtype=np.int32)
         return Best(
-            cost, np.full(triggers, -1, dtype=np.int32), *(np.zeros(triggers, dtype=np.int32) for _ in range(3))
+            cost, np.full(triggers, -1, dtype=np.int32), *(np.zeros(triggers, dtype=np.int32) for _ in range(5))
         )
 
     def beaten_by(self, cost: IntArray, stay_source: IntArray, hop: int) -> NDArray[np.bool_]:
@@ -67,12 +69,12 @@ class Best:
             better |= tied & (new < old)
             tied &= new == old
         chosen = where[better]
-        for name in ("cost", "hop", "frame", "stay_source", "stay_hop"):
-            getattr(self, name)[chosen] = getattr(other, name)[better]
+        for each in fields(self):
+            getattr(self, each.name)[chosen] = getattr(other, each.name)[better]
 
     def _keys(self, where: NDArray[np.int64] | slice) -> tuple[IntArray, ...]:
-        names = (self.cost, self.stay_source, self.hop, self.frame, self.stay_hop)
-        return tuple(values[where] for values in names)
+        stays = (self.cost, self.stay_source, self.hop, self.frame, self.stay_hop)
+        return tuple(values[where] for values in (*stays, self.blend_first, self.blend_second))
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,7 +90,7 @@ class OneHopTable:
     fps
         Frame rate of all clips.
     blend_frames
-        Frames of each blend.
+        Frames of each blend; where entries have their own, those of a direct transition.
     rows
         The transitions.
     entries : (n, 4) or (n, 6) int32
@@ -162,8 +162,11 @@ def table_of(problem: Problem, best: Mapping[int, Best], direct: Mapping[int, In
     for number, switch in enumerate(problem.switches):
         triggers, found = problem.triggers(switch), best[number]
         offset = np.arange(triggers.start, triggers.stop) + found.stay_source - found.frame
-        entry = np.stack([found.hop, offset, found.stay_source, found.stay_hop], axis=1)
-        entry[found.hop < 0] = (-1, 0, 0, 0)
+        columns = [found.hop, offset, found.stay_source, found.stay_hop]
+        if problem.settings.lengths:
+            columns += [found.blend_first, found.blend_second]
+        entry = np.stack(columns, axis=1)
+        entry[found.hop < 0] = (-1, *(0,) * (len(columns) - 1))
         entries.append(entry.astype(np.int32))
         costs.append(_in_units(found.cost, problem.distance.unit))
         directs.append(_in_units(direct[number], problem.distance.unit))

@@ -63,9 +63,11 @@ def test_build_finds_a_weight_and_beats(capsys: pytest.CaptureFixture[str], tmp_
 def test_adaptive_blends(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = tmp_path / "t.npz"
     arguments = ("one-hop", "build", "dance", "box", "--pair", "dance", "box", "--fps", 10, "--out", out, "--adaptive")
-    assert "--weight with --adaptive" in refusal(capsys, *arguments)
-    built = answer(capsys, *arguments, "--weight", 0.001, "--stay", 4)
+    assert "no --longest with --adaptive" in refusal(capsys, *arguments, "--longest", 30)
+    built = answer(capsys, *arguments, "--stay", 4)
     assert built["bytes"] == 24 * int(str(built["entries"]))
+    shown = answer(capsys, "one-hop", "show", out, "--at", "dance", "box", 20)
+    assert shown["columns"][4:] == ["blend_first", "blend_second"]
 
 
 def test_show_gives_entries(capsys: pytest.CaptureFixture[str], table: Path) -> None:
