@@ -6,6 +6,7 @@ world. Which capsules make up a body is the business of `renderer.figure`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,39 @@ IntArray = NDArray[np.int64]
 BACKGROUND: RGB = (222, 223, 225)
 
 
+@dataclass(frozen=True)
+class Way:
+    """A direction in a body: from one point of a pose to another, or square to two other directions.
+
+    Parameters
+    ----------
+    start, end
+        Points, by number; or two ways, whose cross product it is then.
+    otherwise
+        What to take where the two coincide; up, by default.
+    """
+
+    start: int | Way
+    end: int | Way
+    otherwise: Way | None = None
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A point of a body that is no joint: the weighted mean of points, moved by metres along directions.
+
+    Parameters
+    ----------
+    mean
+        Points, by number, and their weights.
+    moved
+        Directions and metres.
+    """
+
+    mean: tuple[tuple[int, float], ...]
+    moved: tuple[tuple[Way, float], ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Figure:
     """Capsules on points: cones with round ends, each from one point towards another.
@@ -31,7 +65,7 @@ class Figure:
     points
         How many points a pose has.
     ends : (capsules, 2)
-        The two points that each capsule hangs on.
+        The two points that each capsule hangs on: those of a pose, and after them the anchors.
     along : (capsules, 2)
         Where its ends lie between them: 0 on the first point, 1 on the second.
     beyond : (capsules, 2)
@@ -46,10 +80,13 @@ class Figure:
         Whether capsules are shaded as round; else flat discs of one colour.
     rounded : (capsules, 2)
         Whether an end is shaded as a round one, not as going straight on into the next bone; no end where None.
-    forward : (capsules, 2)
-        Metres added to each end the way that the body faces; zeros where None.
-    facing
-        Four points that say which way it faces: left, right, low and high, as both shoulders, neck and head.
+    anchors
+        Further points to hang capsules on; each may rest on those before it.
+    part : (capsules,)
+        The capsule along whose line each one is lit. Those with one line look like one surface, whatever they are put
+        together from; each by its own where None.
+    lift : (capsules,)
+        Metres by which it counts as nearer to the eye when it is decided what is painted over what; zeros where None.
     floor_m
         Height of a floor to stand on, metres; None for none.
     """
@@ -64,8 +101,9 @@ class Figure:
     background: RGB = BACKGROUND
     lit: bool = True
     rounded: NDArray[np.bool_] | None = None
-    forward: FloatArray | None = None
-    facing: tuple[int, int, int, int] | None = None
+    anchors: tuple[Anchor, ...] = ()
+    part: IntArray | None = None
+    lift: FloatArray | None = None
     floor_m: float | None = None
 
     def __post_init__(self) -> None:
@@ -85,16 +123,16 @@ class Figure:
                 )
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        if self.forward is not None and (self.facing is None or self.forward.shape != (count, 2)):
-            raise RendererError(f"Expected shifts forward of shape {(count, 2)}, and points that say where that is.")
+        for name, given in (("part", self.part), ("lift", self.lift)):
+            if given is not None and given.shape != (count,):
+                raise RendererError(f"Expected a figure's {name} of shape {(count,)}, got {given.shape}.")
         if self.rounded is not None and self.rounded.shape != (count, 2):
             raise RendererError(f"Expected round ends of shape {(count, 2)}, got {self.rounded.shape}.")
         if self.floor_m is not None and not np.isfinite(self.floor_m):
             raise RendererError(f"Expected a floor at a finite height, got {self.floor_m}.")
-        if self.ends.min() < 0 or self.ends.max() >= self.points:
-            raise RendererError(
-                f"Expected capsules on points 0 to {self.points - 1}, got {self.ends.min()} to {self.ends.max()}."
-            )
+        last = self.points + len(self.anchors) - 1
+        if self.ends.min() < 0 or self.ends.max() > last:
+            raise RendererError(f"Expected capsules on points 0 to {last}, got {self.ends.min()} to {self.ends.max()}.")
         if not (np.isfinite(self.radii).all() and (self.radii > 0).all()):
             raise RendererError("Expected capsules with radii above 0 metres.")
 
@@ -106,6 +144,7 @@ def place(figure: Figure, positions: FloatArray) -> FloatArray:
             f"Expected {figure.points} points a frame, as the figure was made for, got {positions.shape[1]}; "
             "bones and positions must come from one skeleton, end sites included."
         )
+    positions = _with_anchors(figure, positions)
     first, second = positions[:, figure.ends[:, 0]], positions[:, figure.ends[:, 1]]
     way = second - first
     length = np.sqrt(way[..., 0] ** 2 + way[..., 1] ** 2 + way[..., 2] ** 2)[..., None]
@@ -114,8 +153,6 @@ def place(figure: Figure, positions: FloatArray) -> FloatArray:
     placed: FloatArray = np.stack(
         [first + way * figure.along[:, e, None] + unit * figure.beyond[:, e, None] for e in (0, 1)], axis=2
     )
-    if figure.forward is not None and figure.facing is not None:
-        placed += _facing(positions, figure.facing)[:, None, None] * figure.forward[:, :, None]
     return placed
 
 
@@ -124,25 +161,42 @@ def outline(figure: Figure, positions: FloatArray) -> tuple[FloatArray, FloatArr
     return place(figure, positions).reshape(len(positions), -1, 3), figure.radii.reshape(-1)
 
 
-def _facing(positions: FloatArray, points: tuple[int, int, int, int]) -> FloatArray:
-    """The way a body faces: square to the line of its shoulders and to the line up its neck; `(frames, 3)`."""
-    left, right, low, high = (positions[:, point] for point in points)
-    a, b = left - right, high - low
-    out = np.stack(
-        [
-            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
-            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
-            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
-        ],
-        axis=1,
-    )
-    length = np.sqrt(out[:, 0] ** 2 + out[:, 1] ** 2 + out[:, 2] ** 2)[:, None]
-    facing: FloatArray = np.where(length > 1e-9, out / np.maximum(length, 1e-9), 0.0)
-    return facing
+def _with_anchors(figure: Figure, positions: FloatArray) -> FloatArray:
+    """The points of each pose, and the anchors after them; summed one by one, so that every machine rounds alike."""
+    points = [positions[:, i] for i in range(figure.points)]
+    known: dict[Way, FloatArray] = {}
+    for anchor in figure.anchors:
+        place = np.zeros((len(positions), 3))
+        for point, weight in anchor.mean:
+            place = place + weight * points[point]
+        for way, metres in anchor.moved:
+            place = place + metres * _direction(way, points, known)
+        points.append(place)
+    return np.stack(points, axis=1) if figure.anchors else positions
+
+
+def _direction(way: Way, points: Sequence[FloatArray], known: dict[Way, FloatArray]) -> FloatArray:
+    """A unit vector for each frame, `(frames, 3)`."""
+    if way not in known:
+        if isinstance(way.start, int) and isinstance(way.end, int):
+            out = points[way.end] - points[way.start]
+        elif isinstance(way.start, Way) and isinstance(way.end, Way):
+            a, b = (_direction(one, points, known) for one in (way.start, way.end))
+            x, y, z = (a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1)))
+            out = np.stack([x, y, z], axis=1)
+        else:
+            raise AssertionError("a direction rests on two points or on two directions")
+        length = np.sqrt(out[:, 0] ** 2 + out[:, 1] ** 2 + out[:, 2] ** 2)[:, None]
+        instead = np.array([0.0, 1.0, 0.0]) if way.otherwise is None else _direction(way.otherwise, points, known)
+        known[way] = np.where(length > 1e-6, out / np.maximum(length, 1e-6), instead)
+    return known[way]
 
 
 def kept_capsules(figure: Figure, keep: NDArray[np.bool_]) -> Figure:
     """The figure with only some of its capsules, `keep (capsules,)`."""
-    names = ("ends", "along", "beyond", "radii", "colours", "rounded", "forward")
+    names = ("ends", "along", "beyond", "radii", "colours", "rounded", "lift")
     kept = {name: getattr(figure, name)[keep] for name in names if getattr(figure, name) is not None}
+    if figure.part is not None:
+        number = np.cumsum(keep) - 1
+        kept["part"] = np.where(keep[figure.part], number[figure.part], number)[keep]
     return replace(figure, **kept)

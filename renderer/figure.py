@@ -10,16 +10,17 @@ Okabe and Ito (2008), the right side also clearly darker.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.body import Body, Parts
 from renderer.capsules import BACKGROUND, Figure
 from renderer.colour import RGB, check_colour
 from renderer.errors import RendererError
+from renderer.mannequin import WHOLE, mannequin
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -36,7 +37,8 @@ MANNEQUIN_CENTRE: RGB = (134, 136, 142)
 
 REFERENCE_HEIGHT_M = 1.72
 
-# Radii in metres for a body of REFERENCE_HEIGHT_M, at the start and the end of the bone below a role's joint.
+# Radii in metres for a body of REFERENCE_HEIGHT_M, at the start and the end of the bone below a role's joint; of bones
+# below none under "". The full ones are those of bodies that lack limbs; whole bodies are mannequins.
 _STICK_RADII = {
     "hip": (0.044, 0.036),
     "knee": (0.036, 0.028),
@@ -51,6 +53,7 @@ _STICK_RADII = {
     "chest": (0.044, 0.038),
     "neck": (0.032, 0.032),
     "head": (0.032, 0.032),
+    "": (0.032, 0.028),
 }
 _FULL_RADII = {
     "hip": (0.084, 0.056),
@@ -65,6 +68,7 @@ _FULL_RADII = {
     "spine": (0.095, 0.100),
     "chest": (0.090, 0.050),
     "neck": (0.048, 0.048),
+    "": (0.045, 0.040),
 }
 _POINT_ROLES = tuple(
     f"{part}.{side}" for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in "LR"
@@ -117,139 +121,51 @@ def make_figure(
     height = REFERENCE_HEIGHT_M if height_m is None else float(height_m)
     if not 0.1 <= height <= 10.0:
         raise RendererError(f"Expected a height from 0.1 to 10 metres, got {height}.")
-    body = _Body(tree, tuple(sides), dict(parts or {}), height / REFERENCE_HEIGHT_M)
+    body = Body(tree, tuple(sides), dict(parts or {}), height / REFERENCE_HEIGHT_M)
     make, own, ground = {
         "stick": (_stick, COLOURS, BACKGROUND),
         "points": (_points, dict.fromkeys(SIDES, POINT_COLOUR), POINT_BACKGROUND),
-        "mannequin": (_mannequin, {**COLOURS, "centre": MANNEQUIN_CENTRE}, BACKGROUND),
+        "mannequin": (_full, {**COLOURS, "centre": MANNEQUIN_CENTRE}, BACKGROUND),
     }[style]
     if unknown := sorted(set(colours or {}) - set(SIDES)):
         raise RendererError(f"Expected colours for {', '.join(SIDES)}, got {', '.join(map(repr, unknown))}.")
     paint = {**own, **{side: check_colour(c, f"{side} colour") for side, c in (colours or {}).items()}}
     if background is not None:
         ground = check_colour(background, "background colour")
-    return replace(make(body, paint).figure(style, len(sides), ground, lit=style != "points"), floor_m=floor_m)
+    return replace(make(body, paint).figure(style, ground, lit=style != "points"), floor_m=floor_m)
 
 
-@dataclass(frozen=True)
-class _Body:
-    bones: IntArray
-    sides: tuple[str, ...]
-    parts: dict[str, int]
-    scale: float
-
-    def scaled(self, metres: tuple[float, float]) -> tuple[float, float]:
-        """Two lengths of the reference body, on this one."""
-        return metres[0] * self.scale, metres[1] * self.scale
-
-    def reach_to(self, end: int) -> tuple[float, float]:
-        """How much of a bone is drawn: the neck ends under the head, so that it never shows before the chin."""
-        return (0.0, 0.6) if end == self.parts.get("head") else (0.0, 1.0)
-
-    def head_line(self) -> tuple[int, int]:
-        """The head's joint and the end of its bone; without one, what it hangs on and the joint."""
-        head = self.parts["head"]
-        below = [child for parent, child in self.bones.tolist() if parent == head]
-        above = [parent for parent, child in self.bones.tolist() if child == head]
-        return (head, below[0]) if below else (above[0] if above else head, head)
-
-    def role_of(self, point: int) -> tuple[str, str]:
-        """Role and side (`"knee"`, `"L"`) of the nearest joint with a role, from a point up its tree; or nothing."""
-        roles = {index: role for role, index in self.parts.items()}
-        parents = {int(child): int(parent) for parent, child in self.bones}
-        while True:
-            if point in roles:
-                role, _, side = roles[point].partition(".")
-                return role, side
-            if point not in parents:
-                return "", ""
-            point = parents[point]
-
-    def side_of(self, start: int, end: int) -> str:
-        """The colour group of a bone: limbs take their side, trunk, collars and hip bones are centre."""
-        if not self.parts:
-            return self.sides[end] if self.sides[start] == self.sides[end] else "centre"
-        role, side = self.role_of(start)
-        if role in ("hip", "knee", "ankle", "toe", "shoulder", "elbow", "wrist"):
-            return {"L": "left", "R": "right"}[side]
-        return "centre"
+def _stick(body: Body, paint: Mapping[str, RGB]) -> Parts:
+    return _bones(body, paint, _STICK_RADII)
 
 
-@dataclass
-class _Parts:
-    """Capsules in the making."""
-
-    ends: list[tuple[int, int]] = field(default_factory=list)
-    along: list[tuple[float, float]] = field(default_factory=list)
-    beyond: list[tuple[float, float]] = field(default_factory=list)
-    radii: list[tuple[float, float]] = field(default_factory=list)
-    colours: list[RGB] = field(default_factory=list)
-    forward: list[tuple[float, float]] = field(default_factory=list)
-    rounded: list[tuple[bool, bool]] = field(default_factory=list)
-    facing: tuple[int, int, int, int] | None = None
-
-    def add(
-        self,
-        ends: tuple[int, int],
-        radii: tuple[float, float],
-        colour: RGB,
-        along: tuple[float, float] = (0.0, 1.0),
-        beyond: tuple[float, float] = (0.0, 0.0),
-        forward: tuple[float, float] = (0.0, 0.0),
-        *,
-        rounded: bool = False,
-    ) -> None:
-        self.ends.append(ends)
-        self.along.append(along)
-        self.beyond.append(beyond)
-        self.radii.append(radii)
-        self.colours.append(colour)
-        self.forward.append(forward)
-        self.rounded.append((rounded, rounded))
-
-    def _round_ends(self) -> NDArray[np.bool_]:
-        """Ends that are round by themselves, and tips where no other capsule goes on."""
-        uses = Counter(point for pair in self.ends for point in set(pair))
-        tips = [
-            (False, uses[end] == 1 and along[1] == 1.0) for (_, end), along in zip(self.ends, self.along, strict=True)
-        ]
-        return np.logical_or(self.rounded, tips)
-
-    def figure(self, style: str, points: int, background: RGB, *, lit: bool) -> Figure:
-        return Figure(
-            style,
-            points,
-            np.array(self.ends),
-            np.array(self.along),
-            np.array(self.beyond),
-            np.array(self.radii),
-            np.array(self.colours),
-            background,
-            lit,
-            self._round_ends(),
-            np.array(self.forward) if self.facing else None,
-            self.facing,
-        )
+def _full(body: Body, paint: Mapping[str, RGB]) -> Parts:
+    """A mannequin, or full bones for a body that lacks limbs."""
+    return mannequin(body, paint) if body.parts.keys() >= WHOLE else _bones(body, paint, _FULL_RADII)
 
 
-def _stick(body: _Body, paint: Mapping[str, RGB]) -> _Parts:
-    made = _Parts()
-    hidden = _below(body, "head", "wrist.L", "wrist.R")
+def _bones(body: Body, paint: Mapping[str, RGB], thickness: Mapping[str, tuple[float, float]]) -> Parts:
+    """A capsule for each bone, one for each hand, and a head."""
+    made = Parts(len(body.sides))
+    hidden = body.below("head", "wrist.L", "wrist.R")
     for start, end in body.bones.tolist():
         if start in hidden:
             continue  # the head covers its bone, and a hand is one piece
         role, _ = body.role_of(start)
-        radii = body.scaled(_STICK_RADII.get(role, (0.032, 0.028)))
+        radii = body.scaled(thickness.get(role, thickness[""]))
         made.add((start, end), radii, paint[body.side_of(start, end)], body.reach_to(end))
     for side, name in (("L", "left"), ("R", "right")):
-        _add_hand(made, body, f"wrist.{side}", _STICK_RADII["wrist"], paint[name])
+        wrist = body.parts.get(f"wrist.{side}")
+        # One capsule from the wrist to the tip of the longest finger: the fingers are held together.
+        if wrist is not None and (tip := body.tip_of(wrist)) != wrist:
+            made.add((wrist, tip), body.scaled(thickness["wrist"]), paint[name])
     _add_head(made, body, paint["centre"])
     return made
 
 
-def _points(body: _Body, paint: Mapping[str, RGB]) -> _Parts:
+def _points(body: Body, paint: Mapping[str, RGB]) -> Parts:
     """Discs on the joints of Johansson's walker; on every point of a rig without roles."""
-    made = _Parts()
+    made = Parts(len(body.sides))
     radius = (_POINT_RADIUS * body.scale,) * 2
     for role in _POINT_ROLES:
         if role in body.parts:
@@ -264,82 +180,13 @@ def _points(body: _Body, paint: Mapping[str, RGB]) -> _Parts:
     return made
 
 
-def _mannequin(body: _Body, paint: Mapping[str, RGB]) -> _Parts:
-    made = _Parts()
-    hidden = _below(body, "head", "wrist.L", "wrist.R")
-    for start, end in body.bones.tolist():
-        if start in hidden:
-            continue
-        role, _ = body.role_of(start)
-        radii = body.scaled(_FULL_RADII.get(role, (0.045, 0.040)))
-        made.add((start, end), radii, paint[body.side_of(start, end)], body.reach_to(end))
-    for side, name in (("L", "left"), ("R", "right")):
-        _add_hand(made, body, f"wrist.{side}", _FULL_RADII["wrist"], paint[name])
-        if {f"knee.{side}", f"ankle.{side}"} <= body.parts.keys():
-            shin = (body.parts[f"knee.{side}"], body.parts[f"ankle.{side}"])
-            made.add(shin, body.scaled((0.056, 0.042)), paint[name], (0.15, 0.55))
-        if {f"ankle.{side}", f"toe.{side}"} <= body.parts.keys():
-            foot = (body.parts[f"ankle.{side}"], body.parts[f"toe.{side}"])
-            made.add(foot, body.scaled((0.040, 0.036)), paint[name], (0.0, 1.0), (-0.035 * body.scale, 0.0))
-    for pair, radius in (("hip", 0.092), ("shoulder", 0.062)):
-        if {f"{pair}.L", f"{pair}.R"} <= body.parts.keys():
-            ends = (body.parts[f"{pair}.L"], body.parts[f"{pair}.R"])
-            along = (0.10, 0.90) if pair == "hip" else (0.06, 0.94)
-            made.add(ends, body.scaled((radius, radius)), paint["centre"], along)
-    if {"pelvis", "chest"} <= body.parts.keys():
-        made.add((body.parts["pelvis"], body.parts["chest"]), body.scaled((0.105, 0.128)), paint["centre"], (0.1, 0.85))
-    _add_head(made, body, paint["centre"])
-    if {"head", "shoulder.L", "shoulder.R"} <= body.parts.keys():
-        low, high = body.head_line()
-        if low != high:
-            made.facing = (body.parts["shoulder.L"], body.parts["shoulder.R"], low, high)
-            reach = (0.070 * body.scale, 0.050 * body.scale)
-            made.add(
-                (low, high),
-                body.scaled((0.016, 0.018)),
-                paint["centre"],
-                _head_start(body),
-                reach,
-                body.scaled((0.078, 0.092)),
-            )
-    return made
-
-
-def _below(body: _Body, *roles: str) -> set[int]:
-    """The joints with these roles, and all that hang on them."""
-    found = {body.parts[role] for role in roles if role in body.parts}
-    grown = True
-    while grown:
-        more = {int(child) for parent, child in body.bones if int(parent) in found} - found
-        found |= more
-        grown = bool(more)
-    return found
-
-
-def _add_hand(made: _Parts, body: _Body, wrist: str, radii: tuple[float, float], colour: RGB) -> None:
-    """One capsule from the wrist to the tip of the longest chain of bones on it: the fingers are held together."""
-    if wrist not in body.parts:
-        return
-    children: dict[int, list[int]] = {}
-    for parent, child in body.bones.tolist():
-        children.setdefault(parent, []).append(child)
-
-    def longest(point: int) -> list[int]:
-        chains = [longest(child) for child in children.get(point, [])]
-        return [point, *max(chains, key=len, default=[])]
-
-    tip = longest(body.parts[wrist])[-1]
-    if tip != body.parts[wrist]:
-        made.add((body.parts[wrist], tip), body.scaled(radii), colour)
-
-
-def _head_start(body: _Body) -> tuple[float, float]:
+def _head_start(body: Body) -> tuple[float, float]:
     """Where the head's joint lies on `head_line`: at its start, or at its end where the head has no bone of its own."""
     share = 0.0 if body.head_line()[0] == body.parts["head"] else 1.0
     return share, share
 
 
-def _add_head(made: _Parts, body: _Body, colour: RGB) -> None:
+def _add_head(made: Parts, body: Body, colour: RGB) -> None:
     """An egg from chin to crown, on the line from the head's joint to the end of its bone."""
     if "head" in body.parts:
         radii, reach = body.scaled(_HEAD_RADII), body.scaled(_HEAD_REACH)

@@ -61,7 +61,7 @@ class Painter:
         self._capacity = capacity
 
     def load(self, data: NDArray[np.float32]) -> int:
-        """Hand over capsules `(..., 16)` as `shapes.lay_out` numbers them; returns how many."""
+        """Hand over capsules `(..., 24)` as `shapes.lay_out` numbers them; returns how many."""
         flat = data.reshape(-1, FLOATS)
         if len(flat) > self._capacity:
             self._reserve(2 * len(flat))
@@ -95,13 +95,13 @@ class Painter:
         self._arrays, self._buffers, self._programs = {}, [], {}
 
 
-_INPUTS = (("line", 0), ("body", 4), ("colour", 8), ("extra", 12))
+_INPUTS = ("line", "body", "colour", "extra", "part_line", "part_body")
 
 
 def _content(buffer: Any, program: Any) -> list[tuple[Any, ...]]:
-    """The inputs that a program uses, out of 16 floats a vertex."""
+    """The inputs that a program uses, out of 24 floats a vertex."""
     layout, names = [], []
-    for name, _ in _INPUTS:
+    for name in _INPUTS:
         if name in program:
             layout.append("4f")
             names.append(name)

@@ -23,7 +23,7 @@ from renderer.segments import Segment, painted
 
 FloatArray = NDArray[np.float64]
 
-FLOATS = 16
+FLOATS = 24
 """Numbers that the shader takes for each capsule; see `lay_out`."""
 
 # Pixels around a capsule that its smooth edge may touch, in luma or in the half-size chroma.
@@ -36,11 +36,12 @@ class Shapes:
 
     Parameters
     ----------
-    data : (frames, capsules, 16), float32
+    data : (frames, capsules, 24), float32
         In the order to paint: start x, y and the way to the end x, y (pixels, y down); radius at the start, growth
         of the radius, 1 / length squared, 1 / (2 mean radius); luma, blue chroma, red chroma (0..1 of the 8-bit
         range) and opacity; the shift into the picture that is drawn on (x, y), shading (0 none, 1 straight on past
-        its ends, 2 round at the far end, 3 round at both), stretch of y.
+        its ends, 2 round at the far end, 3 round at both), stretch of y; the line along which it is lit, as its own
+        line and radii at the beginning.
     boxes : (frames, 4), int64
         Left, top, right and bottom edge of what may be touched, even numbers, not cut at the frame's edges.
     """
@@ -82,7 +83,9 @@ def lay_out(
     ends = np.round(ends * 256.0) / 256.0
     radii = figure.radii * camera.focal_pixels * nearness
     radii = np.maximum(np.round(radii * 256.0) / 256.0, 0.5)
-    order = paint_order(ends, radii, nearness, figure.radii.mean(axis=1), joined(figure))
+    parts = np.arange(len(figure.ends)) if figure.part is None else figure.part
+    lifted = nearness if figure.lift is None else nearness + figure.lift[:, None] * nearness**2
+    order = paint_order(ends, radii, lifted, figure.radii.mean(axis=1), joined(figure), parts)
     data = _shader_numbers(ends, radii, figure)
     for segment in segments:
         data[segment.start : segment.stop, :, 8:11] = _paint(painted(figure, segment.start, [segment]))
@@ -141,18 +144,11 @@ def joined(figure: Figure) -> NDArray[np.bool_]:
 
 def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure | None) -> NDArray[np.float32]:
     frames, count = ends.shape[:2]
-    start = ends[:, :, 0]
-    way = ends[:, :, 1] - start
-    length2 = way[..., 0] ** 2 + way[..., 1] ** 2
     data = np.zeros((frames, count, FLOATS), dtype=np.float32)
-    data[..., 0:2] = start
-    data[..., 2:4] = way
-    data[..., 4] = radii[..., 0]
-    data[..., 5] = radii[..., 1] - radii[..., 0]
-    data[..., 6] = np.where(length2 > 1e-3, 1.0 / np.maximum(length2, 1e-3), 0.0)
-    data[..., 7] = 1.0 / (radii[..., 0] + radii[..., 1])
+    data[..., 0:8] = _line(ends, radii)
     data[..., 11] = 1.0
     data[..., 15] = 1.0
+    data[..., 16:24] = data[..., 0:8]
     if figure is None:
         return data
     data[..., 8:11] = _paint(figure)
@@ -160,7 +156,33 @@ def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure | None) 
         rounded = np.zeros((count, 2), dtype=bool) if figure.rounded is None else figure.rounded
         # 1: going straight on at both ends; 2: the far end is round; 3: both are.
         data[..., 14] = 1.0 + rounded[:, 1] + (rounded[:, 0] & rounded[:, 1])
+    if figure.part is not None:
+        data[..., 14] = data[..., figure.part, 14]
+        for leader in np.unique(figure.part).tolist():
+            members = np.flatnonzero(figure.part == leader)
+            around = np.round(_reach(ends[:, members], radii[:, members], ends[:, leader]) * 256.0) / 256.0
+            data[:, members, 16:24] = _line(ends[:, leader], around)[:, None]
     return data
+
+
+def _line(ends: FloatArray, radii: FloatArray) -> FloatArray:
+    """Start and way, radius at the start and its growth, 1 / length squared and 1 / (2 mean radius): `(..., 8)`."""
+    way = ends[..., 1, :] - ends[..., 0, :]
+    length2 = way[..., 0] ** 2 + way[..., 1] ** 2
+    inverse = np.where(length2 > 1e-3, 1.0 / np.maximum(length2, 1e-3), 0.0)
+    form = [radii[..., 0], radii[..., 1] - radii[..., 0], inverse, 1.0 / (radii[..., 0] + radii[..., 1])]
+    line: FloatArray = np.concatenate([ends[..., 0, :], way, np.stack(form, axis=-1)], axis=-1)
+    return line
+
+
+def _reach(ends: FloatArray, radii: FloatArray, line: FloatArray) -> FloatArray:
+    """How far the capsules of a part reach from its line `(frames, 2, 2)`, by their first ends and by their second."""
+    start, way = line[:, None, None, 0], (line[:, 1] - line[:, 0])[:, None, None]
+    out = ends - start
+    share = np.clip(_dot(out, way) / np.maximum(_dot(way, way), 1e-3), 0.0, 1.0)
+    out = out - share[..., None] * way
+    reach: FloatArray = (np.sqrt(_dot(out, out)) + radii).max(axis=1)
+    return reach
 
 
 def _paint(figure: Figure) -> FloatArray:
@@ -177,7 +199,12 @@ def _boxes(ends: FloatArray, radii: FloatArray) -> NDArray[np.int64]:
 
 
 def paint_order(
-    ends: FloatArray, radii: FloatArray, nearness: FloatArray, thickness: FloatArray, meets: NDArray[np.bool_]
+    ends: FloatArray,
+    radii: FloatArray,
+    nearness: FloatArray,
+    thickness: FloatArray,
+    meets: NDArray[np.bool_],
+    parts: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """Capsules from the back to the front, `(frames, capsules)`.
 
@@ -194,11 +221,15 @@ def paint_order(
     meets : (capsules, capsules)
         Which capsules share a joint: at the joint neither is before the other, so it counts whose surface comes
         closer to the eye at its middle.
+    parts : (capsules,)
+        Capsules of one part look the same in any order; each is its own where None.
     """
     frames, count = ends.shape[:2]
     middle = nearness.sum(axis=2)
     behind = np.zeros((frames, count, count), dtype=bool)
     one, two = np.triu_indices(count, k=1)
+    if parts is not None:
+        one, two = one[parts[one] != parts[two]], two[parts[one] != parts[two]]
     apart = ~meets[one, two]
     near, far = one[~apart], two[~apart]
     surface = thickness - 2.0 / middle

@@ -7,6 +7,10 @@ flat in vec4 f_line;
 flat in vec4 f_body;
 flat in vec4 f_colour;
 flat in vec4 f_extra;
+#ifndef CHROMA
+flat in vec4 f_part_line;
+flat in vec4 f_part_body;
+#endif
 
 out vec4 painted;
 
@@ -34,14 +38,20 @@ void main() {
     painted = vec4(f_colour.yz, 0.0, cover);
 #else
     float cover = clamp(inside + 0.5, 0.0, 1.0) * f_colour.w;
-    // A soft light from above left: brighter where the surface faces it, darker towards the rim. Past a joint the
-    // surface counts as going straight on, so that two bones meet without a seam; a free end is round.
-    float round_end = on_line > 0.5 ? step(1.5, f_extra.z) : step(2.5, f_extra.z);
-    PRECISE vec2 straight_on = from_start - f_line.zw * on_line;
-    vec2 side = round_end > 0.5 ? out_of_axis : straight_on;
-    PRECISE float across = steep * 2.0;
+    // A soft light from above left: brighter where the surface faces it, darker towards the rim. It falls on the part that
+    // the capsule belongs to, so that what a part is put together from is not seen. Past a joint the surface counts as
+    // going straight on, so that two bones meet without a seam; a free end is round.
+    PRECISE vec2 from_part = pixel - f_part_line.xy;
+    PRECISE float on_part = (from_part.x * f_part_line.z + from_part.y * f_part_line.w) * f_part_body.z;
+    PRECISE float part_share = clamp(on_part, 0.0, 1.0);
+    PRECISE float part_radius = f_part_body.x + f_part_body.y * part_share;
+    float round_end = on_part > 0.5 ? step(1.5, f_extra.z) : step(2.5, f_extra.z);
+    PRECISE vec2 straight_on = from_part - f_part_line.zw * on_part;
+    PRECISE vec2 round_about = from_part - f_part_line.zw * part_share;
+    vec2 side = round_end > 0.5 ? round_about : straight_on;
+    PRECISE float across = f_part_body.w * (4.0 - 4.0 * part_radius * f_part_body.w);
     PRECISE float slope = (side.x * LIGHT_X + side.y * LIGHT_Y) * across;
-    PRECISE float rim = (side.x * side.x + side.y * side.y) * across * across;
+    PRECISE float rim = min((side.x * side.x + side.y * side.y) * across * across, 1.3);
     PRECISE float light = 1.0 + min(f_extra.z, 1.0) * (LIGHT_BASE + slope - rim * LIGHT_RIM);
     PRECISE float luma = (f_colour.x - BLACK) * light;
 #ifdef RGB

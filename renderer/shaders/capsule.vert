@@ -3,11 +3,19 @@ in vec4 line;    // start x, y; way to the end x, y
 in vec4 body;    // radius at the start, its growth, 1 / length squared, 1 / (2 mean radius)
 in vec4 colour;  // luma or red, ...; opacity
 in vec4 extra;   // shift x, y; shading; stretch of y
+#ifndef CHROMA
+in vec4 part_line;  // what it is lit along, as line and body
+in vec4 part_body;
+#endif
 
 flat out vec4 f_line;
 flat out vec4 f_body;
 flat out vec4 f_colour;
 flat out vec4 f_extra;
+#ifndef CHROMA
+flat out vec4 f_part_line;
+flat out vec4 f_part_body;
+#endif
 
 uniform vec2 scale;  // pixels to clip space
 uniform vec2 origin;
@@ -29,4 +37,8 @@ void main() {
     f_body = body;
     f_colour = colour;
     f_extra = extra;
+#ifndef CHROMA
+    f_part_line = part_line;
+    f_part_body = part_body;
+#endif
 }

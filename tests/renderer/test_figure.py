@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.capsules import Figure, place
+from renderer.capsules import Figure, outline, place
 from renderer.colour import nv12_to_rgb, to_rgb, to_ycbcr
 from renderer.errors import RendererError
 from renderer.figure import COLOURS, STYLES, make_figure
+from study.motion.clip import joint_positions
+from study.motion.drawing import figure_for
+from study.motion.library import open_library
 
 
 @pytest.mark.parametrize("style", STYLES)
@@ -42,7 +45,8 @@ def test_limbs_take_the_colour_of_their_side(puppet: Any, style: str) -> None:
             ("elbow", "wrist"),
         ):
             assert by_end[parts[f"{start}.{side}"], parts[f"{end}.{side}"]] == COLOURS[name]
-    assert by_end[parts["spine"], parts["chest"]] not in (COLOURS["left"], COLOURS["right"])
+    if style == "stick":
+        assert by_end[parts["spine"], parts["chest"]] not in (COLOURS["left"], COLOURS["right"])
 
 
 def seen_by(colour: tuple[int, ...], kind: str) -> np.ndarray:
@@ -96,13 +100,69 @@ def test_the_head_sits_on_its_joint_whatever_the_length_of_its_bone(puppet: Any)
 
 
 def test_the_nose_points_the_way_the_body_faces(puppet: Any) -> None:
+    """Of all that is drawn of the head, that ahead of its joint reaches furthest, by a nose's length."""
     figure = make_figure(puppet.bones, puppet.sides, puppet.parts, style="mannequin")
-    assert figure.forward is not None
-    nose = int(np.argmax(figure.forward[:, 0]))
     pose = puppet.walk(5)
-    assert (place(figure, pose)[:, nose, :, 2] > pose[:, None, puppet.parts["head"], 2] + 0.05).all()
-    turned = pose * [-1, 1, -1]
-    assert (place(figure, turned)[:, nose, :, 2] < turned[:, None, puppet.parts["head"], 2] - 0.05).all()
+    for turn in (1.0, -1.0):
+        turned = pose * [turn, 1, turn]
+        ends, radii = outline(figure, turned)
+        head = turned[:, puppet.parts["head"], :]
+        high = ends[..., 1] > head[:, None, 1] + 0.05
+        ahead = np.where(high, (ends[..., 2] - head[:, None, 2]) * turn + radii, -np.inf).max(axis=1)
+        behind = np.where(high, (head[:, None, 2] - ends[..., 2]) * turn + radii, -np.inf).max(axis=1)
+        assert (ahead > 0.10).all()
+        assert (ahead < 0.14).all()
+        assert (behind < ahead).all()
+
+
+def proportions(clip: np.ndarray, parts: dict[str, int], figure: Figure) -> dict[str, float]:
+    """What a tape would measure of a standing figure, as shares of its height, of balls along all of its capsules."""
+    placed = place(figure, clip)[0]
+    # Many balls along each capsule.
+    share = np.linspace(0, 1, 33)[:, None]
+    middles = (placed[:, None, 0] * (1 - share) + placed[:, None, 1] * share).reshape(-1, 3)
+    radii = (figure.radii[:, None, 0] * (1 - share[:, 0]) + figure.radii[:, None, 1] * share[:, 0]).reshape(-1)
+    low, high = (middles[:, 1] - radii).min(), (middles[:, 1] + radii).max()
+    height = high - low
+
+    def across(level: float, axis: int, near: float = np.inf) -> float:
+        """Extent along an axis of what crosses a height, no further than `near` from the middle of the body."""
+        half = radii**2 - (middles[:, 1] - level) ** 2
+        cut = (half > 0) & (np.abs(middles[:, 0] - clip[0, parts["pelvis"], 0]) < near)
+        reach = np.sqrt(np.maximum(half, 0))
+        return float((middles[cut, axis] + reach[cut]).max() - (middles[cut, axis] - reach[cut]).min())
+
+    joints = clip[0]
+    hips = joints[[parts["hip.L"], parts["hip.R"]], 1].mean()
+    shoulders = joints[[parts["shoulder.L"], parts["shoulder.R"]], 1].mean()
+    chest = hips + 0.72 * (shoulders - hips)
+    heel_to_toe = middles[:, 1] < joints[parts["ankle.L"], 1]
+    left = heel_to_toe & (np.abs(middles[:, 0] - joints[parts["ankle.L"], 0]) < 0.06)
+    return {
+        "hip breadth": across(hips, 0, 0.2) / height,
+        "chest breadth": across(chest, 0, 0.13) / height,
+        "chest depth": across(chest, 2, 0.13) / height,
+        "shoulder breadth": across(shoulders - 0.02, 0) / height,
+        "foot": float(((middles[left, 2] + radii[left]).max() - (middles[left, 2] - radii[left]).min()) / height),
+        "head": float(high - joints[parts["head"], 1]) / height,
+    }
+
+
+def test_the_mannequin_is_as_wide_and_deep_as_people_are() -> None:
+    """Shares of stature: men of 1988 (Gordon et al. 1989) over their 1.756 m; the foot of Drillis and Contini (1966)."""
+    stands = open_library("synthetic").clip("stand", fps=30)
+    clip, skeleton = joint_positions(stands, ends=True)[:1], stands.skeleton
+    figure = figure_for(skeleton, "mannequin")
+    found = proportions(clip, dict(skeleton.roles), figure)
+    published = {
+        "hip breadth": 0.342 / 1.756,
+        "chest breadth": 0.322 / 1.756,
+        "chest depth": 0.243 / 1.756,
+        "shoulder breadth": 0.492 / 1.756,
+        "foot": 0.152,
+    }
+    for what, share in published.items():
+        assert 0.80 * share < found[what] < 1.10 * share, (what, found[what], share)
 
 
 @pytest.mark.parametrize(

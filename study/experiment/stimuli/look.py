@@ -159,6 +159,7 @@ def _content_hash(fps: float, positions: FloatArray, figure: Figure, camera: Cam
     digest = hashlib.sha256(f"look {LOOK_VERSION}; {fps:g} fps; {camera.size}; {figure.style}; ".encode())
     floor = "" if figure.floor_m is None else f"{figure.floor_m}, fading"
     digest.update(f"{figure.background}; {figure.lit}; {floor}; {camera.track_seconds}; ".encode())
+    digest.update(f"{figure.anchors}; {figure.part}; {figure.lift}; ".encode())
     digest.update(np.round(positions * 1e4).astype("<i4").tobytes())
     for array in (figure.ends, figure.along, figure.beyond, figure.radii, figure.colours):
         digest.update(np.round(np.asarray(array, dtype=np.float64) * 1e6).astype("<i8").tobytes())
