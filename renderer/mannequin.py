@@ -3,7 +3,9 @@
 Lengths between joints are the rig's own. What lies around them is in proportion to stature: breadths, depths and girths
 of the body are those of people (men of the 1988 survey of the US Army: Gordon et al. 1989, Natick/TR-89/044; lengths
 of segments: Drillis and Contini 1966, as in Winter, *Biomechanics and Motor Control of Human Movement*, Figure 4.1),
-made a little slimmer. Each limb and the trunk are put together from several capsules that are lit as one surface.
+made a little slimmer. Each limb and the trunk are put together from several capsules that are lit as one surface. The
+limbs begin in the trunk's colour, as under a shirt and shorts: whether a limb is painted before or behind the trunk can
+change from one frame to the next, and is then hardly seen.
 
 Positions say neither where a head looks nor how a hand is turned: the face follows the shoulders, hands have no thumb.
 """
@@ -109,6 +111,8 @@ class _Maker:
         upper = self.add(shoulder, elbow, (0.050, 0.037), colour, lift=0.04)
         middle = self.at((shoulder, 0.58), (elbow, 0.42))
         self.chain((shoulder, middle, elbow), (0.057, 0.050, 0.038), colour, upper, 0.04)
+        sleeve = self.at((shoulder, 0.66), (elbow, 0.34))
+        self.add(shoulder, sleeve, (0.059, 0.055), self.paint["centre"], part=upper, lift=0.04)
         wrist = parts.get(f"wrist.{side}", self.body.tip_of(elbow))
         if wrist == elbow:
             return
@@ -124,8 +128,10 @@ class _Maker:
         """Thigh, shank and a foot with a heel."""
         parts = self.body.parts
         hip, knee, ankle = (parts[f"{part}.{side}"] for part in ("hip", "knee", "ankle"))
-        thigh = self.add(hip, knee, (0.080, 0.052), colour, lift=-0.04)
-        self.chain((hip, self.at((hip, 0.60), (knee, 0.40)), knee), (0.084, 0.075, 0.053), colour, thigh, -0.04)
+        thigh = self.add(hip, knee, (0.080, 0.052), colour, lift=-0.06)
+        self.chain((hip, self.at((hip, 0.60), (knee, 0.40)), knee), (0.084, 0.075, 0.053), colour, thigh, -0.06)
+        shorts = self.at((hip, 0.70), (knee, 0.30))
+        self.add(hip, shorts, (0.087, 0.083), self.paint["centre"], part=thigh, lift=-0.06)
         shank = self.add(knee, ankle, (0.052, 0.036), colour)
         calf = self.at((knee, 0.74), (ankle, 0.26), hips_forward=-0.012)
         shin = self.at((knee, 0.36), (ankle, 0.64), hips_forward=-0.004)

@@ -222,29 +222,39 @@ def paint_order(
         Which capsules share a joint: at the joint neither is before the other, so it counts whose surface comes
         closer to the eye at its middle.
     parts : (capsules,)
-        Capsules of one part look the same in any order; each is its own where None.
+        The capsule that leads the part of which each is one; each is a part of its own where None. A part is painted as
+        a whole: of all places where two parts cross, that counts where they are furthest apart.
     """
     frames, count = ends.shape[:2]
-    middle = nearness.sum(axis=2)
-    behind = np.zeros((frames, count, count), dtype=bool)
-    one, two = np.triu_indices(count, k=1)
-    if parts is not None:
-        one, two = one[parts[one] != parts[two]], two[parts[one] != parts[two]]
-    apart = ~meets[one, two]
-    near, far = one[~apart], two[~apart]
-    surface = thickness - 2.0 / middle
+    leaders, part = np.unique(np.arange(count) if parts is None else parts, return_inverse=True)
+    middle = np.stack([nearness[:, part == i].sum(axis=2).mean(axis=1) for i in range(len(leaders))], axis=1)
+    lead = nearness[:, leaders].sum(axis=2)
+    joined_parts = meets[np.ix_(leaders, leaders)]
+    behind = np.zeros((frames, len(leaders), len(leaders)), dtype=bool)
+    near, far = np.nonzero(np.triu(joined_parts, k=1))
+    surface = thickness[leaders] - 2.0 / lead
     behind[:, near, far] = surface[:, far] >= surface[:, near]
     behind[:, far, near] = ~behind[:, near, far]
+    one, two = np.triu_indices(count, k=1)
+    apart = (part[one] != part[two]) & ~joined_parts[part[one], part[two]]
     one, two = one[apart], two[apart]
     frame, pair = np.nonzero(_boxes_overlap(ends, radii, one, two))
     one, two = one[pair], two[pair]
     s, t, gap = nearest_on_screen(ends[frame, one], ends[frame, two])
     ahead = _between(nearness[frame, two], t) - _between(nearness[frame, one], s)
-    ahead = np.where(ahead == 0.0, middle[frame, two] - middle[frame, one], ahead)
+    sums = nearness.sum(axis=2)
+    ahead = np.where(ahead == 0.0, sums[frame, two] - sums[frame, one], ahead)
     touch = gap < radii[frame, one].max(axis=1) + radii[frame, two].max(axis=1) + 2.0
-    behind[frame, one, two] = touch & (ahead >= 0.0)
-    behind[frame, two, one] = touch & (ahead < 0.0)
-    return _topological(behind, middle)
+    frame, ahead, low, high = frame[touch], ahead[touch], part[one[touch]], part[two[touch]]
+    most = np.full(behind.shape, -np.inf)
+    np.maximum.at(most, (frame, low, high), ahead)
+    np.maximum.at(most, (frame, high, low), -ahead)
+    other = most.transpose(0, 2, 1)
+    later = np.triu(np.ones(behind.shape[1:], dtype=bool))
+    behind |= (most > other) | ((most == other) & np.isfinite(most) & later)
+    ranks = np.argsort(_topological(behind, middle), axis=1)
+    order: NDArray[np.int64] = np.argsort(ranks[:, part] * count + np.arange(count), axis=1)
+    return order
 
 
 def _between(ends: FloatArray, share: FloatArray) -> FloatArray:

@@ -149,7 +149,7 @@ def proportions(clip: np.ndarray, parts: dict[str, int], figure: Figure) -> dict
 
 
 def test_the_mannequin_is_as_wide_and_deep_as_people_are() -> None:
-    """Shares of stature: men of 1988 (Gordon et al. 1989) over their 1.756 m; the foot of Drillis and Contini (1966)."""
+    """Shares of stature: men of 1988 (Gordon et al. 1989) over their 1.756 m; the foot, Drillis and Contini (1966)."""
     stands = open_library("synthetic").clip("stand", fps=30)
     clip, skeleton = joint_positions(stands, ends=True)[:1], stands.skeleton
     figure = figure_for(skeleton, "mannequin")
