@@ -54,6 +54,10 @@ class _Maker:
         """A capsule between two points."""
         return self.made.add((start, end), self.body.scaled(radii), colour, **more)  # type: ignore[arg-type]
 
+    def line(self, start: int, end: int, colour: RGB, lift: float = 0.0) -> int:
+        """What the capsules of a part are lit along: a thin line within it, which nobody sees."""
+        return self.add(start, end, (0.004, 0.004), colour, lift=lift)
+
     def chain(
         self, points: tuple[int, ...], radii: tuple[float, ...], colour: RGB, part: int, lift: float = 0.0
     ) -> None:
@@ -64,9 +68,8 @@ class _Maker:
     def trunk(self) -> None:
         """Hips, waist, chest and shoulders."""
         colour = self.paint["centre"]
-        bottom, belly = self.at(self.low, up=-0.050, hips_forward=-0.006), self.at(self.low, up=0.075)
-        trunk = self.trunk_part = self.add(bottom, self.at(self.high, up=0.010), (0.072, 0.070), colour)
-        self.chain((belly, self.at((self.low, 0.27), (self.high, 0.73))), (0.094, 0.104), colour, trunk)
+        bottom = self.at(self.low, up=-0.050, hips_forward=-0.006)
+        trunk = self.trunk_part = self.line(bottom, self.at(self.high, up=0.010), colour)
         for s, side in ((1.0, "L"), (-1.0, "R")):
             thigh = self.at(self.low, hips_left=0.056 * s, up=-0.052, hips_forward=-0.004)
             hip = self.at(self.low, hips_left=0.062 * s, up=0.010, hips_forward=-0.014)
@@ -108,7 +111,7 @@ class _Maker:
         """Upper arm, forearm and a hand with its fingers together."""
         parts = self.body.parts
         shoulder, elbow = parts[f"shoulder.{side}"], parts[f"elbow.{side}"]
-        upper = self.add(shoulder, elbow, (0.050, 0.037), colour, lift=0.04)
+        upper = self.line(shoulder, elbow, colour, 0.04)
         middle = self.at((shoulder, 0.58), (elbow, 0.42))
         self.chain((shoulder, middle, elbow), (0.057, 0.050, 0.038), colour, upper, 0.04)
         sleeve = self.at((shoulder, 0.66), (elbow, 0.34))
@@ -116,7 +119,7 @@ class _Maker:
         wrist = parts.get(f"wrist.{side}", self.body.tip_of(elbow))
         if wrist == elbow:
             return
-        fore = self.add(elbow, wrist, (0.037, 0.026), colour, lift=0.02)
+        fore = self.line(elbow, wrist, colour, 0.02)
         self.chain((elbow, self.at((elbow, 0.74), (wrist, 0.26)), wrist), (0.038, 0.043, 0.026), colour, fore, 0.02)
         tip = self.body.tip_of(wrist)
         self.hand = Way(wrist, tip, Way(elbow, wrist)) if tip != wrist else Way(elbow, wrist)
@@ -128,11 +131,11 @@ class _Maker:
         """Thigh, shank and a foot with a heel."""
         parts = self.body.parts
         hip, knee, ankle = (parts[f"{part}.{side}"] for part in ("hip", "knee", "ankle"))
-        thigh = self.add(hip, knee, (0.080, 0.052), colour, lift=-0.06)
+        thigh = self.line(hip, knee, colour, -0.06)
         self.chain((hip, self.at((hip, 0.60), (knee, 0.40)), knee), (0.084, 0.075, 0.053), colour, thigh, -0.06)
         shorts = self.at((hip, 0.70), (knee, 0.30))
         self.add(hip, shorts, (0.087, 0.083), self.paint["centre"], part=thigh, lift=-0.06)
-        shank = self.add(knee, ankle, (0.052, 0.036), colour)
+        shank = self.line(knee, ankle, colour)
         calf = self.at((knee, 0.74), (ankle, 0.26), hips_forward=-0.012)
         shin = self.at((knee, 0.36), (ankle, 0.64), hips_forward=-0.004)
         self.chain((knee, calf, shin, ankle), (0.052, 0.056, 0.043, 0.036), colour, shank)
