@@ -55,8 +55,6 @@ class Camera:
     turns : (2, coefficients)
         Where given, it turns while the film lasts: polynomials, constant first, in the seconds since the film began, of
         what is added to the yaw and to the elevation of `axes`, radians.
-    fill_share
-        The share of the frame's width or height, whichever is the larger, that the motion it was made for takes.
     """
 
     eye: FloatArray
@@ -64,7 +62,6 @@ class Camera:
     focal_pixels: float
     size: tuple[int, int]
     track_seconds: float | None = None
-    fill_share: float | None = None
     turns: FloatArray | None = None
 
     def __post_init__(self) -> None:

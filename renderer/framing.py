@@ -27,8 +27,9 @@ from renderer.camera import (
 from renderer.capsules import Figure, outline
 from renderer.errors import RendererError
 
-FILLS = {"fixed": 0.86, "pan": 0.94, "track": 0.86}
-"""The share of the frame that a group takes at most. Under `pan` it is reached for a moment, elsewhere all the time."""
+FILLS = {"fixed": (0.86, 0.86), "pan": (0.80, 0.90), "track": (0.86, 0.86)}
+"""The shares of the frame's width and height that a group takes at most. A panning camera leaves room at the sides, so
+that the figure stays near the middle."""
 
 PAN_ORDER = 2
 """Of the polynomials by which a panning camera turns."""
@@ -64,8 +65,8 @@ def frame_group(
     view
         `"front"`, `"side"` or `"three-quarter"`, relative to the way the group travels; or radians from the front.
     fill
-        The share of the frame, across or up, that the group's motion takes at most; reached in one of the two. By
-        default that of `FILLS`.
+        The share of the frame, across and up, that the group's motion takes at most; reached in one of the two. By
+        default those of `FILLS`.
     elevation
         Radians by which the camera looks down.
     field_of_view
@@ -88,8 +89,8 @@ def frame_group(
         raise RendererError("Expected at least one clip to frame, got none.")
     if camera not in CAMERAS:
         raise RendererError(f"Expected a camera of {', '.join(CAMERAS)}, got {camera!r}.")
-    share = FILLS[camera] if fill is None else fill
-    if not 0.05 <= share <= 1.0:
+    shares = FILLS[camera] if fill is None else (fill, fill)
+    if not 0.05 <= min(shares) <= max(shares) <= 1.0:
         raise RendererError(f"Expected a fill share from 0.05 to 1, got {fill}.")
     if not 0.02 <= field_of_view <= 2.5:
         raise RendererError(f"Expected a field of view from 0.02 to 2.5 radians, got {field_of_view}.")
@@ -101,8 +102,8 @@ def frame_group(
         outlines = [outline(figure, clip) for figure, clip in zip(figures, group, strict=True)]
         group, radii = [ends for ends, _ in outlines], [radius for _, radius in outlines]
     if camera == "pan":
-        return _panning(group, radii, size, yaw, elevation, share, fps)
-    still = _still(group, radii, size, view_axes(yaw, elevation), share, field_of_view)
+        return _panning(group, radii, size, yaw, elevation, shares, fps)
+    still = _still(group, radii, size, view_axes(yaw, elevation), shares, field_of_view)
     return replace(still, track_seconds=track_seconds) if camera == "track" else still
 
 
@@ -111,7 +112,7 @@ def _still(
     radii: Sequence[FloatArray | float],
     size: tuple[int, int],
     axes: FloatArray,
-    fill: float,
+    fills: tuple[float, float],
     field_of_view: float,
 ) -> Camera:
     """The closest eye that sees all points of a group, which has a closed form.
@@ -128,7 +129,7 @@ def _still(
     eye = np.zeros(3)
     distances = []
     for axis in (0, 1):
-        tangent = fill * 0.5 * size[axis] / focal
+        tangent = fills[axis] * 0.5 * size[axis] / focal
         reach = padding * np.sqrt(1.0 + tangent * tangent)
         right = np.max(seen[:, axis] + tangent * seen[:, 2] + reach)
         left = np.max(-seen[:, axis] + tangent * seen[:, 2] + reach)
@@ -136,7 +137,7 @@ def _still(
         eye[axis] = 0.5 * (right - left)
     # Never closer than half a metre before the nearest point, whatever the lens.
     eye[2] = max(*distances, float((seen[:, 2] + padding).max()) + 0.5)
-    return Camera(_turned_back(eye, axes), axes, float(focal), size, None, float(fill))
+    return Camera(_turned_back(eye, axes), axes, float(focal), size)
 
 
 def _panning(
@@ -145,7 +146,7 @@ def _panning(
     size: tuple[int, int],
     yaw: float,
     elevation: float,
-    fill: float,
+    fills: tuple[float, float],
     fps: float,
 ) -> Camera:
     """A camera far away that turns by the group's common path, with the longest lens that sees everything."""
@@ -160,13 +161,13 @@ def _panning(
     bearing, height = np.arctan2(right, -back), np.arctan2(up, np.hypot(right, back))
     # Rounded well below what moves a pixel: a solver's last digits differ between machines.
     turns = np.round([_polynomial(seconds, -bearing), _polynomial(seconds, -height - elevation)], 10)
-    camera = Camera(eye, axes, 1.0, size, None, fill, turns)
+    camera = Camera(eye, axes, 1.0, size, turns=turns)
     low, high = _slopes(camera, group, radii, fps)
     # As much room above as below: what reaches up for a moment would else leave some unused at the feet.
     turns[1, 0] -= np.round(0.5 * (np.arctan(low[1]) + np.arctan(high[1])), 10)
     camera = replace(camera, turns=turns)
     low, high = _slopes(camera, group, radii, fps)
-    focal = fill * 0.5 * np.array(size) / np.maximum(np.maximum(high, -low), 1e-3)
+    focal = np.array(fills) * 0.5 * np.array(size) / np.maximum(np.maximum(high, -low), 1e-3)
     return replace(camera, focal_pixels=float(focal.min()))
 
 

@@ -70,7 +70,6 @@ def test_the_group_fills_the_stated_share(seed: int) -> None:
     if extent > 0.5:  # a smaller group would be closer than half a metre to the eye
         assert share.max() == pytest.approx(0.8, abs=1e-9)
     assert share.max() <= 0.8 + 1e-9
-    assert camera.fill_share == 0.8
 
 
 def test_named_views_see_a_walker_as_they_are_called() -> None:
