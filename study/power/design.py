@@ -8,23 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from study.analysis.analyse import Analysis
 from study.analysis.exclusions import Rules, exclude
+from study.experiment.plan import Plan
+from study.experiment.protocol.whole import Protocol, StudySpec
 from study.power.curve import PowerPoint, Run
 from study.tasks.observer import ObserverSettings
 from study.tasks.registry import task_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.analyse import Analysis
-    from study.experiment.plan import Plan
-    from study.experiment.protocol.whole import Protocol, StudySpec
-    from study.tasks.trial import Trial
+from study.tasks.trial import Trial
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -155,7 +151,6 @@ def kept_of(design: Design, rng: np.random.Generator, response_s: FloatArray, gi
     """Return which answers the analysis counts: those given, and not excluded by the protocol's rules."""
     if design.rules == Rules():
         return given
-    import pandas as pd
 
     studies, people, trials = given.shape
     who = np.repeat(np.arange(studies * people), trials)
@@ -174,8 +169,6 @@ def kept_of(design: Design, rng: np.random.Generator, response_s: FloatArray, gi
 
 def _checks(design: Design, rng: np.random.Generator, studies: int, people: int) -> pd.DataFrame:
     """Answers to attention checks: right wherever they were given in time."""
-    import pandas as pd
-
     count = len(design.trials("check")[0])
     _, given = times(design, rng, np.ones((studies, people, count)))
     who = np.repeat(np.arange(studies * people), count)

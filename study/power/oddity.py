@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from study.analysis.analyse import Analysis
 from study.analysis.oddity.analyse import SIGNS, Oddity
 from study.analysis.psychometric.analyse import typical_threshold
 from study.analysis.psychometric.mixed import TypicalThreshold
 from study.analysis.psychometric.model import make_model
+from study.experiment.protocol.studies import AnalysisSettings
+from study.experiment.protocol.whole import StudySpec
 from study.models.oddity import CHANCE, HALFWAY, d_prime_of
 from study.models.population import probability_odd_found
 from study.power.curve import Run
 from study.power.design import Design, Effect, FloatArray
 from study.power.same_different import level_study
 from study.tasks.observer import ObserverSettings, default_observer
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
-    from study.experiment.protocol.studies import AnalysisSettings
-    from study.experiment.protocol.whole import StudySpec
 
 
 def oddity_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:

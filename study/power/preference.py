@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.special import expit
 
+from study.analysis.analyse import Analysis
 from study.analysis.preference.analyse import Preference
 from study.analysis.preference.participants import default_p_values
 from study.errors import AnalysisError
+from study.experiment.protocol.studies import AnalysisSettings
+from study.experiment.protocol.whole import StudySpec
 from study.models.choice import PreferenceObserver
 from study.power.curve import Run
 from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
 from study.tasks.observer import ObserverSettings, default_observer
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
-    from study.experiment.protocol.studies import AnalysisSettings
-    from study.experiment.protocol.whole import StudySpec
 
 
 def preference_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
@@ -76,8 +75,6 @@ def logit_normal(share: float, correlation: float, order_bias: float = 0.0) -> t
         raise AnalysisError(
             f"expected a share between 0 and 1 and a correlation from 0 to 0.9, found {share:g} and {correlation:g}"
         )
-    from scipy.optimize import brentq
-    from scipy.special import expit
 
     points, weights = np.polynomial.hermite_e.hermegauss(61)
     weights = weights / weights.sum()
@@ -106,7 +103,6 @@ def preference_study(design: Design, alpha: float, share: float) -> Run:
     lean = typical.utility[design.study.reference] - typical.utility.get(design.study.comparison or "", 0.0)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
-        from scipy.special import expit
 
         people = max(sizes)
         own = lean + typical.participant_sd * rng.standard_normal((studies, people, 1))

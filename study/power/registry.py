@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 from study.errors import AnalysisError
+from study.experiment.protocol.studies import AnalysisSettings
+from study.experiment.protocol.whole import StudySpec
 from study.power.design import Effect
 from study.power.oddity import oddity_effect
 from study.power.preference import preference_effect
 from study.power.ratings import rating_effect
 from study.power.same_different import same_different_effect
 from study.power.staircases import staircase_effect
-
-if TYPE_CHECKING:
-    from study.experiment.protocol.studies import AnalysisSettings
-    from study.experiment.protocol.whole import StudySpec
 
 Make = Callable[["StudySpec", Mapping[str, float], "AnalysisSettings"], Effect]
 """From a study, the numbers of its effect by name, and what was decided about the analysis."""

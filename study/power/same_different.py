@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from study.analysis.analyse import Analysis
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import Counts
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.experiment.observers import person
+from study.experiment.protocol.studies import AnalysisSettings
+from study.experiment.protocol.whole import StudySpec
 from study.models.population import SameDifferentObserver, probability_different
 from study.power.curve import Run
 from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
 from study.tasks.observer import ObserverSettings, default_observer
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
-    from study.experiment.protocol.studies import AnalysisSettings
-    from study.experiment.protocol.whole import StudySpec
 
 
 def same_different_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:

@@ -5,21 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from study.analysis.analyse import Analysis, analyse_folder
 from study.experiment.observers import person, respond
+from study.experiment.plan import Plan
+from study.experiment.session import open_session, walk
 from study.power.curve import Run
 from study.power.design import BoolArray, Design
 from study.tasks.registry import answer_columns
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.experiment.plan import Plan
-    from study.tasks.trial import Trial
+from study.tasks.trial import Trial
 
 
 def whole_sessions(design: Design, found: Callable[[Analysis], bool]) -> Run:
@@ -28,7 +25,6 @@ def whole_sessions(design: Design, found: Callable[[Analysis], bool]) -> Run:
     Each participant goes through a whole session, each study through the whole analysis; `found` says whether that
     found what there is.
     """
-    import pandas as pd
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
         verdicts = np.zeros((studies, len(sizes)), dtype=bool)
@@ -47,10 +43,6 @@ def whole_sessions(design: Design, found: Callable[[Analysis], bool]) -> Run:
 
 def _session(design: Design, plan: Plan, seed: int) -> pd.DataFrame:
     """A simulated participant's answers to the study, through the session that real front ends run."""
-    import pandas as pd
-
-    from study.experiment.session import open_session, walk
-
     who = person(design.settings, plan.participant, seed)
     own = _renumbered([trial for trial in plan.trials if trial.study == design.study.name])
     courses = tuple(replace(course, first=len(own) + 1) for course in plan.courses if course.study == design.study.name)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from study.analysis.analyse import Analysis
 from study.analysis.exclusions import exclude
 from study.analysis.oddity.analyse import Oddity
 from study.analysis.same_different.analyse import SameDifferent
@@ -20,6 +20,8 @@ from study.analysis.same_different.staircases import SIGNS, Staircases, staircas
 from study.errors import AnalysisError
 from study.experiment.observers import person
 from study.experiment.procedures.staircase import Staircase
+from study.experiment.protocol.studies import AnalysisSettings
+from study.experiment.protocol.whole import StudySpec
 from study.models.oddity import CHANCE
 from study.models.population import SameDifferentObserver, probability_different, probability_odd_found
 from study.models.up_down import Track, moved, stopped
@@ -28,11 +30,6 @@ from study.power.design import BoolArray, Design, Effect, FloatArray, times
 from study.power.oddity import oddity_observer
 from study.power.same_different import same_different_observer
 from study.tasks.observer import ObserverSettings
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
-    from study.experiment.protocol.studies import AnalysisSettings
-    from study.experiment.protocol.whole import StudySpec
 
 OBSERVERS: Mapping[str, Callable[[float, float, float, float], ObserverSettings]] = {
     "same-different": same_different_observer,

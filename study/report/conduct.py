@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+import pandas as pd
+
+from study.analysis.analyse import Analysis, Results
+from study.analysis.quality import Quality
 from study.counting import counted, noun
 from study.report import tables
 from study.report.drawing import BLUE, FAINT, ORANGE, add_mark, new_figure, quiet_grid, style, to_svg
 from study.report.sections.registry import SECTIONS
 from study.report.sections.section import MainResult
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.analyse import Analysis, Results
-    from study.analysis.quality import Quality
 
 LONGEST_GAP_FRAMES = 1.5
 """A longer time between two frames is a display failure. [frames]"""
@@ -53,8 +52,6 @@ def presentation_table(presentations: pd.DataFrame) -> tables.Table:
 
 def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> str | None:
     """Draw the longest gap of every presentation; None where none was measured."""
-    import numpy as np
-
     gaps = presentations["longest_gap_frames"].dropna().to_numpy(dtype=np.float64)
     if not len(gaps):
         return None

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from typing import TYPE_CHECKING
 
+import numpy as np
+import scipy
+
+import study
+from study.analysis.quality import Quality
 from study.counting import counted
 from study.report import words
-
-if TYPE_CHECKING:
-    from study.analysis.quality import Quality
-    from study.report.material import Material
+from study.report.material import Material
 
 
 def who(quality: Quality) -> str:
@@ -73,11 +74,6 @@ def shown_sentence(material: Material) -> str:
 
 def versions(material: Material) -> tuple[tuple[str, str], ...]:
     """Return versions and hashes: of this program, of what made the stimuli, and of what was analysed."""
-    import numpy as np
-    import scipy
-
-    import study
-
     table = hashlib.sha256(material.answers.to_csv(index=False).encode()).hexdigest()
     rows = [
         ("report by Segue", study.__version__),

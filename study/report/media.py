@@ -14,17 +14,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.counting import counted
 from study.errors import StimulusError
-
-if TYPE_CHECKING:
-    from study.experiment.stimuli.manifest import Manifest
-    from study.experiment.stimuli.stimulus import StimulusRecord
+from study.experiment.stimuli.manifest import Manifest, read_manifest
+from study.experiment.stimuli.stimulus import StimulusRecord
 
 MOST_VIDEO_BYTES = 1_800_000
 MOST_STRIPS = 12
@@ -90,8 +88,6 @@ _BESIDE = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); import study
 
 def tell(folder: str) -> None:
     """Print the pictures of a results folder as JSON: what the process of `embedding` does."""
-    from study.experiment.stimuli.manifest import read_manifest
-
     json.dump(asdict(embed(read_manifest(folder))), sys.stdout)
 
 

@@ -5,22 +5,19 @@ Each sentence follows from what was run; methods that were not used are neither 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import pandas as pd
 
+import study
+from study.analysis.analyse import Analysis
 from study.counting import counted
+from study.experiment.protocol.whole import Protocol, StudySpec
+from study.experiment.stimuli.manifest import Manifest
 from study.report import words
 from study.report.sections.registry import SECTIONS
 from study.tasks.registry import task_of
 from study.transitions.methods.makes.blends import Blending
+from study.transitions.methods.method import Method
 from study.transitions.methods.registry import METHODS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.analyse import Analysis
-    from study.experiment.protocol.whole import Protocol, StudySpec
-    from study.experiment.stimuli.manifest import Manifest
-    from study.transitions.methods.method import Method
 
 ORDERS = {
     "both": "Each pair was shown in both orders",
@@ -214,7 +211,6 @@ def _excluded(analysis: Analysis) -> str:
 
 
 def _software(protocol: Protocol) -> str:
-    import study
 
     return (
         f"Stimuli, sessions and analysis were made with Segue {study.__version__}, under the protocol {protocol.name} "

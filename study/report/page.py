@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from study.analysis.analyse import Analysis
 from study.counting import counted
 from study.report import conduct, course, facts, methods, power, shortcuts, stimuli, words
 from study.report.material import Material
@@ -14,9 +14,6 @@ from study.report.sections.preference.section import confirmatory_table
 from study.report.sections.registry import SECTIONS
 from study.report.sections.section import About, Drawing, Headline, Section, readings_table
 from study.report.tables import Table
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from study.experiment.stimuli.manifest import Manifest
+from study.experiment.stimuli.stimulus import MotionUse
 from study.report import tables, words
 from study.report.tables import Table
-
-if TYPE_CHECKING:
-    from study.experiment.stimuli.manifest import Manifest
-    from study.experiment.stimuli.stimulus import MotionUse
 
 
 def stimulus_table(manifest: Manifest) -> Table:

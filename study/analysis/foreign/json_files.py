@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from study.errors import AnalysisError
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 HOLDERS = ("trials", "data", "results")
 
@@ -36,8 +35,6 @@ def parse_json(text: str) -> pd.DataFrame:
     AnalysisError
         When the text is not JSON, or holds no trials.
     """
-    import pandas as pd
-
     trials = [trial for value in _values(text) for trial in _trials(value)]
     if not trials:
         raise AnalysisError(

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
+
+import pandas as pd
 
 from study.analysis import estimates
 from study.analysis.psychometric.analyse import PsychometricStudy, analyse_psychometric
 from study.analysis.psychometric.model import make_model
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
+from study.analysis.study_result import Settings
 from study.models.oddity import CHANCE, d_prime_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.study_result import Settings
 
 Side = Literal["shorter", "longer"]
 SIGNS: Mapping[Side, int] = {"shorter": -1, "longer": 1}

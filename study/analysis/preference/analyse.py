@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+import pandas as pd
 
 from study.analysis import estimates
 from study.analysis.estimates import NotFitted
@@ -23,12 +24,8 @@ from study.analysis.preference.no_effect import MARGIN, NoEffect, no_preference
 from study.analysis.preference.order import ONE_ORDER, OrderEffect, order_effect
 from study.analysis.preference.participants import ParticipantTests, participant_tests
 from study.analysis.preference.published import MotionPreference, Published, by_motion, without_ties
+from study.analysis.study_result import Settings
 from study.counting import counted
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.study_result import Settings
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import pandas as pd
 
 from study.analysis import estimates
 from study.errors import AnalysisError
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _TRUTH = {"true": "1", "false": "0"}
 NEEDED_COLUMNS = ("participant", "chose_a", "method_a", "method_b")
@@ -22,8 +19,6 @@ def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
     AnalysisError
         When a column is missing, or `chose_a` holds anything else.
     """
-    import pandas as pd
-
     estimates.check_columns(answers, NEEDED_COLUMNS, "a preference analysis")
     chosen = answers[answers["task"] == "preference"] if "task" in answers.columns else answers
     given = chosen[chosen["chose_a"].notna()].copy()

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from study.analysis.preference.participants import participant_tests
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 ONE_ORDER = "the two were always shown in the same order: a preference cannot be separated from an effect of order"
 

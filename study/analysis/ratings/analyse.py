@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
+
+import pandas as pd
 
 from study.analysis.ratings.answers import of_pairs
 from study.analysis.ratings.comparisons import MethodDifference, Question, rating_anova
 from study.analysis.ratings.pairs import PairQuestion, pair_ratings, pair_sentences
 from study.analysis.ratings.table import CellRating, MethodRating, rating_cells, rating_table
+from study.analysis.study_result import Settings
 from study.counting import counted
 from study.errors import AnalysisError
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.study_result import Settings
 
 
 @dataclass(frozen=True)

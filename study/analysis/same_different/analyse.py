@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from study.analysis import estimates
@@ -32,11 +33,7 @@ from study.analysis.same_different.motions import AcrossMotions, across_motions
 from study.analysis.same_different.order import OrderShare, OrderTest, order_test, shares_by_order
 from study.analysis.same_different.profiles import profile_intervals
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.study_result import Settings
+from study.analysis.study_result import Settings
 
 
 @dataclass(frozen=True)

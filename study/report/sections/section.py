@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+import pandas as pd
+
+from study.analysis.analyse import Analysis, Data
 from study.report import tables
 from study.report.tables import Table
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.analyse import Analysis, Data
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING
 
+import pandas as pd
+
+from study.analysis.analyse import Analysis
 from study.analysis.oddity.analyse import SIGNS, Oddity, SideThreshold
 from study.counting import counted
 from study.models.oddity import CHANCE, HALFWAY
@@ -14,11 +16,6 @@ from study.report.references import MACMILLAN_2005
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.report.tables import Table
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.analysis.analyse import Analysis
 
 
 def oddity_section(result: Oddity, about: About) -> Section | None:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from study.analysis.analyse import Analysis
 from study.analysis.ratings.analyse import PairRatings
 from study.analysis.ratings.pairs import AllAnswers, PairQuestion, ScoreTest
 from study.counting import counted
@@ -17,9 +17,6 @@ from study.report.sections.pair_ratings.figures import likert_figure
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.tables import Table
 from study.transitions.methods.method import WANG_2003
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
 
 
 def pair_ratings_section(result: PairRatings, about: About) -> Section | None:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from study.analysis.analyse import Analysis
 from study.analysis.confirmatory import ConfirmatoryTest
 from study.analysis.estimates import Interval
 from study.analysis.preference.analyse import Comparison, Preference
@@ -28,9 +29,6 @@ from study.report.references import (
 from study.report.sections.preference.figures import preference_figure
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.tables import Table
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
 
 
 def preference_section(result: Preference, about: About) -> Section | None:

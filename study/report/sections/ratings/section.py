@@ -7,8 +7,9 @@ difference between the methods, the mixed design, ranks, and an ordinal model.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from study.analysis.analyse import Analysis
 from study.analysis.ratings.analyse import Ratings
 from study.analysis.ratings.comparisons import MethodDifference, Question
 from study.analysis.ratings.table import MeanRating, MethodRating
@@ -20,9 +21,6 @@ from study.report.sections.ratings import figures
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.tables import Table
 from study.transitions.methods.method import WANG_2003
-
-if TYPE_CHECKING:
-    from study.analysis.analyse import Analysis
 
 
 def ratings_section(result: Ratings, about: About) -> Section | None:
