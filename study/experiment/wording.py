@@ -11,13 +11,10 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from study.experiment.protocol.languages import words
+from study.experiment.protocol.whole import Protocol, StudySpec
 from study.tasks.registry import task_of
-
-if TYPE_CHECKING:
-    from study.experiment.protocol.whole import Protocol, StudySpec
 
 _ANSWER_S = 2.0
 _ITEM_S = 6.0

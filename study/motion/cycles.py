@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from study.counting import counted
 from study.errors import MotionError
 from study.motion.clip import Clip, joint_positions
+from study.motion.continuing import carry_on, linger
 from study.motion.feet import heading
 
 FloatArray = NDArray[np.float64]
@@ -170,8 +171,6 @@ def reversed_in_time(clip: Clip) -> Clip:
 
 def _continuation(clip: Clip, cycle: Cycle, frames: int) -> Clip:
     """The frames to add at the cycle's end of the clip, in the order in which they are shown."""
-    from study.motion.continuing import carry_on, linger
-
     forwards = clip if cycle.at == "end" else reversed_in_time(clip)
     if cycle.kind == "still":
         added = linger(forwards, cycle.period_frames, frames)

@@ -12,16 +12,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from study.errors import MotionError, MotionFileError
 from study.motion.clip import Clip, trim
 from study.motion.cmu import Boundary, IndexedMotion, Take, cmu_index
+from study.motion.defects import Defect, find_defects, told
+from study.motion.feet import faced, grounded
 from study.motion.library_file import FACTS, ClipTable, LibraryFile, absolute, composed, find_library_file, placed
+from study.motion.mending import mend
+from study.motion.mirror import mirror
 from study.motion.readers.registry import read_clip
-
-if TYPE_CHECKING:
-    from study.motion.defects import Defect
 
 
 @dataclass(frozen=True)
@@ -270,11 +271,6 @@ def prepared(entry: Entry, *, as_is: bool = False) -> Clip:
     MotionError
         Where the file can't be read, lacks the entry's frames, or is not usable for half of its length.
     """
-    from study.motion.defects import find_defects, told
-    from study.motion.feet import faced, grounded
-    from study.motion.mending import mend
-    from study.motion.mirror import mirror
-
     clip = read_entry(entry)
     if entry.trial:
         clip = clip.noting(f"CMU trial {entry.trial}, as {entry.name!r}")
@@ -310,8 +306,6 @@ def read_entry(entry: Entry) -> Clip:
 
 def _added_pose(clip: Clip, entry: Entry) -> tuple[Defect, ...]:
     """The T-pose that BVH conversions of CMU trials have in front; frames of the index count as in the original."""
-    from study.motion.defects import find_defects
-
     if not entry.trial or entry.file is None or entry.file.suffix.lower() != ".bvh":
         return ()
     return tuple(defect for defect in find_defects(clip) if defect.kind == "t-pose" and defect.frame_start == 0)

@@ -18,8 +18,10 @@ from math import ceil
 from pathlib import Path
 
 from study.errors import MotionError, MotionFileError
+from study.motion import synthetic
 from study.motion.clip import Clip, resample
 from study.motion.cmu import CMU_ACKNOWLEDGEMENT, CMU_SITE, Boundary, IndexedMotion, cmu_index, is_trial
+from study.motion.cycles import extend
 from study.motion.download import download_trial
 from study.motion.entries import (
     Entry,
@@ -34,6 +36,7 @@ from study.motion.entries import (
     prepared,
 )
 from study.motion.library_file import LibraryFile, absolute, composed, find_library_file, placed
+from study.motion.readers.other_formats import KNOWN, by_suffix
 from study.motion.readers.registry import SUFFIXES
 
 __all__ = ["CMU_ACKNOWLEDGEMENT", "Entry", "Library", "download_trial", "open_library"]
@@ -135,8 +138,6 @@ def _from_file(entry: Entry, fps: float | None, min_seconds: float | None, as_is
     """A captured motion from its file."""
     clip = prepared(entry, as_is=as_is)
     if min_seconds is not None and clip.seconds < min_seconds and entry.cyclic_end:
-        from study.motion.cycles import extend
-
         clip = extend(clip, frames_after=ceil(min_seconds * clip.fps) - clip.frames).clip
     return clip if fps is None else resample(clip, fps)
 
@@ -181,14 +182,12 @@ class SyntheticLibrary(Library):
     acknowledgement = "The motions are synthetic: a program generated them, nobody was captured."
 
     def names(self) -> tuple[str, ...]:
-        from study.motion import synthetic
 
         return tuple(synthetic.NAMES)
 
     def entry(self, name: str) -> Entry:
         if name not in self.names():
             raise MotionError(_unknown(name, self.names(), "the synthetic library"))
-        from study.motion import synthetic
 
         about = synthetic.describe(name)
         start: Boundary = "gait" if about.cyclic_start else ""
@@ -196,7 +195,6 @@ class SyntheticLibrary(Library):
         return Entry(name, about.kind, f"synthetic: {about.line}", start, end)
 
     def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
-        from study.motion import synthetic
 
         return synthetic.synthesize(entry.name, seconds=min_seconds, fps=30.0 if fps is None else fps)
 
@@ -353,8 +351,6 @@ def _motion_files(folder: Path, skipped: list[str]) -> Iterator[Path]:
 
 def _only_others(folder: Path) -> str:
     """What a folder without motion files holds instead, if it is motion in another format."""
-    from study.motion.readers.other_formats import KNOWN, by_suffix
-
     others = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KNOWN)
     return str(by_suffix(others[0])) if others else "found none."
 

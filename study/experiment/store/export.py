@@ -14,20 +14,22 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
+import sqlalchemy as sa
 
 import study
 from study.counting import counted
 from study.errors import SessionError
+from study.experiment.protocol.whole import Protocol
+from study.experiment.store import tables as stored
+from study.experiment.store.frames import ROLES, answers_frame
+from study.experiment.store.responses import Responses, rows_of
+from study.experiment.store.sessions import session_table
 from study.experiment.store.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, SHOWN_TO, STIMULI, Variable
 from study.files import whole_folder
 from study.spreadsheets import safe_table
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from study.experiment.protocol.whole import Protocol
-    from study.experiment.store.responses import Responses
 
 MADE_BY = "Segue"
 DESCRIPTION = "dataset_description.json"
@@ -80,14 +82,6 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
     SessionError
         Where there is no answer.
     """
-    import pandas as pd
-    import sqlalchemy as sa
-
-    from study.experiment.store import tables as stored
-    from study.experiment.store.frames import ROLES, answers_frame
-    from study.experiment.store.responses import rows_of
-    from study.experiment.store.sessions import session_table
-
     answers = answers_frame(responses, all_attempts=True, roles=ROLES)
     if answers.empty:
         raise SessionError(f"{responses.place}: expected answers to export, found none; collect or simulate some first")
