@@ -26,7 +26,7 @@ _WORDS = {int: "whole number", float: "number", str: "text", bool: "true or fals
 
 
 def key_tables() -> str:
-    """Markdown tables of all keys: key, type, unit, default, meaning."""
+    """Markdown tables of all keys: key, type with bounds and unit, default, meaning."""
     tables = [_table(_title(path), model) for path, model in parts(Protocol) if not path.endswith(".points")]
     own = [
         _table(f'`[studies.procedure]` with `name = "{name}"`', table_of(member))
@@ -47,12 +47,12 @@ def _table(title: str, model: type[BaseModel]) -> str:
     return "\n".join([f"### {title}", *_HEAD, *rows])
 
 
-_HEAD = ("", "| key | type | unit | default | meaning |", "|---|---|---|---|---|")
+_HEAD = ("", "| key | type | default | meaning |", "|---|---|---|---|")
 
 
 def _row(name: str, field: FieldInfo) -> str:
     unit, words = _unit_and_words(field.description or "")
-    return f"| `{name}` | {_type(field)} | {unit} | {_default(field)} | {words} |"
+    return f"| `{name}` | {_type(field, unit)} | {_default(field)} | {words} |"
 
 
 def _unit_and_words(words: str) -> tuple[str, str]:
@@ -74,9 +74,11 @@ def _default(field: FieldInfo) -> str:
     return f"`{value:g}`" if isinstance(value, (int, float)) else "its own"
 
 
-def _type(field: FieldInfo) -> str:
-    bounds = list(_bounds(field.metadata))
-    return _annotation(field.annotation) + (f", {', '.join(bounds)}" if bounds else "")
+def _type(field: FieldInfo, unit: str) -> str:
+    bounds = ", ".join(_bounds(field.metadata))
+    # A range reads as one.
+    bounds = re.sub(r"^≥ ([0-9.]+), ≤ ([0-9.]+)$", r"\1–\2", bounds)
+    return ", ".join(filter(None, (_annotation(field.annotation), f"{bounds} {unit}".strip())))
 
 
 def _bounds(metadata: list[Any]) -> Iterator[str]:
