@@ -28,7 +28,7 @@ def fuzz() -> ModuleType:
 
 
 @pytest.mark.parametrize("chunk", range(CHUNKS))
-def test_damaged_input_ends_in_an_answer_or_a_refusal(fuzz, chunk: int) -> None:
+def test_damaged_input_ends_in_an_answer_or_a_refusal(fuzz: ModuleType, chunk: int) -> None:
     chosen = fuzz.cases(CASES, list(fuzz.KINDS))[chunk::CHUNKS]
     outcomes = [fuzz.run_case(kind, SEED, number) for kind, number in chosen]
     finds = [f"{o.name}: {o.fault}\n{o.details[-1500:]}" for o in outcomes if o.result == "fault"]
@@ -37,12 +37,12 @@ def test_damaged_input_ends_in_an_answer_or_a_refusal(fuzz, chunk: int) -> None:
 
 
 @pytest.mark.parametrize(("kind", "number"), [(kind, n) for kind, numbers in FOUND_ONCE.items() for n in numbers])
-def test_what_was_found_once_stays_mended(fuzz, kind: str, number: int) -> None:
+def test_what_was_found_once_stays_mended(fuzz: ModuleType, kind: str, number: int) -> None:
     outcome = fuzz.run_case(kind, SEED, number)
     assert outcome.result != "fault", outcome.details
 
 
-def test_a_case_is_the_same_each_time(fuzz, tmp_path: Path) -> None:
+def test_a_case_is_the_same_each_time(fuzz: ModuleType, tmp_path: Path) -> None:
     for kind in ("bvh", "acclaim", "library", "protocol", "table"):
         contents = []
         for name in ("one", "two"):
@@ -53,11 +53,11 @@ def test_a_case_is_the_same_each_time(fuzz, tmp_path: Path) -> None:
         assert contents[0] == contents[1], kind
 
 
-def test_what_a_verb_may_not_do_is_found(fuzz, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_verb_may_not_do_is_found(fuzz: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """A traceback, silence, endless work, too much memory and a missing number: each is a find, and says where."""
     from study.apps.cli import motions as motion_commands
 
-    def ends(fault) -> Any:
+    def ends(fault: Any) -> Any:
         def inspect(*_: object, **__: object) -> None:
             fault()
 
@@ -76,7 +76,7 @@ def test_what_a_verb_may_not_do_is_found(fuzz, monkeypatch: pytest.MonkeyPatch) 
     fuzz._look_for_missing_numbers({"percent": None, "note": "nobody answered that question"})
 
 
-def test_the_disk_of_a_case_can_be_full(fuzz, tmp_path: Path) -> None:
+def test_the_disk_of_a_case_can_be_full(fuzz: ModuleType, tmp_path: Path) -> None:
     with fuzz.disk_full_after(1000), pytest.raises(OSError, match="File too large"):
         (tmp_path / "large").write_bytes(b"x" * 2000)
     (tmp_path / "large").write_bytes(b"x" * 2000)

@@ -45,7 +45,7 @@ def ask(tmp_path: Path) -> Any:
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)
 
-    def run(command) -> Any:
+    def run(command: Any) -> Any:
         script = f"set -euo pipefail; source {ROOT / '.ci' / 'packages'}; {command}"
         return subprocess.run(
             ["bash", "-c", script],
@@ -58,21 +58,21 @@ def ask(tmp_path: Path) -> Any:
     return run
 
 
-def test_what_the_distribution_has_is_wanted_however_slowly_it_says_so(ask) -> None:
+def test_what_the_distribution_has_is_wanted_however_slowly_it_says_so(ask: Any) -> None:
     for _ in range(10):
         found = ask("wanted_packages chromium libosmesa6 firefox-esr libavcodec-extra unheard-of")
         assert found.returncode == 0, found.stderr
         assert found.stdout.split() == ["chromium", "firefox-esr", "libavcodec-extra"]
 
 
-def test_a_look_up_that_fails_is_not_taken_for_a_missing_package(ask) -> None:
+def test_a_look_up_that_fails_is_not_taken_for_a_missing_package(ask: Any) -> None:
     found = ask("wanted=$(wanted_packages libosmesa6 broken firefox-esr); echo went on")
     assert found.returncode != 0
     assert "apt-cache policy broken failed" in found.stderr
     assert "went on" not in found.stdout
 
 
-def test_removed_packages_count_as_missing(ask) -> None:
+def test_removed_packages_count_as_missing(ask: Any) -> None:
     found = ask("missing_packages").stdout.split()
     assert "xvfb" not in found
     assert {"postgresql", "chromium", "firefox-esr", "libosmesa6"} <= set(found)

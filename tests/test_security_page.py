@@ -6,6 +6,7 @@ import importlib.util
 import json
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -53,7 +54,7 @@ def test_every_package_that_segue_installs_stands_on_the_page() -> None:
         ),
     ],
 )
-def test_only_packages_that_were_looked_up_pass_an_audit(answer, status: int, said: str) -> None:
+def test_only_packages_that_were_looked_up_pass_an_audit(answer: Any, status: int, said: str) -> None:
     found, lines = script("audited").audited("pypi", answer if isinstance(answer, str) else json.dumps(answer))
     assert found == status
     assert said in "\n".join(lines)

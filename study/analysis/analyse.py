@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, TypeVar
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
 
 from study.analysis.confirmatory import ConfirmatoryTest, confirmatory
 from study.analysis.exclusions import Exclusions, Rules, exclude, rules_of
@@ -17,6 +15,9 @@ from study.analysis.study_result import Settings, StudyResult
 from study.analysis.to_json import to_json
 from study.errors import AnalysisError
 from study.models.up_down import UpDown
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Kind = TypeVar("Kind", bound=StudyResult)
 Data = Literal["collected", "simulated", "mixed", "none"]

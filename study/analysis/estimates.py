@@ -10,14 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtrc, fdtrc, gammaln, ndtri, stdtr, stdtrit, xlog1py, xlogy
 
 from study.counting import counted, noun
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = NDArray[np.float64]
 
@@ -90,26 +92,36 @@ class Clustering:
 
 def normal_quantile(confidence: float) -> float:
     """Return z such that a standard normal lies within +-z with this probability."""
+    from scipy.special import ndtri
+
     return float(ndtri(0.5 + confidence / 2))
 
 
 def t_quantile(confidence: float, degrees_of_freedom: float) -> float:
     """Return t such that Student's t lies within +-t with this probability."""
+    from scipy.special import stdtrit
+
     return float(stdtrit(degrees_of_freedom, 0.5 + confidence / 2))
 
 
 def t_probability(statistic: float, degrees_of_freedom: float) -> float:
     """Return the two-sided p-value of Student's t."""
+    from scipy.special import stdtr
+
     return float(2 * stdtr(degrees_of_freedom, -abs(statistic)))
 
 
 def chi_square_probability(statistic: float, degrees_of_freedom: int) -> float:
     """Return the upper tail of the chi-square distribution."""
+    from scipy.special import chdtrc
+
     return float(chdtrc(degrees_of_freedom, max(statistic, 0.0)))
 
 
 def f_probability(statistic: float, numerator: float, denominator: float) -> float:
     """Return the upper tail of the F distribution."""
+    from scipy.special import fdtrc
+
     return float(fdtrc(numerator, denominator, max(statistic, 0.0)))
 
 
@@ -131,6 +143,7 @@ def binomial_probability(successes: int, trials: int, expected: float = 0.5) -> 
     """Return the exact two-sided binomial p-value, of all counts no likelier than this one; None without trials."""
     if trials <= 0:
         return None
+    from scipy.special import gammaln, xlog1py, xlogy  # scipy.stats takes half a second to import
 
     counts = np.arange(trials + 1)
     ways = gammaln(trials + 1) - gammaln(counts + 1) - gammaln(trials - counts + 1)
@@ -202,6 +215,8 @@ def student_p_values(values: FloatArray, there: NDArray[np.bool_], expected: flo
     -------
     ndarray, shape (...)
     """
+    from scipy.special import stdtr
+
     count = there.sum(axis=-1)
     people = np.where(count > 1, count, 2)
     mean = np.where(there, values, 0.0).sum(axis=-1) / np.maximum(count, 1)

@@ -7,9 +7,12 @@ the analysis is given with and without them, so that their effect can be seen.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,8 @@ def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = N
     -----
     Participants are judged by all their answers, before single answers are excluded.
     """
+    import pandas as pd
+
     who = answers["participant"].astype(str)
     gone = pd.Series(False, index=answers.index)
     counts: list[RuleCount] = []
@@ -106,6 +111,7 @@ def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = N
 
 
 def _times(answers: pd.DataFrame) -> pd.Series[float]:
+    import pandas as pd
 
     if "response_s" not in answers.columns:
         return pd.Series(np.nan, index=answers.index)
@@ -148,6 +154,8 @@ def _answers_out(answers: pd.DataFrame, rules: Rules) -> list[tuple[str, pd.Seri
     if rules.fastest_s is not None:
         found.append((f"answers sooner than {rules.fastest_s:g} s", (_times(answers) < rules.fastest_s).fillna(False)))
     if rules.badly_shown:
+        import pandas as pd
+
         badly = pd.Series(False, index=answers.index)
         if "shown_well" in answers.columns:
             badly = answers["answer"].notna() & ~answers["shown_well"].fillna(True).astype(bool)

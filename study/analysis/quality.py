@@ -6,13 +6,15 @@ The rules are few and given in words; they flag participants and exclude no one.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from study.counting import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FASTEST_S = 0.2
 MANY_MISSED = 0.1
@@ -23,6 +25,8 @@ FEWEST_FOR_UNIFORM = 8
 
 def _numbers(answers: pd.DataFrame, column: str) -> NDArray[np.float64]:
     """A column as numbers; NaN where there is none."""
+    import pandas as pd
+
     if column not in answers:
         return np.full(len(answers), np.nan)
     return pd.to_numeric(answers[column], errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
-
-import pandas as pd
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from study.analysis.preference.no_effect import MARGIN
 from study.models.up_down import UpDown
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class StudyResult(Protocol):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from study.analysis.analyse import Analysis
+from study.analysis.estimates import Interval
 from study.analysis.oddity.analyse import SIGNS, Oddity
 from study.analysis.psychometric.analyse import typical_threshold
 from study.analysis.psychometric.mixed import TypicalThreshold
@@ -19,23 +20,20 @@ from study.models.oddity import CHANCE, HALFWAY, d_prime_of
 from study.models.population import probability_odd_found
 from study.power.curve import Run
 from study.power.design import Design, Effect, FloatArray
-from study.power.same_different import level_study
+from study.power.same_different import level_study, narrow, threshold_numbers
 from study.tasks.observer import ObserverSettings, default_observer
 
 
 def oddity_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
     """Return thresholds shorter and longer, how participants differ, and how precisely both are to be told."""
     del decided
-    shorter, longer, spread, precision = (options[name] for name in ("shorter", "longer", "spread", "precision"))
+    precision = options["precision"]
     return Effect(
-        observer=oddity_observer(shorter, longer, spread, options["missed"]),
-        stated={"shorter": shorter, "longer": longer, "spread": spread, "precision": precision},
-        icc=None,
+        **threshold_numbers(oddity_observer, options),
         test="width of the mixed model's 95% intervals of a typical participant's thresholds",
         aim=f"tell both thresholds to ± {precision:g} frames",
         study=lambda design: oddity_study(design, precision),
         found=lambda analysis: oddity_found(analysis, study.name, precision),
-        slow=True,
     )
 
 
@@ -50,28 +48,24 @@ def oddity_observer(shorter: float, longer: float, spread: float, missed: float)
 def oddity_found(analysis: Analysis, name: str, precision: float) -> bool:
     """Return whether the intervals of the thresholds of all sides are as narrow as asked."""
     result = analysis.of(Oddity).get(name)
-    found = [function.mixed for function in result.functions.values()] if result else []
-    return bool(found) and all(_narrow(threshold, precision) for threshold in found)
+    return result is not None and _told([function.mixed for function in result.functions.values()], precision)
 
 
-def _narrow(found: TypicalThreshold | str | None, precision: float) -> bool:
-    return (
-        isinstance(found, TypicalThreshold)
-        and None not in (found.threshold, found.low, found.high)
-        and (found.high or 0.0) - (found.low or 0.0) <= 2 * precision
-    )
+def _told(found: Sequence[TypicalThreshold | str | None], precision: float) -> bool:
+    known = [one for one in found if isinstance(one, TypicalThreshold) and one.threshold is not None]
+    return len(known) == len(found) and narrow([Interval(one.low, one.high) for one in known], precision)
 
 
 def oddity_study(design: Design, precision: float) -> Run:
     """Whether the intervals of a typical participant's thresholds are as narrow as asked."""
     model = make_model("2afc", choices=3)
 
-    def narrow(levels: FloatArray, right: FloatArray, shown: FloatArray) -> bool:
+    def told(levels: FloatArray, right: FloatArray, shown: FloatArray) -> bool:
         people = len(right)
         counts = {"yes": right.ravel(), "shown": shown.ravel()}
         table = pd.DataFrame({"participant": np.repeat(np.arange(people), len(levels)).astype(str), **counts})
         table["level"], side = np.tile(np.abs(levels), people), np.tile(np.sign(levels), people)
         parts = [part for sign in SIGNS.values() if len(part := table[(side == sign) & (table["shown"] > 0)])]
-        return all(_narrow(typical_threshold(part, model, 0.95), precision) for part in parts)
+        return _told([typical_threshold(part, model, 0.95) for part in parts], precision)
 
-    return level_study(design, probability_odd_found, CHANCE, narrow)
+    return level_study(design, probability_odd_found, CHANCE, told)

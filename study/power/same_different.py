@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from study.analysis.analyse import Analysis
+from study.analysis.estimates import Interval
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import Counts
 from study.analysis.same_different.model import ModelFit, fit_model
@@ -22,30 +24,40 @@ from study.tasks.observer import ObserverSettings, default_observer
 
 def same_different_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
     """Return thresholds shorter and longer, how participants differ, and how precisely both are to be told."""
-    shorter, longer, spread, precision = (options[name] for name in ("shorter", "longer", "spread", "precision"))
+    precision = options["precision"]
     return Effect(
-        observer=same_different_observer(shorter, longer, spread, options["missed"]),
-        stated={"shorter": shorter, "longer": longer, "spread": spread, "precision": precision},
-        icc=None,
+        **threshold_numbers(same_different_observer, options),
         test="width of the differencing model's 95% intervals",
         aim=f"tell both thresholds to ± {precision:g} frames",
         study=lambda design: same_different_study(design, precision, decided.threshold),
         found=lambda analysis: thresholds_found(analysis, study.name, precision),
-        slow=True,
+    )
+
+
+def threshold_numbers(
+    observer: Callable[[float, float, float, float], ObserverSettings], options: Mapping[str, float]
+) -> dict[str, Any]:
+    """Return what effects of thresholds share: the observer, the numbers that are stated, few studies."""
+    stated = {name: options[name] for name in ("shorter", "longer", "spread", "precision")}
+    who = observer(options["shorter"], options["longer"], options["spread"], options["missed"])
+    return {"observer": who, "stated": stated, "icc": None, "slow": True}
+
+
+def narrow(ends: Collection[Interval], precision: float) -> bool:
+    """Return whether there are intervals, and each reaches at most this far to both sides."""
+    return bool(ends) and all(
+        end.low is not None and end.high is not None and end.high - end.low <= 2 * precision for end in ends
     )
 
 
 def thresholds_found(analysis: Analysis, name: str, precision: float) -> bool:
     """Return whether the model's intervals of both thresholds are as narrow as asked."""
     result = analysis.of(SameDifferent).get(name)
-    return _narrow(result.model if result else None, precision)
+    return _told(result.model if result else None, precision)
 
 
-def _narrow(model: ModelFit | str | None, precision: float) -> bool:
-    ends = [threshold.interval for threshold in model.jnd.values()] if isinstance(model, ModelFit) else []
-    return bool(ends) and all(
-        end.low is not None and end.high is not None and end.high - end.low <= 2 * precision for end in ends
-    )
+def _told(model: ModelFit | str | None, precision: float) -> bool:
+    return isinstance(model, ModelFit) and narrow([found.interval for found in model.jnd.values()], precision)
 
 
 def same_different_observer(shorter: float, longer: float, spread: float, missed: float) -> ObserverSettings:
@@ -58,12 +70,12 @@ def same_different_observer(shorter: float, longer: float, spread: float, missed
 def same_different_study(design: Design, precision: float, level: float) -> Run:
     """Whether the model's intervals of both thresholds are as narrow as asked (half their width, in frames)."""
 
-    def narrow(levels: FloatArray, different: FloatArray, shown: FloatArray) -> bool:
+    def told(levels: FloatArray, different: FloatArray, shown: FloatArray) -> bool:
         names = tuple(str(place) for place in range(len(shown)))
         fit = fit_model(Counts(names, levels, different, shown), level=level) if names else None
-        return _narrow(fit, precision)
+        return _told(fit, precision)
 
-    return level_study(design, probability_different, 0.5, narrow)
+    return level_study(design, probability_different, 0.5, told)
 
 
 def level_study(

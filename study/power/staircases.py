@@ -28,7 +28,7 @@ from study.models.up_down import Track, moved, stopped
 from study.power.curve import Run
 from study.power.design import BoolArray, Design, Effect, FloatArray, times
 from study.power.oddity import oddity_observer
-from study.power.same_different import same_different_observer
+from study.power.same_different import narrow, same_different_observer, threshold_numbers
 from study.tasks.observer import ObserverSettings
 
 OBSERVERS: Mapping[str, Callable[[float, float, float, float], ObserverSettings]] = {
@@ -47,16 +47,13 @@ def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: An
     del decided
     if study.task not in OBSERVERS:
         raise AnalysisError(f"{study.name}: expected one of the tasks {', '.join(OBSERVERS)}, found {study.task!r}")
-    shorter, longer, spread, precision = (options[name] for name in ("shorter", "longer", "spread", "precision"))
+    precision = options["precision"]
     return Effect(
-        observer=OBSERVERS[study.task](shorter, longer, spread, options["missed"]),
-        stated={"shorter": shorter, "longer": longer, "spread": spread, "precision": precision},
-        icc=None,
+        **threshold_numbers(OBSERVERS[study.task], options),
         test="width of the 95% intervals of the staircases' thresholds, Student's t over participants",
         aim=f"tell the thresholds of the staircases to ± {precision:g} frames",
         study=lambda design: staircase_study(design, precision),
         found=lambda analysis: staircases_found(analysis, study.name, precision),
-        slow=True,
         answers=trials_each,
     )
 
@@ -64,14 +61,11 @@ def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: An
 def staircases_found(analysis: Analysis, name: str, precision: float) -> bool:
     """Return whether the intervals of the thresholds of all sides are as narrow as asked."""
     result = analysis.of(SameDifferent).get(name) or analysis.of(Oddity).get(name)
-    return _narrow(result.staircases if result else None, precision)
+    return result is not None and result.staircases is not None and _told(result.staircases, precision)
 
 
-def _narrow(found: Staircases | None, precision: float) -> bool:
-    ends = [threshold.interval for threshold in found.thresholds.values()] if found else []
-    return bool(ends) and all(
-        end.low is not None and end.high is not None and end.high - end.low <= 2 * precision for end in ends
-    )
+def _told(found: Staircases, precision: float) -> bool:
+    return narrow([threshold.interval for threshold in found.thresholds.values()], precision)
 
 
 def trials_each(design: Design) -> int:
@@ -100,7 +94,7 @@ def staircase_study(design: Design, precision: float) -> Run:
             parts = [pd.DataFrame(_responses(design, procedure, seed, who, rng)) for who in range(max(sizes))]
             for place, size in enumerate(sizes):
                 kept, _ = exclude(pd.concat(parts[:size], ignore_index=True), design.rules)
-                verdicts[number, place] = _narrow(staircase_thresholds(kept, procedure.rule), precision)
+                verdicts[number, place] = _told(staircase_thresholds(kept, procedure.rule), precision)
         return verdicts
 
     return run

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from study.analysis.analyse import Analysis, Results
 from study.analysis.quality import Quality
@@ -16,6 +15,10 @@ from study.report import tables
 from study.report.drawing import BLUE, FAINT, ORANGE, add_mark, new_figure, quiet_grid, style, to_svg
 from study.report.sections.registry import SECTIONS
 from study.report.sections.section import MainResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 LONGEST_GAP_FRAMES = 1.5
 """A longer time between two frames is a display failure. [frames]"""

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from study.analysis.analyse import Results
 from study.report import tables, words
 from study.report.drawing import BLUE, FAINT, RULE, add_mark, new_figure, quiet_grid, style, to_svg
 from study.report.sections.registry import SECTIONS
 from study.report.sections.section import Course
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 PARTS = 6
 FEWEST_ANSWERS = 12

@@ -10,17 +10,15 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
-
-from study.analysis.analyse import Analysis, analyse_folder, analysis_json
 from study.files import write_whole
 from study.report import tables, words
-from study.report.drawing import as_file
 from study.report.material import gather
-from study.report.media import embedding
-from study.report.page import Page, compose
+
+if TYPE_CHECKING:
+    from study.analysis.analyse import Analysis
+    from study.report.page import Page
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -61,6 +59,10 @@ def write_report(
     SegueError
         When a part of the folder is missing or can't be read.
     """
+    from study.analysis.analyse import analyse_folder
+    from study.report.media import embedding
+    from study.report.page import compose
+
     folder = Path(results_folder)
     material = gather(folder, database)
     with embedding(material.manifest) as pictures:
@@ -75,6 +77,9 @@ def write_report(
 
 def _write_files(folder: Path, page: Page, analysis: Analysis) -> None:
     """Write every table as CSV and JSON, every figure as SVG, and the whole analysis as JSON."""
+    from study.analysis.analyse import analysis_json
+    from study.report.drawing import as_file
+
     for table in page.tables:
         write_whole(folder / "tables" / f"{table.name}.csv", tables.as_csv(table))
         write_whole(folder / "tables" / f"{table.name}.json", tables.as_json(table))
@@ -86,6 +91,9 @@ def _write_files(folder: Path, page: Page, analysis: Analysis) -> None:
 
 def to_html(page: Page) -> str:
     """Return the page as one HTML text; everything but our own SVG and CSS is escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,

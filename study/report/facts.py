@@ -6,7 +6,6 @@ import hashlib
 import platform
 
 import numpy as np
-import scipy
 
 import study
 from study.analysis.quality import Quality
@@ -74,6 +73,8 @@ def shown_sentence(material: Material) -> str:
 
 def versions(material: Material) -> tuple[tuple[str, str], ...]:
     """Return versions and hashes: of this program, of what made the stimuli, and of what was analysed."""
+    import scipy
+
     table = hashlib.sha256(material.answers.to_csv(index=False).encode()).hexdigest()
     rows = [
         ("report by Segue", study.__version__),

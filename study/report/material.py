@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-
-import pandas as pd
-import sqlalchemy as sa
+from typing import TYPE_CHECKING
 
 from study.errors import AnalysisError
-from study.experiment.folder import PROTOCOL
-from study.experiment.protocol.whole import Protocol, load_protocol
-from study.experiment.stimuli.manifest import Manifest, read_manifest
-from study.experiment.store.frames import answers_frame
-from study.experiment.store.responses import Responses, open_answers, rows_of
-from study.experiment.store.sessions import session_table
-from study.experiment.store.tables import presentations, withdrawals
 from study.report.power import FoundPower, read_power
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import sqlalchemy as sa
+
+    from study.experiment.protocol.whole import Protocol
+    from study.experiment.stimuli.manifest import Manifest
+    from study.experiment.store.responses import Responses
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +58,14 @@ def gather(folder: Path, database: str | None = None) -> Material:
     SegueError
         When a part of the folder is missing or can't be read.
     """
+    from study.experiment.folder import PROTOCOL
+    from study.experiment.protocol.whole import load_protocol
+    from study.experiment.stimuli.manifest import read_manifest
+    from study.experiment.store.frames import answers_frame
+    from study.experiment.store.responses import open_answers
+    from study.experiment.store.sessions import session_table
+    from study.experiment.store.tables import presentations, withdrawals
+
     protocol, manifest = load_protocol(folder / PROTOCOL), read_manifest(folder)
     with open_answers(folder, database) as responses:
         material = Material(
@@ -81,6 +88,11 @@ def gather(folder: Path, database: str | None = None) -> Material:
 
 def _table(responses: Responses, table: sa.Table) -> pd.DataFrame:
     """A table without its details, which hold the times of all frames."""
+    import pandas as pd
+    import sqlalchemy as sa
+
+    from study.experiment.store.responses import rows_of
+
     columns = [column for column in table.c if column.name != "detail_json"]
     rows = rows_of(responses, sa.select(*columns).order_by(*table.primary_key))
     return pd.DataFrame([dict(row) for row in rows], columns=[column.name for column in columns])

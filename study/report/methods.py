@@ -5,7 +5,7 @@ Each sentence follows from what was run; methods that were not used are neither 
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 import study
 from study.analysis.analyse import Analysis
@@ -18,6 +18,10 @@ from study.tasks.registry import task_of
 from study.transitions.methods.makes.blends import Blending
 from study.transitions.methods.method import Method
 from study.transitions.methods.registry import METHODS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 ORDERS = {
     "both": "Each pair was shown in both orders",

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from study.experiment.protocol.whole import StudySpec
 from study.experiment.stimuli.shortcuts import CUES, ShortcutShare, needed_share, shares_in_words, shortcuts_of
 from study.report import tables, words
 from study.report.material import Material
 from study.report.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 LEAST_APART = 0.1
 """Pairs that differ by less, in standard deviations of a percept, have no stimulus with more of a property."""

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -185,7 +186,7 @@ def test_an_interrupted_simulation_ends_as_an_uninterrupted_one(
         simulate(toy_protocol, toy_stimuli, responses, 3, seed=4)
         whole = timeless(responses)
 
-    def stop(done, total) -> None:
+    def stop(done: Any, total: int) -> None:
         assert total == 24
         if done == after:
             raise StopHereError
@@ -356,7 +357,7 @@ def test_a_simulation_with_stalls_goes_on_as_it_would_have(
         simulate(toy_protocol, toy_stimuli, responses, 3, seed=4, settings=settings)
         whole = timeless(responses)
 
-    def stop(done, _total) -> None:
+    def stop(done: Any, _total: int) -> None:
         if done == after:
             raise StopHereError
 

@@ -14,12 +14,12 @@ import pytest
 from toys import FakeStimuli
 
 from study.errors import SessionError
-from study.experiment.plan import draw_plan, groups_of, plan_from_json
+from study.experiment.plan import Plan, draw_plan, groups_of, plan_from_json
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.tasks.trial import Trial
 
 
-def real(plan) -> list[Any]:
+def real(plan: Plan) -> list[Any]:
     """The trials that count."""
     return [trial for trial in plan.trials if trial.role == "trial"]
 

@@ -9,9 +9,10 @@ import pytest
 from toys import FakeStimuli
 
 from study.errors import SessionError
-from study.experiment.plan import draw_plan
+from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import (
+    Session,
     advanced,
     answered,
     current,
@@ -23,13 +24,13 @@ from study.experiment.session import (
 from study.experiment.steps import answer_keys
 
 
-def to_question(session) -> Any:
+def to_question(session: Session) -> Any:
     while current(session).kind not in ("answer", "done"):
         session = advanced(session)
     return session
 
 
-def run(session, count=None, choose=lambda step: step.legal[0], seen=None) -> Any:
+def run(session: Session, count: int | None = None, choose: Any = lambda step: step.legal[0], seen: Any = None) -> Any:
     """Answer `count` questions (all by default); the session after it and the answers."""
     answers = []
     while current(session).kind != "done" and (count is None or len(answers) < count):
@@ -49,7 +50,7 @@ def opened(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Any:
     return open_session(toy_protocol, draw_plan(toy_protocol, toy_stimuli.pairs, "p01"))
 
 
-def test_a_trial_is_first_gap_second_answer_pause(opened) -> None:
+def test_a_trial_is_first_gap_second_answer_pause(opened: Any) -> None:
     seen = []
     run(opened, seen=seen)
     kinds = [step.place for step in seen]
@@ -69,12 +70,12 @@ def test_a_trial_is_first_gap_second_answer_pause(opened) -> None:
     assert [step.text for step in seen if step.kind == "instructions"] == ["Welcome.", "Some pairs are the same."]
 
 
-def test_trials_come_in_the_order_of_the_plan(opened) -> None:
+def test_trials_come_in_the_order_of_the_plan(opened: Any) -> None:
     _, answers = run(opened)
     assert [answer.trial for answer in answers] == list(range(1, 9))
 
 
-def test_only_legal_answers_in_the_answer_window_count(opened) -> None:
+def test_only_legal_answers_in_the_answer_window_count(opened: Any) -> None:
     session = to_question(opened)
     assert current(session).legal == ("same", "different")
     with pytest.raises(SessionError, match="Expected one of same, different in trial 1, found 'first'"):
@@ -87,7 +88,7 @@ def test_only_legal_answers_in_the_answer_window_count(opened) -> None:
     assert (answer.value, answer.response_s, answer.attempt, answer.missed) == ("same", 5.0, 1, False)
 
 
-def test_a_wrong_order_of_calls_is_refused(opened) -> None:
+def test_a_wrong_order_of_calls_is_refused(opened: Any) -> None:
     with pytest.raises(SessionError, match="Expected no answer now: the session is at 'instructions'"):
         answered(opened, "same", 1.0)
     with pytest.raises(SessionError, match="Expected no answer now"):
@@ -104,7 +105,7 @@ def test_a_wrong_order_of_calls_is_refused(opened) -> None:
         advanced(done)
 
 
-def test_a_missed_answer_is_recorded_and_not_asked_again(opened) -> None:
+def test_a_missed_answer_is_recorded_and_not_asked_again(opened: Any) -> None:
     session, answer = missed(to_question(opened))
     assert (answer.value, answer.response_s, answer.missed) == (None, None, True)
     _, rest = run(session)
@@ -112,7 +113,7 @@ def test_a_missed_answer_is_recorded_and_not_asked_again(opened) -> None:
 
 
 @pytest.mark.parametrize("done", range(9))
-def test_a_session_is_taken_up_where_it_stopped(opened, done: int) -> None:
+def test_a_session_is_taken_up_where_it_stopped(opened: Any, done: int) -> None:
     """Whatever was answered before, the rest is the rest, in the same order."""
     _, whole = run(opened)
     _, before = run(opened, done)
@@ -122,7 +123,7 @@ def test_a_session_is_taken_up_where_it_stopped(opened, done: int) -> None:
     assert before + after == whole
 
 
-def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opened) -> None:
+def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opened: Any) -> None:
     _, before = run(opened, 2)
     seen = []
     run(open_session(opened.protocol, opened.plan, before), seen=seen)
@@ -131,7 +132,7 @@ def test_taking_up_shows_the_instructions_of_the_study_but_not_the_welcome(opene
     assert seen[1].trial == 3
 
 
-def test_a_badly_shown_trial_comes_again_at_the_end_of_its_study(opened) -> None:
+def test_a_badly_shown_trial_comes_again_at_the_end_of_its_study(opened: Any) -> None:
     session, faulty = answered(to_question(opened), "same", 1.0, shown_well=False)
     _, rest = run(session)
     assert [(a.trial, a.attempt) for a in rest][4:] == [(6, 1), (1, 2), (7, 1), (8, 1)]
@@ -141,7 +142,7 @@ def test_a_badly_shown_trial_comes_again_at_the_end_of_its_study(opened) -> None
         assert [faulty, *rest] == before + after
 
 
-def test_a_trial_is_not_repeated_for_ever(opened) -> None:
+def test_a_trial_is_not_repeated_for_ever(opened: Any) -> None:
     session = opened
     answers = []
     while current(session := to_question(session)).kind != "done":
@@ -202,7 +203,7 @@ def test_breaks_come_after_so_many_of_eight_trials_and_never_after_the_last(
     assert before == expected
 
 
-def test_another_protocol_or_stray_answers_are_refused(opened) -> None:
+def test_another_protocol_or_stray_answers_are_refused(opened: Any) -> None:
     other = parse_protocol(opened.protocol.text + "# changed\n")
     with pytest.raises(SessionError, match="Expected the protocol under which the plan was drawn"):
         open_session(other, opened.plan)
@@ -242,7 +243,7 @@ def with_people(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Any:
     return protocol, draw_plan(protocol, toy_stimuli.pairs, "p01")
 
 
-def test_consent_and_form_come_first_and_once(with_people) -> None:
+def test_consent_and_form_come_first_and_once(with_people: Any) -> None:
     protocol, plan = with_people
     session = open_session(protocol, plan)
     assert (current(session).kind, current(session).text) == ("consent", "Do you agree?")
@@ -268,7 +269,7 @@ def test_consent_and_form_come_first_and_once(with_people) -> None:
     assert current(open_session(protocol, plan, passed=("consent", "form"))).kind == "instructions"
 
 
-def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people) -> None:
+def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people: Any) -> None:
     protocol, plan = with_people
     assert [trial.role for trial in plan.trials[:4]] == ["practice"] * 4
     assert sorted(bool(trial.difference_frames) for trial in plan.trials[:4]) == [False, False, True, True]
@@ -286,16 +287,16 @@ def test_practice_gets_feedback_and_checks_ask_for_what_they_say(with_people) ->
     assert "10" not in answer_keys(protocol, [str(i) for i in range(11)])
 
 
-def test_practice_and_checks_leave_the_trials_as_they_are(with_people, opened) -> None:
+def test_practice_and_checks_leave_the_trials_as_they_are(with_people: Any, opened: Any) -> None:
     from dataclasses import replace
 
-    def trials(plan) -> list[Any]:
+    def trials(plan: Plan) -> list[Any]:
         return [replace(trial, trial=0) for trial in plan.trials if trial.role == "trial"]
 
     assert trials(with_people[1]) == trials(opened.plan)
 
 
-def test_practice_is_not_repeated(with_people) -> None:
+def test_practice_is_not_repeated(with_people: Any) -> None:
     protocol, plan = with_people
     session = open_session(protocol, plan, passed=("consent", "form"))
     _, answer = answered(to_question(session), "same", 1.0, shown_well=False)
@@ -315,7 +316,7 @@ def practising(toy_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeSt
     return open_session(protocol, draw_plan(protocol, make_stimuli(protocol).pairs, "p01"))
 
 
-def test_the_end_of_practice_is_said_once(practising) -> None:
+def test_the_end_of_practice_is_said_once(practising: Any) -> None:
     seen = []
     run(practising, seen=seen)
     over = [i for i, step in enumerate(seen) if step.text == practising.protocol.texts.practice_over]
@@ -328,7 +329,7 @@ def test_the_end_of_practice_is_said_once(practising) -> None:
         assert any(step.text == practising.protocol.texts.practice_over for step in again.steps) == said
 
 
-def test_practice_and_example_show_transitions_of_their_own(practising) -> None:
+def test_practice_and_example_show_transitions_of_their_own(practising: Any) -> None:
     plan = practising.plan
     assert [trial.motion for trial in plan.trials if trial.role == "practice"] == ["still_slow"] * 2
     assert {trial.motion for trial in plan.trials if trial.study == "jnd" and trial.role == "trial"} == {"slow_quick"}

@@ -14,7 +14,7 @@ import pytest
 from toys import TOY_PROTOCOL, TOY_RATING, FakeStimuli
 
 from study.errors import SessionError
-from study.experiment.plan import draw_plan
+from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import (
     Answer,
@@ -28,6 +28,7 @@ from study.experiment.session import (
     progress,
     restarted,
 )
+from study.tasks.trial import Trial
 
 WALKS = 40
 SHOW_AGAIN = (0, 1, 3)
@@ -80,7 +81,7 @@ class Walker:
         return session
 
 
-def walk(protocol, plan, walker: Walker) -> list[Answer]:
+def walk(protocol: Protocol, plan: Plan, walker: Walker) -> list[Answer]:
     session = open_session(protocol, plan)
     done = 0
     while current(session).kind != "done":
@@ -100,7 +101,7 @@ def whole(request: pytest.FixtureRequest, make_stimuli: Callable[[Protocol], Fak
     return protocol, make_stimuli(protocol).pairs
 
 
-def asked_of(protocol, trial) -> set[str]:
+def asked_of(protocol: Protocol, trial: Trial) -> set[str]:
     return {""} if trial.role == "check" else {item.name for item in protocol.study(trial.study).items} or {""}
 
 
@@ -165,14 +166,14 @@ def test_the_same_seed_gives_the_same_answers_however_often_it_is_killed(whole: 
     protocol, pairs = whole
     plan = draw_plan(protocol, pairs, "p1")
 
-    def answer_of(session) -> Any:
+    def answer_of(session: Session) -> Any:
         step = current(session)
         rng = np.random.default_rng([step.trial, step.attempt, len(step.item)])
         if rng.random() < 0.2:
             return missed(session, shown_well=rng.random() < 0.6)
         return answered(session, str(rng.choice(step.legal)), rng.uniform(0, 5), shown_well=rng.random() < 0.6)
 
-    def run(kills) -> Any:
+    def run(kills: Any) -> Any:
         stored: list[Answer] = []
         session = open_session(protocol, plan, passed={"consent", "form"})
         while current(session).kind != "done":

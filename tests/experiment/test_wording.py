@@ -30,7 +30,9 @@ STANDARD = {
 }
 
 
-def changed(protocol, *, top: str = "", consent: str = 'text = "{standard}"\ncontact = "Ann, ann@example.org"') -> Any:
+def changed(
+    protocol: Protocol, *, top: str = "", consent: str = 'text = "{standard}"\ncontact = "Ann, ann@example.org"'
+) -> Any:
     """A toy protocol with built-in texts."""
     text = protocol.text
     for old, new in STANDARD.items():
@@ -39,11 +41,11 @@ def changed(protocol, *, top: str = "", consent: str = 'text = "{standard}"\ncon
     return parse_protocol(top + FORM + text + f"\n[consent]\n{consent}\n")
 
 
-def first_plan(protocol, toy_stimuli) -> Any:
+def first_plan(protocol: Protocol, toy_stimuli: Any) -> Any:
     return draw_plan(protocol, toy_stimuli.pairs, "p01")
 
 
-def slots(text) -> set[Any]:
+def slots(text: str) -> set[Any]:
     return set(re.findall(r"\{(\w*)\}", text))
 
 

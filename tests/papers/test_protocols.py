@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from study.experiment.observers import truth
-from study.experiment.plan import draw_plan
+from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.proofreading import to_do
 from study.experiment.protocol.whole import find_protocol, load_protocol, protocols_folder
 from study.experiment.simulation import simulate
@@ -18,7 +18,7 @@ from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.experiment.wording import all_texts
-from study.motion.library import open_library
+from study.motion.library import Library, open_library
 from study.tasks.observer import default_observer
 
 PUBLISHED = ("blend_length_jnd", "geodesic_vs_fixed", "velocity_vs_fixed", "geodesic_vs_timewarp")
@@ -35,7 +35,7 @@ def cmu(mocap: Path) -> Any:
     return open_library(mocap / "cmu")
 
 
-def published(name) -> Any:
+def published(name: str) -> Any:
     return load_protocol(find_protocol(name))
 
 
@@ -129,7 +129,7 @@ def test_study_four_is_as_printed() -> None:
     assert (four.timing, four.stimuli) == (two.timing, two.stimuli)
 
 
-def shown_on(name, library) -> Any:
+def shown_on(name: str, library: Library) -> Any:
     """Check and build a protocol's stimuli on a library; what must hold on any."""
     protocol = published(name)
     assert check(protocol, library) == []
@@ -147,7 +147,7 @@ def shown_on(name, library) -> Any:
     return prepared, plan
 
 
-def trials_and_pairs(prepared, plan) -> Any:
+def trials_and_pairs(prepared: Any, plan: Plan) -> Any:
     """What the study shows, practice apart, which shows other transitions."""
     trials = [trial for trial in plan.trials if trial.role == "trial"]
     shown = {trial.motion for trial in trials}
@@ -155,7 +155,7 @@ def trials_and_pairs(prepared, plan) -> Any:
     return trials, [pair for pair in prepared.pairs if pair.motion in shown]
 
 
-def assert_study_one(prepared, plan) -> None:
+def assert_study_one(prepared: Any, plan: Plan) -> None:
     trials, pairs = trials_and_pairs(prepared, plan)
     assert len(trials) == 42
     assert set(Counter((t.motion, t.difference_frames, t.a_first) for t in trials).values()) == {1}
@@ -166,7 +166,7 @@ def assert_study_one(prepared, plan) -> None:
         assert comparison.blend_frames == reference.blend_frames + pair.difference_frames
 
 
-def assert_study_two_or_three(prepared, plan) -> None:
+def assert_study_two_or_three(prepared: Any, plan: Plan) -> None:
     trials, pairs = trials_and_pairs(prepared, plan)
     assert len(trials) == len(pairs) == 8
     for pair in pairs:
@@ -178,7 +178,7 @@ def assert_study_two_or_three(prepared, plan) -> None:
         assert (optimal.source.frame, optimal.destination.frame) == (fixed.source.frame, fixed.destination.frame)
 
 
-def assert_study_four(prepared, plan) -> None:
+def assert_study_four(prepared: Any, plan: Plan) -> None:
     """Section 4.5: warps of 10 frames on average, such as 18 frames of the source with 28 of the destination."""
     trials, pairs = trials_and_pairs(prepared, plan)
     assert len(trials) == len(pairs) == 8
@@ -200,18 +200,18 @@ def assert_study_four(prepared, plan) -> None:
     assert 7 <= sum(warps) / len(warps) <= 13
 
 
-def assert_as_printed(name, prepared, plan) -> None:
+def assert_as_printed(name: str, prepared: Any, plan: Plan) -> None:
     checks = {"blend_length_jnd": assert_study_one, "geodesic_vs_timewarp": assert_study_four}
     checks.get(name, assert_study_two_or_three)(prepared, plan)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_published_protocols_are_shown_on_the_synthetic_library(name: str, synthetic) -> None:
+def test_published_protocols_are_shown_on_the_synthetic_library(name: str, synthetic: Any) -> None:
     assert_as_printed(name, *shown_on(name, synthetic))
 
 
-def test_the_demo_is_short_on_the_synthetic_library(synthetic) -> None:
+def test_the_demo_is_short_on_the_synthetic_library(synthetic: Any) -> None:
     prepared, plan = shown_on("demo", synthetic)
     assert len(plan.trials) == 17
     assert sum(record.frames for record in prepared.records) < 1500
@@ -221,7 +221,7 @@ def test_the_demo_is_short_on_the_synthetic_library(synthetic) -> None:
 @pytest.mark.mocap
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_published_protocols_are_shown_on_cmu_clips(name: str, cmu) -> None:
+def test_published_protocols_are_shown_on_cmu_clips(name: str, cmu: Any) -> None:
     prepared, plan = shown_on(name, cmu)
     assert_as_printed(name, prepared, plan)
     assert "EIA-0196217" in prepared.acknowledgement
@@ -235,13 +235,13 @@ def test_published_protocols_are_shown_on_cmu_clips(name: str, cmu) -> None:
 
 
 @pytest.mark.mocap
-def test_the_demo_is_shown_on_cmu_clips(cmu) -> None:
+def test_the_demo_is_shown_on_cmu_clips(cmu: Any) -> None:
     prepared, plan = shown_on("demo", cmu)
     assert len(plan.trials) == 17
     assert not prepared.synthetic
 
 
-def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path: Path, synthetic) -> None:
+def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path: Path, synthetic: Any) -> None:
     """35 participants as in the paper; at each level the proportion is the truth's within its sampling error."""
     from study.models.population import population_different
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from study.motion.clip import retarget
-from study.motion.library import open_library
+from study.motion.library import Library, open_library
 from study.transitions.cost_matrix import cost_matrix, extremes, joint_blocks
 from study.transitions.fit_weights import cross_validate, fit_weights
 from study.transitions.weights import LEE2002, WANG2003
@@ -33,7 +33,7 @@ def test_section_3_the_original_weights_are_one_for_major_joints_and_trunk() -> 
     assert parts == {"shoulder", "elbow", "hip", "knee", "pelvis", "spine"}
 
 
-def whole(library, name) -> Any:
+def whole(library: Library, name: str) -> Any:
     """A whole trial at 30 fps, with the beginning that its motion in the index of CMU trials leaves out."""
     return library.clip(replace(library.entry(name), first_frame=0, last_frame=None), fps=30.0)
 
@@ -46,7 +46,7 @@ def dances(mocap: Path) -> Any:
 
 
 @pytest.mark.mocap
-def test_figure_2_the_optimum_hardly_depends_on_nu(dances) -> None:
+def test_figure_2_the_optimum_hardly_depends_on_nu(dances: Any) -> None:
     """The paper: unchanged as nu goes from 0 to 100 for its dances; here within three frames from 0 to 10."""
     places = [
         extremes(joint_blocks(*dances, weights="lee2002", nu=nu, precision="double")).argmin
@@ -57,7 +57,7 @@ def test_figure_2_the_optimum_hardly_depends_on_nu(dances) -> None:
 
 @pytest.mark.mocap
 @pytest.mark.parametrize("weights", ["lee2002", "wang2003"])
-def test_figures_1_and_3_costs_fill_their_range(dances, weights: str) -> None:
+def test_figures_1_and_3_costs_fill_their_range(dances: Any, weights: str) -> None:
     """Section 3: "reasonably uniformly distributed", so that a picture in proportion shows them as they are."""
     costs = cost_matrix(*dances, weights=weights)
     shares = np.histogram((costs - costs.min()) / (costs.max() - costs.min()), bins=4)[0] / costs.size

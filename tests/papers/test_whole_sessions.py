@@ -33,7 +33,7 @@ def library(request: pytest.FixtureRequest) -> Any:
     return open_library(request.getfixturevalue("mocap") / "cmu")
 
 
-def published(name) -> Any:
+def published(name: str) -> Any:
     return load_protocol(find_protocol(name))
 
 

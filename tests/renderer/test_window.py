@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,7 +98,7 @@ def test_a_picture_is_as_high_as_asked_in_its_own_shape_where_it_fits(
     assert fitted.focal_pixels == pytest.approx(100.0 * size[1] / 120, rel=0.01)
 
 
-def test_a_drawing_is_laid_out_again_only_for_another_size(puppet) -> None:
+def test_a_drawing_is_laid_out_again_only_for_another_size(puppet: Any) -> None:
     figure = make_figure(puppet.bones, puppet.sides, puppet.parts, style="stick")
     drawing = Drawing(puppet.walk(3), figure, frame_group([puppet.walk(3)], size=(160, 120)), 30.0, np.inf)
     assert drawing.fit((320, 240))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from study.transitions.weights import joint_weights
 from study.transitions.windows import SPECIFICATIONS, longest_available, shortfall, window
 
 
-def test_costs_are_those_of_the_plain_equations(make_walk: Callable[..., Clip], oracle) -> None:
+def test_costs_are_those_of_the_plain_equations(make_walk: Callable[..., Clip], oracle: ModuleType) -> None:
     source, destination = make_walk(60, phase=0.4), make_walk(60, phase=2.1, cadence=1.3, swing=0.7)
     weights = joint_weights(source.skeleton)
     fast = geodesic_costs(source, destination, 7, 50, 40, weights)

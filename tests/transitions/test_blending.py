@@ -15,7 +15,7 @@ from study.transitions.blending import blend, blend_weights, cut, facing, slerp_
 from study.transitions.windows import SPECIFICATIONS
 
 
-def speeds(clip) -> Any:
+def speeds(clip: Clip) -> Any:
     """Floor speed of the root between frames, m/s."""
     return np.linalg.norm(np.diff(clip.root_positions[:, [0, 2]], axis=0), axis=1) * clip.fps
 
@@ -117,7 +117,7 @@ def test_a_turning_destination_goes_on_turning(make_walk: Callable[..., Clip]) -
 
 
 @pytest.mark.parametrize("angle", [0.4, 2 * np.pi / 3, np.radians(170), -3.0])
-def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(make_walk: Callable[..., Clip], angle) -> None:
+def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(make_walk: Callable[..., Clip], angle: Any) -> None:
     source, destination = make_walk(120, turn_rate=0.5), make_walk(120, phase=2.0, speed=2.0)
     shift = np.array([3.0, 0.0, -7.0])
     plain = joint_positions(blend(source, destination, 50, 80, 25).clip)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from study.motion import quaternions as quat
-from study.motion.clip import joint_positions, moved, resample, trim
+from study.motion.clip import Clip, joint_positions, moved, resample, trim
 from study.motion.readers.registry import read_clip
 from study.transitions.blend_length import blend_length, joint_costs
 from study.transitions.blending import blend, cut, facing
@@ -39,13 +39,13 @@ def clips(mocap: Path) -> Any:
     return {name: trim(clip, 1, clip.frames) for name, clip in loaded.items()}
 
 
-def chosen(clips, name) -> Any:
+def chosen(clips: Any, name: str) -> Any:
     source, destination, start, end = PAIRS[name]
     length = blend_length(clips[source], clips[destination], start, end)
     return clips[source], clips[destination], start, end, length.blend_frames
 
 
-def local_velocity(clip) -> Any:
+def local_velocity(clip: Clip) -> Any:
     """Root velocity on the floor in the figure's facing, m/s: `x` to its left, `z` ahead."""
     heading = facing(clip)
     steps = np.diff(clip.root_positions, axis=0) * [1.0, 0.0, 1.0] * clip.fps
@@ -53,7 +53,7 @@ def local_velocity(clip) -> Any:
 
 
 @pytest.mark.parametrize("name", PAIRS)
-def test_the_root_moves_no_more_abruptly_than_in_the_clips(clips, name: str) -> None:
+def test_the_root_moves_no_more_abruptly_than_in_the_clips(clips: Any, name: str) -> None:
     source, destination, start, end, length = chosen(clips, name)
     for frames in (length, 10):
         result = blend(source, destination, start, end, frames)
@@ -68,7 +68,7 @@ def test_the_root_moves_no_more_abruptly_than_in_the_clips(clips, name: str) -> 
 
 
 @pytest.mark.parametrize("name", PAIRS)
-def test_feet_stop_sliding_and_joints_do_not_pop(clips, name: str) -> None:
+def test_feet_stop_sliding_and_joints_do_not_pop(clips: Any, name: str) -> None:
     source, destination, start, end, length = chosen(clips, name)
     raw = blend(source, destination, start, end, length)
     planted, result = plant_feet(raw, source, destination)
@@ -78,14 +78,14 @@ def test_feet_stop_sliding_and_joints_do_not_pop(clips, name: str) -> None:
     np.testing.assert_array_equal(planted.clip.rotations[: raw.blend_start], raw.clip.rotations[: raw.blend_start])
     np.testing.assert_array_equal(planted.clip.root_positions[: raw.blend_start], source.root_positions[:start])
 
-    def largest_kick(clip) -> Any:
+    def largest_kick(clip: Clip) -> Any:
         steps = quat.half_angle_between(clip.rotations[1:], clip.rotations[:-1])
         return np.max(np.abs(np.diff(steps, axis=0)))
 
     assert largest_kick(planted.clip) <= max(largest_kick(clip) for clip in (source, destination)) + 1e-9
 
 
-def test_contacts_of_a_walk_alternate(clips) -> None:
+def test_contacts_of_a_walk_alternate(clips: Any) -> None:
     contacts = find_contacts(clips["16_15"])
     share = contacts.mean(axis=0)
     # A foot bears weight for some 60% of a walking cycle, a toe a little less or more.
@@ -95,7 +95,7 @@ def test_contacts_of_a_walk_alternate(clips) -> None:
     assert running.all(axis=1).mean() < 0.05
 
 
-def test_walking_has_the_cost_curve_of_2004_figures_3_and_5(clips) -> None:
+def test_walking_has_the_cost_curve_of_2004_figures_3_and_5(clips: Any) -> None:
     """One deep minimum a cycle, a little over a second apart, on which hips and knees agree."""
     source, destination, start, end = clips["16_15"], clips["16_16"], 35, 75
     found = blend_length(source, destination, start, end)
@@ -109,7 +109,7 @@ def test_walking_has_the_cost_curve_of_2004_figures_3_and_5(clips) -> None:
     assert np.all(each[:, low] < 0.15 * each.max(axis=1, keepdims=True))
 
 
-def test_a_warp_finds_a_pair_of_lengths_that_costs_no_more(clips) -> None:
+def test_a_warp_finds_a_pair_of_lengths_that_costs_no_more(clips: Any) -> None:
     for source, destination, start, end in PAIRS.values():
         pair = clips[source], clips[destination]
         plain = blend_length(*pair, start, end, longest=20)
@@ -117,7 +117,7 @@ def test_a_warp_finds_a_pair_of_lengths_that_costs_no_more(clips) -> None:
         assert warped.cost <= plain.cost + 1e-12
 
 
-def test_turning_a_clip_on_the_floor_changes_no_length_and_no_pose(clips) -> None:
+def test_turning_a_clip_on_the_floor_changes_no_length_and_no_pose(clips: Any) -> None:
     source, destination = clips["16_35"], clips["16_41"]
     turned = moved(destination, np.radians(170), np.array([4.0, 0.0, -2.0]))
     lengths = [blend_length(source, clip, 12, 30).blend_frames for clip in (turned, destination)]
@@ -129,14 +129,14 @@ def test_turning_a_clip_on_the_floor_changes_no_length_and_no_pose(clips) -> Non
     )
 
 
-def test_a_cut_keeps_place_and_facing(clips) -> None:
+def test_a_cut_keeps_place_and_facing(clips: Any) -> None:
     source, destination = clips["16_15"], clips["16_41"]
     result = cut(source, destination, 60, 10)
     np.testing.assert_allclose(result.clip.root_positions[60, [0, 2]], source.root_positions[60, [0, 2]], atol=1e-12)
     assert facing(trim(result.clip, 60, 61))[0] == pytest.approx(facing(trim(source, 60, 61))[0], abs=1e-12)
 
 
-def test_the_hips_outweigh_the_elbows_on_a_captured_rig(clips) -> None:
+def test_the_hips_outweigh_the_elbows_on_a_captured_rig(clips: Any) -> None:
     skeleton = clips["16_15"].skeleton
     weights = joint_weights(skeleton)
     named = {skeleton.names[joint]: weights[joint] for joint in np.flatnonzero(weights)}

@@ -65,7 +65,7 @@ def pair(make_walk: Callable[..., Clip]) -> Any:
 @pytest.mark.parametrize("weights", ["wang2003", "lee2002"])
 @pytest.mark.parametrize("root", cm.ROOTS)
 @pytest.mark.parametrize("nu", [0.0, 1.0, 10.0])
-def test_agrees_with_the_equations_by_scipy(pair, weights: str, root: str, nu: float) -> None:
+def test_agrees_with_the_equations_by_scipy(pair: Any, weights: str, root: str, nu: float) -> None:
     source, destination = pair
     by_role = dict(WANG2003 if weights == "wang2003" else LEE2002)
     found = cm.cost_matrix(source, destination, weights=weights, nu=nu, root=root)
@@ -76,14 +76,14 @@ def test_agrees_with_the_equations_by_scipy(pair, weights: str, root: str, nu: f
         )
 
 
-def test_single_precision_is_good_to_a_millionth(pair) -> None:
+def test_single_precision_is_good_to_a_millionth(pair: Any) -> None:
     exact = cm.cost_matrix(*pair, weights="lee2002")
     single = cm.cost_matrix(*pair, weights="lee2002", precision="single")
     assert single.dtype == np.float32
     np.testing.assert_allclose(single, exact, atol=4e-6, rtol=2e-6)
 
 
-def test_without_velocity_and_root_it_is_the_difference_of_2004(pair) -> None:
+def test_without_velocity_and_root_it_is_the_difference_of_2004(pair: Any) -> None:
     weights = joint_weights(pair[0].skeleton)
     np.testing.assert_allclose(
         cm.cost_matrix(*pair, nu=0.0, root="none"), distance_matrix(*pair, weights), atol=1e-13, rtol=1e-12
@@ -92,7 +92,7 @@ def test_without_velocity_and_root_it_is_the_difference_of_2004(pair) -> None:
 
 @pytest.mark.parametrize("degrees", [120.0, 170.0, -75.0])
 @pytest.mark.parametrize("weights", ["wang2003", "lee2002"])
-def test_turning_and_moving_either_clip_changes_nothing(pair, degrees: float, weights: str) -> None:
+def test_turning_and_moving_either_clip_changes_nothing(pair: Any, degrees: float, weights: str) -> None:
     source, destination = pair
     expected = cm.cost_matrix(source, destination, weights=weights)
     there = moved(destination, np.radians(degrees), np.array([30.0, 0.0, -20.0]))
@@ -102,13 +102,13 @@ def test_turning_and_moving_either_clip_changes_nothing(pair, degrees: float, we
     )
 
 
-def test_a_root_in_the_world_counts_where_the_figure_is(pair) -> None:
+def test_a_root_in_the_world_counts_where_the_figure_is(pair: Any) -> None:
     source, destination = pair
     far = moved(destination, 0.0, np.array([3.0, 0.0, 4.0]))
     assert cm.cost_matrix(source, far, root="world").min() > cm.cost_matrix(source, far, root="matched").min() + 1.0
 
 
-def test_a_clip_costs_nothing_to_itself(pair) -> None:
+def test_a_clip_costs_nothing_to_itself(pair: Any) -> None:
     np.testing.assert_allclose(np.diag(cm.cost_matrix(pair[0], pair[0], weights="lee2002")), 0.0, atol=1e-12)
 
 
@@ -151,7 +151,7 @@ def test_point_clouds_come_in_blocks_too(make_walk: Callable[..., Clip]) -> None
     assert cm.extremes(cm.pointcloud_blocks(source, destination, window=5)).shape == (296, 76)
 
 
-def test_what_can_not_be_compared_is_refused(pair) -> None:
+def test_what_can_not_be_compared_is_refused(pair: Any) -> None:
     source, destination = pair
     with pytest.raises(TransitionError, match="matched, world, none"):
         cm.cost_matrix(source, destination, root="floor")

@@ -10,11 +10,12 @@ from scipy.spatial.transform import Rotation
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, moved
+from study.motion.skeleton import Skeleton
 from study.transitions.distances import distance_matrix, frame_distance, joint_differences, on_joints_of
 from study.transitions.weights import joint_weights
 
 
-def test_a_half_turn_of_one_joint_is_half_pi_away(rig) -> None:
+def test_a_half_turn_of_one_joint_is_half_pi_away(rig: Callable[..., Skeleton]) -> None:
     skeleton = rig()
     rest = np.tile(quat.IDENTITY, (skeleton.joints, 1))
     turned = rest.copy()

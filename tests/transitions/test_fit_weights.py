@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
+from study.motion.skeleton import Skeleton
 from study.transitions.candidates import candidates
 from study.transitions.cost_matrix import cost_matrix
 from study.transitions.fit_weights import (
@@ -24,7 +27,7 @@ from study.transitions.weights import LEE2002, ROLES, WANG2003
 
 
 @pytest.fixture(scope="module")
-def clips(rig) -> list[Clip]:
+def clips(rig: Callable[..., Skeleton]) -> list[Clip]:
     """Restless figures: every joint wanders smoothly on its own, so that no two joints tell the same."""
     skeleton = rig()
     rng = np.random.default_rng(3)
@@ -42,7 +45,7 @@ def clips(rig) -> list[Clip]:
     return made
 
 
-def cuts_from(clips, weights, *, good: int = 5, bad: int = 60, seed: int = 0) -> list[LabelledCut]:
+def cuts_from(clips: Any, weights: Any, *, good: int = 5, bad: int = 60, seed: int = 0) -> list[LabelledCut]:
     """So many cuts for each pair of clips: good ones cost least by known weights, bad ones all the same."""
     rng = np.random.default_rng(seed)
     cuts = []
@@ -58,7 +61,7 @@ def cuts_from(clips, weights, *, good: int = 5, bad: int = 60, seed: int = 0) ->
     return cuts
 
 
-def test_a_is_the_cost_per_unit_of_weight(clips) -> None:
+def test_a_is_the_cost_per_unit_of_weight(clips: list[Clip]) -> None:
     cuts = [LabelledCut(clips[0], clips[1], i, j, 0.0) for i, j in ((5, 90), (40, 11), (100, 140))]
     groups = weight_groups(clips[0].skeleton)
     assert {role for group in groups for role in group} == set(clips[0].skeleton.roles)
@@ -70,7 +73,7 @@ def test_a_is_the_cost_per_unit_of_weight(clips) -> None:
             np.testing.assert_allclose(cost_terms(cuts, groups, nu) @ by_group, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_labels_from_known_weights_give_them_back(clips) -> None:
+def test_labels_from_known_weights_give_them_back(clips: list[Clip]) -> None:
     """2003 Eq. 3: bad transitions at one cost, good ones near none, drawn from Table 1's weights."""
     found = fit_weights(cuts_from(clips, WANG2003))
     assert max(found.weights.values()) == 1.0
@@ -81,7 +84,7 @@ def test_labels_from_known_weights_give_them_back(clips) -> None:
         assert found.weights[f"{part}.L"] == found.weights[f"{part}.R"], "symmetric"
 
 
-def test_labels_that_are_the_cost_itself_give_the_weights_exactly(clips) -> None:
+def test_labels_that_are_the_cost_itself_give_the_weights_exactly(clips: list[Clip]) -> None:
     rng = np.random.default_rng(1)
     weights = {"hip.L": 1.0, "hip.R": 1.0, "chest": 0.25, "wrist.L": 0.5, "wrist.R": 0.5}
     costs = cost_matrix(clips[0], clips[1], weights=weights, root="none")
@@ -96,7 +99,7 @@ def test_labels_that_are_the_cost_itself_give_the_weights_exactly(clips) -> None
         assert value == pytest.approx(weights.get(role, 0.0), abs=1e-8)
 
 
-def test_leaving_one_out_moves_the_best_transition_by_less_than_a_frame(clips) -> None:
+def test_leaving_one_out_moves_the_best_transition_by_less_than_a_frame(clips: list[Clip]) -> None:
     cuts = cuts_from(clips, WANG2003, good=4, bad=6)
     seen = []
     found = cross_validate(cuts, transfer=(clips[0], clips[2]), progress=lambda done, of: seen.append((done, of)))
@@ -107,7 +110,7 @@ def test_leaving_one_out_moves_the_best_transition_by_less_than_a_frame(clips) -
     assert seen[-1] == (len(cuts), len(cuts))
 
 
-def test_the_best_transition_within_a_clip_is_not_to_the_next_frame(clips) -> None:
+def test_the_best_transition_within_a_clip_is_not_to_the_next_frame(clips: list[Clip]) -> None:
     i, j = best_transition(clips[0], clips[0], WANG2003)
     assert abs(i - j) >= 15
     short = replace(clips[0], root_positions=clips[0].root_positions[:10], rotations=clips[0].rotations[:10])
@@ -115,7 +118,7 @@ def test_the_best_transition_within_a_clip_is_not_to_the_next_frame(clips) -> No
         best_transition(short, short, WANG2003)
 
 
-def test_labels_that_can_not_be_fitted_are_refused(clips) -> None:
+def test_labels_that_can_not_be_fitted_are_refused(clips: list[Clip]) -> None:
     good = LabelledCut(clips[0], clips[1], 3, 4, 0.0)
     with pytest.raises(TransitionError, match="both good and bad"):
         fit_weights([good, good])
@@ -180,7 +183,7 @@ def test_faulty_tables_are_refused_with_their_line(tmp_path: Path, text: str, wo
         read_labels(path)
 
 
-def test_candidates_hold_the_best_and_the_worst_of_each_metric(clips) -> None:
+def test_candidates_hold_the_best_and_the_worst_of_each_metric(clips: list[Clip]) -> None:
     found = candidates(clips[0], clips[1], np.random.default_rng(0), best=1, worst=1, at_random=3)
     by_kind = {part: one for one in found for part in one.found.split(", ")}
     costs = cost_matrix(clips[0], clips[1], weights="lee2002")[15:-1, 1:-15]
@@ -192,6 +195,6 @@ def test_candidates_hold_the_best_and_the_worst_of_each_metric(clips) -> None:
     assert found == again, "a seed gives the same cuts in the same order, so that labelling goes on where it stopped"
 
 
-def test_candidates_within_one_clip_are_apart(clips) -> None:
+def test_candidates_within_one_clip_are_apart(clips: list[Clip]) -> None:
     for one in candidates(clips[0], clips[0], np.random.default_rng(0), at_random=0):
         assert abs(one.source_frame - one.destination_frame) >= 12

@@ -38,7 +38,7 @@ def slider(make_walk: Callable[..., Clip]) -> Clip:
     return replace(walk, root_positions=positions, rotations=rotations)
 
 
-def knee_bend(clip, side) -> Any:
+def knee_bend(clip: Clip, side: Any) -> Any:
     """Signed angle of the knee, radians, positive where it bends the way knees do (about the line of the hips)."""
     positions = joint_positions(clip)
     hip, knee, ankle = (positions[:, clip.skeleton.role(f"{part}.{side}")] for part in ("hip", "knee", "ankle"))

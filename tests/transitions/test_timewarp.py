@@ -17,7 +17,7 @@ from study.transitions.timewarp import warp_costs, warp_length, warped_blend
 from study.transitions.weights import joint_weights
 
 
-def plain_cost(source, destination, i, j, b_from, b_to, weights) -> Any:
+def plain_cost(source: Clip, destination: Clip, i: int, j: int, b_from: int, b_to: int, weights: Any) -> Any:
     """2004 Eqs. 5 and 6 as printed, pose by pose, with slerp between frames; the sum, not the mean."""
     total = 0.0
     for t in range(1, max(b_from, b_to) + 1):
@@ -39,7 +39,7 @@ def pair(make_walk: Callable[..., Clip]) -> Any:
 
 
 @pytest.mark.parametrize("average", [True, False])
-def test_costs_are_those_of_the_plain_equations(pair, average: bool) -> None:
+def test_costs_are_those_of_the_plain_equations(pair: Any, average: bool) -> None:
     weights = joint_weights(pair[0].skeleton)
     costs = warp_costs(*pair, 20, 40, 9, weights, average=average, steepest=math.inf)
     for b_from in range(1, 10):
@@ -57,7 +57,7 @@ def test_long_windows_agree_at_a_sample_of_lengths(make_walk: Callable[..., Clip
         assert costs[b_from - 1, b_to - 1] == pytest.approx(plain_cost(*pair, 25, 70, b_from, b_to, weights), rel=1e-11)
 
 
-def test_equal_lengths_cost_what_the_geodesic_method_says(pair) -> None:
+def test_equal_lengths_cost_what_the_geodesic_method_says(pair: Any) -> None:
     weights = joint_weights(pair[0].skeleton)
     warped = np.diag(warp_costs(*pair, 15, 45, 30, weights))
     np.testing.assert_allclose(warped, geodesic_costs(*pair, 15, 45, 30, weights), rtol=1e-12, atol=1e-15)
@@ -170,19 +170,19 @@ def test_another_tempo_of_the_same_motion_is_found(make_walk: Callable[..., Clip
     assert (found.blend_frames, found.blend_s) == (45, 1.5)
 
 
-def test_the_printed_sum_favours_short_blends(pair) -> None:
+def test_the_printed_sum_favours_short_blends(pair: Any) -> None:
     mean = warp_length(*pair, 20, 40, longest=15)
     printed = warp_length(*pair, 20, 40, longest=15, average=False)
     assert printed.blend_frames <= mean.blend_frames
     assert printed.cost <= mean.cost * mean.blend_frames
 
 
-def test_where_the_clips_stand_changes_nothing(pair) -> None:
+def test_where_the_clips_stand_changes_nothing(pair: Any) -> None:
     turned = moved(pair[1], np.radians(170), np.array([1.0, 0.0, 2.0]))
     assert warp_length(*pair, 20, 40, longest=12).cost == warp_length(pair[0], turned, 20, 40, longest=12).cost
 
 
-def test_equal_lengths_blend_as_without_a_warp(pair) -> None:
+def test_equal_lengths_blend_as_without_a_warp(pair: Any) -> None:
     plain, warped = blend(*pair, 20, 40, 12), warped_blend(*pair, 20, 40, 12, 12)
     np.testing.assert_allclose(warped.clip.root_positions, plain.clip.root_positions, atol=1e-12)
     np.testing.assert_allclose(quat.half_angle_between(warped.clip.rotations, plain.clip.rotations), 0, atol=1e-7)
@@ -210,7 +210,7 @@ def test_a_warped_blend_takes_the_longer_time_and_keeps_the_rest(
     assert speed.min() > 0
 
 
-def test_frames_that_are_not_there_are_counted(pair) -> None:
+def test_frames_that_are_not_there_are_counted(pair: Any) -> None:
     with pytest.raises(TransitionError, match="the source lacks 1 frame before its first"):
         warp_length(*pair, 0, 40, longest=5)
     with pytest.raises(

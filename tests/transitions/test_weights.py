@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from study.motion.skeleton import Skeleton
 from study.transitions.weights import joint_weights
 
 
-def test_the_root_weighs_nothing_unless_asked_for(rig) -> None:
+def test_the_root_weighs_nothing_unless_asked_for(rig: Callable[..., Skeleton]) -> None:
     skeleton = rig()
     weights = joint_weights(skeleton, "lee2002")
     assert weights[skeleton.role("pelvis")] == 0.0
@@ -17,7 +19,7 @@ def test_the_root_weighs_nothing_unless_asked_for(rig) -> None:
     assert joint_weights(skeleton, "lee2002", with_root=True)[skeleton.role("pelvis")] == 1.0
 
 
-def test_a_mapping_by_role_is_taken_as_it_is(rig) -> None:
+def test_a_mapping_by_role_is_taken_as_it_is(rig: Callable[..., Skeleton]) -> None:
     skeleton = rig()
     weights = joint_weights(skeleton, {"wrist.L": 0.25, "head": 2.0, "hip.L": 0.0})
     assert weights[skeleton.role("wrist.L")] == 0.25
@@ -49,6 +51,8 @@ def test_a_rig_without_a_needed_joint_is_refused_by_role() -> None:
         ({"pelvis": 1.0}, "other than the root"),
     ],
 )
-def test_weights_that_make_no_sense_are_refused(rig, weights: dict[str, float] | str, message: str) -> None:
+def test_weights_that_make_no_sense_are_refused(
+    rig: Callable[..., Skeleton], weights: dict[str, float] | str, message: str
+) -> None:
     with pytest.raises(TransitionError, match=message):
         joint_weights(rig(), weights)

@@ -6,14 +6,17 @@ The result goes through `summary.analyse` as our own answers do.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from study.analysis.foreign.columns import column, few, numbers, row_of, taken
 from study.analysis.foreign.words import FIRST, SECOND
 from study.counting import counted
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Numbers that questionnaires write where there is no answer.
 CODES = (-9.0, -99.0, -999.0, 99.0, 999.0, 9999.0)
@@ -216,6 +219,8 @@ def _refuse_off_scale(answer: pd.Series[str], rating: pd.Series[float], columns:
 
 def _common(table: pd.DataFrame, columns: AnswerColumns, task: str, answer: pd.Series[str]) -> pd.DataFrame:
     """What both tasks have: who answered what, in the file's order."""
+    import pandas as pd
+
     who = column(table, columns.participant, "participant") if columns.participant else "participant"
     found = pd.DataFrame({"participant": who, "task": task, "study": task}, index=table.index)
     nobody = found["participant"][(found["participant"] == "") & (answer != "")]

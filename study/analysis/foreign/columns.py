@@ -6,12 +6,14 @@ import difflib
 import json
 import re
 from collections.abc import Sequence
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis.estimates import LARGEST
 from study.analysis.foreign.words import BLANK
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SMALLEST = 1e-12
 
@@ -90,6 +92,8 @@ def numbers(text: pd.Series[str], name: str, means: str, decimal: str | None = N
     AnalysisError
         When a cell holds something else, or a comma may stand for thousands as well as for decimals.
     """
+    import pandas as pd
+
     text = text.str.replace("\u2212", "-", regex=False)
     given = text[text != ""]
     if decimal == "comma" or (decimal is None and _has_decimal_commas(given, name)):

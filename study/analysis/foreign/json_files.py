@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import json
 import re
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 HOLDERS = ("trials", "data", "results")
 
@@ -35,6 +36,8 @@ def parse_json(text: str) -> pd.DataFrame:
     AnalysisError
         When the text is not JSON, or holds no trials.
     """
+    import pandas as pd
+
     trials = [trial for value in _values(text) for trial in _trials(value)]
     if not trials:
         raise AnalysisError(

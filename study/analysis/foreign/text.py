@@ -11,12 +11,14 @@ import csv
 import io
 import re
 from collections.abc import Sequence
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis.foreign.kinds import other_kind
 from study.counting import counted
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "space": " "}
 END = "END OF FILE"
@@ -70,6 +72,8 @@ def parse_table(text: str, needed: Sequence[str], delimiter: str | None = None) 
         When there is no heading or row, the delimiter can't be determined, a row has more cells than the heading, or a
         needed column occurs twice.
     """
+    import pandas as pd
+
     stated = re.match(r"sep=(.)\r?\n", text, re.IGNORECASE)  # for spreadsheets, which then show it in no cell
     mark = DELIMITERS[delimiter] if delimiter else stated[1] if stated else _delimiter(text, needed)
     records = _records(text, mark)[1 if stated else 0 :]

@@ -8,13 +8,15 @@ stimulus level here; preferences and ratings in `foreign_answers`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis.foreign.columns import column, few, numbers, row_of, taken
 from study.analysis.foreign.words import NO, YES
 from study.counting import counted
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TASKS = ("2afc", "yes-no", "same-different")
 MOST_ANSWERS = 1_000_000
@@ -90,6 +92,8 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Trials:
     AnalysisError
         When a column is missing, or a cell can't be understood.
     """
+    import pandas as pd
+
     if task not in TASKS:
         raise AnalysisError(f"expected one of the tasks {', '.join(TASKS)}, found {task!r}")
     rows = len(table)

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
-
-import pandas as pd
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from study.analysis import estimates
 from study.analysis.psychometric.analyse import PsychometricStudy, analyse_psychometric
@@ -19,6 +17,10 @@ from study.analysis.psychometric.model import make_model
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
 from study.models.oddity import CHANCE, d_prime_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 Side = Literal["shorter", "longer"]
 SIGNS: Mapping[Side, int] = {"shorter": -1, "longer": 1}

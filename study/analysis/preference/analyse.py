@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import pandas as pd
 
 from study.analysis import estimates
 from study.analysis.estimates import NotFitted
@@ -26,6 +25,9 @@ from study.analysis.preference.participants import ParticipantTests, participant
 from study.analysis.preference.published import MotionPreference, Published, by_motion, without_ties
 from study.analysis.study_result import Settings
 from study.counting import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis import estimates
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _TRUTH = {"true": "1", "false": "0"}
 NEEDED_COLUMNS = ("participant", "chose_a", "method_a", "method_b")
@@ -19,6 +22,8 @@ def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
     AnalysisError
         When a column is missing, or `chose_a` holds anything else.
     """
+    import pandas as pd
+
     estimates.check_columns(answers, NEEDED_COLUMNS, "a preference analysis")
     chosen = answers[answers["task"] == "preference"] if "task" in answers.columns else answers
     given = chosen[chosen["chose_a"].notna()].copy()

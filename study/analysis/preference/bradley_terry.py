@@ -15,8 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
-from scipy.special import expit, xlogy
 
 from study.analysis.estimates import Interval, chi_square_probability, normal_quantile, t_quantile
 from study.analysis.scoring import maximise
@@ -158,6 +156,8 @@ def _finite(design: FloatArray, yes: FloatArray, total: FloatArray, contrasts: F
 
     The likelihood does not fall along a direction that goes with every answer; what changes along one is not finite.
     """
+    from scipy.optimize import linprog
+
     signed = np.unique(np.concatenate([design[yes > 0], -design[yes < total]]), axis=0)
 
     def highest(aim: FloatArray) -> float:
@@ -186,6 +186,7 @@ def _fitted(
     `design` has a row a comparison and a column a method but the one held at 0; `yes` of `total` answers favoured the
     first. `told` says of each method whether the answers tell its strength.
     """
+    from scipy.special import expit, xlogy
 
     def share(point: FloatArray) -> FloatArray:
         return np.clip(np.asarray(expit(point @ design.T), dtype=np.float64), 1e-12, 1 - 1e-12)

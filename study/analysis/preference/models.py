@@ -8,12 +8,10 @@ participant belong together.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import expit
 
 from study.analysis import estimates
 from study.analysis.regression.estimating_equations import estimating_equations
@@ -21,6 +19,9 @@ from study.analysis.regression.mixed import fit_mixed, marginal_share
 from study.analysis.regression.random_effects import LARGEST_EFFECT, LARGEST_ERROR
 from study.counting import counted
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = NDArray[np.float64]
 
@@ -122,6 +123,7 @@ def _counted(
 
 
 def _percent(logit: float | None) -> float | None:
+    from scipy.special import expit
 
     return None if logit is None else 100 * float(expit(logit))
 

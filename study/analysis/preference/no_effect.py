@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import quad
-from scipy.special import stdtr
 
 from study.analysis.estimates import Interval, mean_test, t_quantile
 
@@ -59,6 +57,8 @@ def no_preference(shares: ArrayLike, margin: float = MARGIN, alpha: float = 0.05
     alpha
         Error rate of the equivalence test.
     """
+    from scipy.special import stdtr
+
     test = mean_test(shares, 0.5, 1 - 2 * alpha)
     if test.t is None or test.standard_error is None or test.mean is None or test.degrees_of_freedom is None:
         return NoEffect(margin, None, Interval(None, None, 1 - 2 * alpha), None, test.note)
@@ -85,6 +85,8 @@ def bayes_factor_null(statistic: float, participants: int, scale: float = PRIOR_
     >>> round(bayes_factor_null(2.03, 80, scale=1.0), 2)
     1.56
     """
+    from scipy.integrate import quad
+
     freedom = participants - 1
     if freedom < 1 or not np.isfinite(statistic):
         return None

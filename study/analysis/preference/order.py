@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis.preference.participants import participant_tests
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ONE_ORDER = "the two were always shown in the same order: a preference cannot be separated from an effect of order"
 

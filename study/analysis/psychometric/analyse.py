@@ -7,9 +7,9 @@ group, since answers of one participant are not independent of each other.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from study.analysis import estimates
 from study.analysis.estimates import NotFitted
@@ -19,6 +19,9 @@ from study.analysis.psychometric.model import Model, make_model
 from study.analysis.psychometric.posterior import Estimate, curve_of, fit_psychometric
 from study.analysis.regression.mixed import Link
 from study.counting import counted, noun
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NEEDED_COLUMNS = ("participant", "level", "yes", "shown")
 LINKS_OF: dict[str, Link] = {"normal": "probit", "logistic": "logit"}

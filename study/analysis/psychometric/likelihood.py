@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import xlogy
 
 from study.analysis import estimates
 from study.analysis.psychometric.model import (
@@ -211,6 +210,7 @@ def fit_likelihood(
 
 
 def _saturated(yes: FloatArray, shown: FloatArray) -> FloatArray:
+    from scipy.special import xlogy
 
     share = yes / np.maximum(shown, 1e-12)
     return np.asarray((xlogy(yes, share) + xlogy(shown - yes, 1 - share)).sum(axis=-1), dtype=np.float64)

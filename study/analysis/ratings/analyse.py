@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
-
-import pandas as pd
+from typing import TYPE_CHECKING, ClassVar
 
 from study.analysis.ratings.answers import of_pairs
 from study.analysis.ratings.comparisons import MethodDifference, Question, rating_anova
@@ -15,6 +13,9 @@ from study.analysis.ratings.table import CellRating, MethodRating, rating_cells,
 from study.analysis.study_result import Settings
 from study.counting import counted
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)

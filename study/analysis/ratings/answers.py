@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis import estimates
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def rated(answers: pd.DataFrame) -> pd.DataFrame:
@@ -16,6 +19,8 @@ def rated(answers: pd.DataFrame) -> pd.DataFrame:
     AnalysisError
         When an answer is not a number.
     """
+    import pandas as pd
+
     part = answers[answers["task"] == "rating"] if "task" in answers.columns else answers
     part = part[part["answer"].notna()].copy()
     part["rating"] = pd.to_numeric(part["answer"].astype(str).str.strip(), errors="coerce").astype(float)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from study.analysis import estimates
@@ -21,6 +21,9 @@ from study.analysis.regression.ordinal import OrdinalFit, fit_ordinal
 from study.analysis.variance.repeated_measures import Likeness, WithinEffect, likeness, mixed_design
 from study.analysis.variance.two_way import TwoWay, two_way
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = NDArray[np.float64]
 

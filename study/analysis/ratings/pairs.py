@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from study.analysis import estimates
 from study.analysis.estimates import Mean, MeanTest, mean_of, mean_test
@@ -20,6 +20,9 @@ from study.analysis.rank_tests import NO_RANKS, signed_rank
 from study.analysis.ratings.answers import rated
 from study.counting import counted
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NEEDED_COLUMNS = ("participant", "answer", "method_a", "method_b", "a_first")
 

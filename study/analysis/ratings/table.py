@@ -7,12 +7,13 @@ saw first.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from study.analysis.estimates import Mean, mean_of
 from study.analysis.ratings.answers import first_seen, rated
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[Metho
     AnalysisError
         When an answer is not a number.
     """
+    import pandas as pd
+
     part = rated(answers)
     who = part["participant"].astype(str)
     method = part["method_a"].astype(str) if "method_a" in part.columns else pd.Series("all", index=part.index)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import expit
 
 from study.errors import AnalysisError
 
@@ -97,6 +96,7 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _mean(values: FloatArray, rows: FloatArray) -> FloatArray:
+    from scipy.special import expit
 
     # Kept off 0 and 1, where a residual could not be scaled.
     return np.asarray(expit((rows @ values).clip(-25, 25)), dtype=np.float64)

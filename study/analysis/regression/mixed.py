@@ -16,7 +16,6 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize
 
 from study.analysis.regression.random_effects import (
     LARGEST_EFFECT,
@@ -130,6 +129,7 @@ def fit_mixed(
     reason = _why_no_fit(problem, people)
     if reason:
         return reason
+    from scipy.optimize import minimize
 
     effects, random_size = problem.fixed.shape[2], problem.random.shape[2]
     grid, log_weights = quadrature(nodes, random_size)

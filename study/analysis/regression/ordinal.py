@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize
-from scipy.special import expit
 
 from study.analysis.regression.random_effects import (
     LARGEST_EFFECT,
@@ -145,6 +143,7 @@ def _why_no_fit(design: FloatArray, points: int, people: int) -> str:
 def _fitted(
     problem: _Problem, points: FloatArray, names: Sequence[str], nodes: int, confidence: float
 ) -> OrdinalFit | str:
+    from scipy.optimize import minimize
 
     effects, cuts, people = problem.design.shape[1], problem.categories - 1, len(problem.starts)
     grid, log_weights = quadrature(nodes, 1)
@@ -184,6 +183,8 @@ def _parts(eta: FloatArray, edges: FloatArray, problem: _Problem) -> tuple[Float
 
     `eta` is of shape (answers, points).
     """
+    from scipy.special import expit
+
     above = expit(edges[problem.code + 1][:, None] - eta)
     below = expit(edges[problem.code][:, None] - eta)
     chance = np.maximum(above - below, 1e-300)

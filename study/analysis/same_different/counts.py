@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.errors import AnalysisError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = NDArray[np.float64]
 Side = Literal["shorter", "longer"]
@@ -114,6 +116,8 @@ def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
 
 def count_answers(answers: pd.DataFrame) -> Counts:
     """Count answers by participant and signed difference in blend length."""
+    import pandas as pd
+
     given = same_different_answers(answers)
     if given.empty:
         nothing = np.zeros((0, 0))

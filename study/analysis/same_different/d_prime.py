@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtri
 
 from study.analysis.same_different.counts import Counts
 from study.analysis.same_different.fits import d_prime_interval
@@ -60,6 +58,9 @@ def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: floa
     One half is added to each count of answers, one to each count of pairs (Hautus 1995), so that 0 and 100% stay
     finite; this pulls d-prime towards 0 where there are few answers. The interval is that of the counts as they are.
     """
+    from scipy.optimize import brentq
+    from scipy.special import ndtri
+
     for yes, pairs in ((hits, different_pairs), (alarms, same_pairs)):
         if not 0 <= yes <= pairs < np.inf:
             raise AnalysisError(

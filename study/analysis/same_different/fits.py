@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from study.analysis.estimates import normal_quantile
 from study.analysis.scoring import maximise
@@ -95,6 +94,8 @@ def _bounds(frames: FloatArray, largest_lapse: float) -> tuple[FloatArray, Float
 
 def _start(frames: FloatArray, different: FloatArray, shown: FloatArray) -> FloatArray:
     """First guesses: the criterion from the pairs with no difference, slopes from percentages turned into d-prime."""
+    from scipy.special import ndtri
+
     share = (different + 0.5) / (shown + 1)
     nothing = frames.sum(axis=1) == 0
     alarms = (different[:, nothing].sum(axis=1) + 0.5) / (shown[:, nothing].sum(axis=1) + 1)

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from study.analysis.same_different.counts import SIDES, Counts, frames_by_side
 from study.analysis.same_different.fits import LARGEST_LAPSE
@@ -62,6 +61,7 @@ class Rules:
 
 
 def _odd(delta: FloatArray, criterion: FloatArray) -> FloatArray:
+    from scipy.special import ndtr
 
     return np.asarray(ndtr(delta - criterion) + ndtr(-delta - criterion), dtype=np.float64)
 

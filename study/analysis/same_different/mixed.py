@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from study.analysis import estimates
 from study.analysis.same_different import fits
@@ -219,6 +218,7 @@ def _maximise(
     people: _People, begin: FloatArray, bounds: list[tuple[float, float]], avoidance: float
 ) -> tuple[FloatArray, float, bool]:
     """The highest point of the likelihood times the spread of sensitivity to the power `avoidance`."""
+    from scipy.optimize import minimize
 
     def loss(point: FloatArray) -> tuple[float, FloatArray]:
         value, gradient = _log_likelihood(point, people)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import xlogy
 
 from study.analysis import estimates
 from study.analysis.same_different import fits
@@ -230,6 +229,7 @@ def _caution(best: fits.Fits) -> str:
 
 
 def _saturated_log_likelihood(different: FloatArray, shown: FloatArray) -> float:
+    from scipy.special import xlogy
 
     share = different / shown
     return float((xlogy(different, share) + xlogy(shown - different, 1 - share)).sum())

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-from scipy.special import xlogy
 
 from study.analysis import estimates
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ def _with_ratio(
     """The test with the likelihood ratio of a share a level and order against one a level."""
 
     def log_likelihood(keys: list[pd.Series[Any]]) -> tuple[float, int]:
+        from scipy.special import xlogy
 
         sums = different.groupby(keys).agg(["sum", "count"])
         yes, shown = sums["sum"].to_numpy(dtype=np.float64), sums["count"].to_numpy(dtype=np.float64)

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from study.analysis import estimates
 from study.analysis.same_different.counts import Side, Threshold
 from study.counting import counted
 from study.models.up_down import Track, UpDown, moved, target
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SIGNS: dict[Side, int] = {"longer": 1, "shorter": -1}
 

@@ -9,9 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scipy.optimize import brentq
-from scipy.special import ncfdtr
-
 from study.analysis.estimates import Interval
 
 LARGEST = 1e6
@@ -90,6 +87,8 @@ def effect_size(f: float, degrees: float, error_degrees: float, alpha: float = 0
 
 def _noncentrality(f: float, degrees: float, error_degrees: float, probability: float) -> float | None:
     """The noncentrality under which a smaller F has this probability; 0 where none does; None where it is endless."""
+    from scipy.optimize import brentq
+    from scipy.special import ncfdtr
 
     def excess(noncentrality: float) -> float:
         return float(ncfdtr(degrees, error_degrees, noncentrality, f)) - probability

@@ -24,15 +24,15 @@ MEASURED = """(async () => {{
 }})()"""
 
 
-def steady(period_ms=1000 / FPS, leave_out=(), first: int = 0) -> list[Any]:
+def steady(period_ms: float = 1000 / FPS, leave_out: Any = (), first: int = 0) -> list[Any]:
     return [(i, i + 7, 500 + i * period_ms) for i in range(first, FRAMES) if i not in leave_out]
 
 
-def twice_counted(at, leave_out=()) -> list[Any]:
+def twice_counted(at: Any, leave_out: Any = ()) -> list[Any]:
     return [(i, count + (i >= at), time) for i, count, time in steady(leave_out=leave_out)]
 
 
-def told_twice(at) -> list[Any]:
+def told_twice(at: Any) -> list[Any]:
     told = steady()
     return [*told[: at + 1], (at, told[at][1] + 1, told[at][2] + 5), *[(i, n + 1, ms) for i, n, ms in told[at + 1 :]]]
 

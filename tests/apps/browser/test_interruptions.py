@@ -32,14 +32,14 @@ AWAY_S = 3.5  # longer than the page takes to give a film up that does not go on
 
 
 @contextmanager
-def minimised(tab) -> Iterator[None]:
+def minimised(tab: Any) -> Iterator[None]:
     tab.window("minimized")
     yield
     tab.window("normal")
 
 
 @contextmanager
-def behind_another_tab(tab) -> Iterator[None]:
+def behind_another_tab(tab: Any) -> Iterator[None]:
     target = tab.browser.call("Target.createTarget", url="about:blank", browserContextId=tab.context)["targetId"]
     tab.wait("document.hidden")
     yield
@@ -47,7 +47,7 @@ def behind_another_tab(tab) -> Iterator[None]:
 
 
 @contextmanager
-def frozen(tab) -> Iterator[None]:
+def frozen(tab: Any) -> Iterator[None]:
     """As browsers do with pages that nobody looks at, to save power."""
     tab.window("minimized")
     tab.call("Page.setWebLifecycleState", state="frozen")
@@ -57,7 +57,7 @@ def frozen(tab) -> Iterator[None]:
 
 
 @contextmanager
-def lid_closed(tab) -> Iterator[None]:
+def lid_closed(tab: Any) -> Iterator[None]:
     with tab.browser.stopped():
         yield
 

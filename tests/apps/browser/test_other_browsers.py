@@ -8,15 +8,17 @@ from typing import Any
 
 import pytest
 import sqlalchemy as sa
+from bidi import FirefoxTab
 from serving import QUESTIONS, Site
 from walking import answers, check_frames, go_on, happened
+from webdriver import WebKitTab
 
 from study.experiment.store.tables import presentations
 
 pytestmark = pytest.mark.gl
 
 
-def walk(site: Site, tab, keys: bool = True) -> Any:
+def walk(site: Site, tab: Any, keys: bool = True) -> Any:
     """A whole session; returns how its films were shown."""
     tab.open(site.address)
     try:
@@ -35,13 +37,13 @@ def walk(site: Site, tab, keys: bool = True) -> Any:
 
 
 @pytest.mark.parametrize("keys", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["keys", "buttons"])
-def test_firefox_walks_through_every_task(make_site: Callable[..., Site], firefox_tab, keys: bool) -> None:
+def test_firefox_walks_through_every_task(make_site: Callable[..., Site], firefox_tab: FirefoxTab, keys: bool) -> None:
     site = make_site()
     check_frames(walk(site, firefox_tab, keys))
     assert "Firefox" in happened(site, "display")[0]["user_agent"]
 
 
-def test_without_frame_callbacks_the_record_says_so(make_site: Callable[..., Site], firefox_tab) -> None:
+def test_without_frame_callbacks_the_record_says_so(make_site: Callable[..., Site], firefox_tab: FirefoxTab) -> None:
     """An older browser: sessions go on, and nothing claims that frames were measured."""
     site = make_site()
     firefox_tab.before_each_page("delete HTMLVideoElement.prototype.requestVideoFrameCallback;")
@@ -55,7 +57,7 @@ def test_without_frame_callbacks_the_record_says_so(make_site: Callable[..., Sit
 
 @pytest.mark.slow
 @pytest.mark.parametrize("keys", [True, False], ids=["keys", "buttons"])
-def test_webkit_walks_through_every_task(make_site: Callable[..., Site], webkit_tab, keys: bool) -> None:
+def test_webkit_walks_through_every_task(make_site: Callable[..., Site], webkit_tab: WebKitTab, keys: bool) -> None:
     site = make_site()
     check_frames(walk(site, webkit_tab, keys))
     assert "AppleWebKit" in happened(site, "display")[0]["user_agent"]

@@ -144,12 +144,12 @@ def test_reduced_motion_is_told_of_and_hides_no_film(
     assert tab.run("getComputedStyle(document.querySelector('video.now')).visibility") == "visible"
 
 
-def to_films_through(tab) -> None:
+def to_films_through(tab: Any) -> None:
     while not tab.run("document.querySelector('video.now') !== null"):
         read_on(tab)
 
 
-def as_tablet(tab, width, height) -> None:
+def as_tablet(tab: Any, width: int, height: int) -> None:
     tab.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=2, mobile=True)
     tab.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=5)
 
@@ -196,7 +196,7 @@ def test_touch_is_refused_politely_where_the_protocol_does_not_allow_it(
     assert site.host.live_sessions == {}
 
 
-def spoken(tab) -> set[Any]:
+def spoken(tab: Any) -> set[Any]:
     """What a screen reader finds: role and name of all that has a name, and whether it is announced by itself."""
     nodes = tab.call("Accessibility.getFullAXTree")["nodes"]
     return {(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node.get("ignored")}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
@@ -155,7 +156,7 @@ def test_films_that_fail_are_tried_again_then_said_clearly(
     assert len(answers(site)) == QUESTIONS
 
 
-def to_fault(tab) -> None:
+def to_fault(tab: Any) -> None:
     end = time.monotonic() + 90
     while "A film could not be shown" not in tab.text():
         assert time.monotonic() < end, tab.text()

@@ -6,6 +6,7 @@ import json
 import random
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from devtools import Tab
@@ -41,13 +42,13 @@ window.fetch = async (address, options) => {
 """
 
 
-def reload(site: Site, tab, chance) -> None:
+def reload(site: Site, tab: Any, chance: Any) -> None:
     del site, chance
     tab.reload()
     tab.wait(f"({LOOK}) !== ''")
 
 
-def restart_server(site: Site, tab, chance) -> None:
+def restart_server(site: Site, tab: Any, chance: Any) -> None:
     site.stop()
     time.sleep(chance.uniform(0, 2))
     if tab.run(LOOK) == "question":
@@ -55,7 +56,7 @@ def restart_server(site: Site, tab, chance) -> None:
     site.start()
 
 
-def cut_network(site: Site, tab, chance) -> None:
+def cut_network(site: Site, tab: Any, chance: Any) -> None:
     del site
     tab.offline(True)
     if tab.run(LOOK) == "question":
@@ -64,7 +65,7 @@ def cut_network(site: Site, tab, chance) -> None:
     tab.offline(False)
 
 
-def truncate_films(site: Site, tab, chance) -> None:
+def truncate_films(site: Site, tab: Any, chance: Any) -> None:
     site.film_fault = "truncated"
     end = time.monotonic() + chance.uniform(0.5, 4)
     while time.monotonic() < end:
@@ -75,14 +76,14 @@ def truncate_films(site: Site, tab, chance) -> None:
     site.film_fault = None
 
 
-def hide(site: Site, tab, chance) -> None:
+def hide(site: Site, tab: Any, chance: Any) -> None:
     del site
     tab.window("minimized")
     time.sleep(chance.uniform(0, 3))
     tab.window("normal")
 
 
-def close_lid(site: Site, tab, chance) -> None:
+def close_lid(site: Site, tab: Any, chance: Any) -> None:
     del site
     with tab.browser.stopped():
         time.sleep(chance.uniform(0, 4))
@@ -113,7 +114,7 @@ def test_a_session_in_which_everything_goes_wrong(
     check_records(site, heard, slowest)
 
 
-def check_records(site: Site, heard, slowest) -> None:
+def check_records(site: Site, heard: Any, slowest: Any) -> None:
     (session,) = all_sessions(site.responses)
     every = answers(site, all_attempts=True)
     assert not every.duplicated(["trial", "attempt", "item"]).any()

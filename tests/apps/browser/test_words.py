@@ -35,7 +35,7 @@ def foreign(text: str) -> set[str]:
     return set(latin(re.sub(r"\b[a-z0-9]{4}(?:-[a-z0-9]{4}){3}\b", "", text)))
 
 
-def go_through(tab, texts, seen, at_most: int = 300) -> None:
+def go_through(tab: Any, texts: Any, seen: Any, at_most: int = 300) -> None:
     """To the end, by whatever the first button is; the form is filled in wrongly first."""
     end = time.monotonic() + at_most
     wrong = True
@@ -56,7 +56,7 @@ def go_through(tab, texts, seen, at_most: int = 300) -> None:
     seen |= foreign(tab.run(WORDS))
 
 
-def test_every_page_of_a_session_is_in_the_protocol_s_words(greek) -> None:
+def test_every_page_of_a_session_is_in_the_protocol_s_words(greek: Any) -> None:
     site, tab, texts = greek
     seen: set[str] = set()
     tab.open(site.address)
@@ -70,7 +70,7 @@ def test_every_page_of_a_session_is_in_the_protocol_s_words(greek) -> None:
     assert foreign(tab.run(WORDS)) == set()
 
 
-def test_what_goes_wrong_is_said_in_the_protocol_s_words(greek, make_tab: Callable[..., Tab]) -> None:
+def test_what_goes_wrong_is_said_in_the_protocol_s_words(greek: Any, make_tab: Callable[..., Tab]) -> None:
     """A film that fails, a server that is away, a second tab."""
     site, tab, texts = greek
     seen: set[str] = set()

@@ -113,7 +113,7 @@ LOOK = """(() => {
 })()"""
 
 
-def press(tab, keys: bool = True, which: int = 0) -> bool:
+def press(tab: Any, keys: bool = True, which: int = 0) -> bool:
     """Answer the question that is asked, by key or by button, and wait until it is gone; False where it was gone."""
     asked = tab.run(
         f"(() => {{ const b = document.querySelectorAll('button.answer:not(:disabled)')[{which}]; if (!b) return null;"
@@ -129,7 +129,7 @@ def press(tab, keys: bool = True, which: int = 0) -> bool:
     return True
 
 
-def read_on(tab, keys: bool = True, again: bool = True) -> None:
+def read_on(tab: Any, keys: bool = True, again: bool = True) -> None:
     """Pass a page that is read or filled in, whichever is there; one that offers to try again only with `again`."""
     seen = tab.run(LOOK)
     if seen == "form":
@@ -145,7 +145,7 @@ def read_on(tab, keys: bool = True, again: bool = True) -> None:
     time.sleep(0.03)
 
 
-def go_on(tab, keys: bool = True, on_step=lambda: None, at_most: int = 300) -> Any:
+def go_on(tab: Any, keys: bool = True, on_step: Any = lambda: None, at_most: int = 300) -> Any:
     """Walk to the end, whatever comes; the longest time from a look without a question to its answer, in seconds."""
     end = time.monotonic() + at_most
     slowest, unasked = 0.0, time.monotonic()
@@ -162,7 +162,7 @@ def go_on(tab, keys: bool = True, on_step=lambda: None, at_most: int = 300) -> A
     return slowest
 
 
-def eventually(happens, at_most: int = 60) -> None:
+def eventually(happens: Any, at_most: int = 60) -> None:
     """Wait until something is so: what a page has sent may still be on its way to the server."""
     end = time.monotonic() + at_most
     while not happens():
@@ -170,7 +170,7 @@ def eventually(happens, at_most: int = 60) -> None:
         time.sleep(0.05)
 
 
-def check_frames(shown, fps: int = 30) -> None:
+def check_frames(shown: Any, fps: int = 30) -> None:
     """Every frame is accounted for, and in what counts as shown well they stand as far apart in time as in the film."""
     assert {row["method"] for row in shown} == {"requestVideoFrameCallback"}
     for row in shown:
@@ -185,7 +185,7 @@ def check_frames(shown, fps: int = 30) -> None:
     assert any(row["shown_well"] for row in shown)
 
 
-def to_question(tab, number: int = 1) -> None:
+def to_question(tab: Any, number: int = 1) -> None:
     """Walk until a question is asked; or until the second, third, ... one is."""
     end = time.monotonic() + 60
     while number:
@@ -202,7 +202,7 @@ def answers(site: Site, **more) -> Any:
     return answers_frame(site.responses, roles=ROLES, **more)
 
 
-def to_films(tab, place: int = 0) -> None:
+def to_films(tab: Any, place: int = 0) -> None:
     """Walk until a pair's first film plays, or its second."""
     tab.wait(f"[...document.querySelectorAll('.stage video')][{place}]?.classList.contains('now')", every=0.01)
 
@@ -214,7 +214,7 @@ def details(site: Site) -> list[Any]:
     return [{**row, "detail": json.loads(row["detail_json"])} for row in rows]
 
 
-def happened(site: Site, kind) -> list[Any]:
+def happened(site: Site, kind: str) -> list[Any]:
     with site.responses.engine.connect() as connection:
         rows = connection.execute(sa.select(events.c.detail_json).where(events.c.kind == kind)).scalars().all()
     return [json.loads(row) if row else {} for row in rows]

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import urllib.request
 from pathlib import Path
+from typing import Any
 
 import pytest
 from serving import PROTOCOL, TOKEN, unfilmed
@@ -81,7 +82,7 @@ def test_it_listens_at_ipv6_too() -> None:
 
 
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
-def test_it_ends_when_told_to_and_has_stored_who_came(tmp_path: Path, end) -> None:
+def test_it_ends_when_told_to_and_has_stored_who_came(tmp_path: Path, end: Any) -> None:
     unfilmed(tmp_path)
     child = subprocess.Popen(
         [sys.executable, "-c", SERVE, str(tmp_path), TOKEN], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,

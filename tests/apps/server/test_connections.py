@@ -16,7 +16,7 @@ from study.apps.server import connections, running
 LARGE = b"x" * 20_000_000
 
 
-async def app(scope, receive, send) -> None:
+async def app(scope: Any, receive: Any, send: Any) -> None:
     """Reads a request; says how long its body was, or sends far more than a socket holds."""
     if scope["type"] != "http":
         return
@@ -54,7 +54,7 @@ def ask(client: socket.socket, body: bytes = b"four") -> Any:
     return client.recv(1000)
 
 
-def trickle(client: socket.socket, pieces, seconds: float = 3.0) -> bool:
+def trickle(client: socket.socket, pieces: Any, seconds: float = 3.0) -> bool:
     """Send piece after piece until the connection breaks; whether it did."""
     begin = time.monotonic()
     for piece in pieces:

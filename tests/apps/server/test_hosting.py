@@ -21,7 +21,7 @@ from study.experiment.store.sessions import session_table
 from study.experiment.store.tables import events, presentations
 
 
-def happenings(responses: Responses, kind) -> list[Any]:
+def happenings(responses: Responses, kind: str) -> list[Any]:
     with responses.engine.connect() as connection:
         rows = connection.execute(sa.select(events.c.detail_json).where(events.c.kind == kind)).scalars().all()
     return [json.loads(row) if row else None for row in rows]

@@ -27,10 +27,10 @@ def count(responses: Responses, *kinds) -> Any:
         return connection.execute(query).scalar_one()
 
 
-def later(hours) -> Any:
+def later(hours: float) -> Any:
     class Later(datetime):
         @classmethod
-        def now(cls, tz=None) -> Any:
+        def now(cls, tz: Any = None) -> Any:
             return datetime.now(tz) + timedelta(hours=hours)
 
     return Later
@@ -131,7 +131,7 @@ def test_work_in_the_background_that_fails_says_so_and_goes_on(
     happened, failing = [], [True]
     original = hosting.Host.note_who_is_here
 
-    async def note(self) -> None:
+    async def note(self: Any) -> None:
         happened.append(self.recent.copy())
         if failing[0]:
             raise RuntimeError("disk on fire")

@@ -10,6 +10,7 @@ import socket
 import struct
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -37,7 +38,7 @@ def port(stimuli: Manifest, responses: Responses) -> Iterator[int]:
         yield port
 
 
-def head(path, length, *more) -> bytes:
+def head(path: Path, length: Any, *more) -> bytes:
     lines = [f"POST {path} HTTP/1.1", "host: 127.0.0.1", f"content-length: {length}", "content-type: application/json"]
     return "\r\n".join([*lines, "x-segue-page: page-one", *more, "", ""]).encode()
 
@@ -281,7 +282,7 @@ def test_guesses_that_are_sent_together_are_counted_each(serve: Callable[..., Se
     async def together() -> Any:
         from study.apps.server.inbox import Letter, RefusedError, withdraw
 
-        async def one(number) -> Any:
+        async def one(number: int) -> Any:
             async def receive() -> dict[Any, Any]:
                 return {"type": "http.request", "body": json.dumps({"code": str(number)}).encode()}
 

@@ -15,6 +15,7 @@ from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.stimuli.stimulus import StimulusSet
+from study.motion.clip import Clip
 from study.transitions.blend_length import blend_length
 
 
@@ -322,7 +323,7 @@ def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypat
     """A clip that walks but is too short is continued by cycles; points stay within what was captured."""
 
     class Captured(ToyLibrary):
-        def entry(self, name) -> Any:
+        def entry(self, name: str) -> Any:
             return replace(super().entry(name), start="gait", end="gait")
 
     library = Captured(
@@ -332,7 +333,7 @@ def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypat
     calls = []
     from study.motion import cycles
 
-    def extend(clip, *, frames_before: int = 0, frames_after: int = 0) -> Any:
+    def extend(clip: Clip, *, frames_before: int = 0, frames_after: int = 0) -> Any:
         calls.append((clip.name, frames_before, frames_after))
         path = np.arange(-frames_before, clip.frames + frames_after) % clip.frames
         speed = clip.root_positions[1, 2] - clip.root_positions[0, 2]

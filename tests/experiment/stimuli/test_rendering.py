@@ -43,11 +43,11 @@ def rendered(prepared: StimulusSet, tmp_path_factory: pytest.TempPathFactory) ->
     return folder, summary
 
 
-def files(folder) -> dict[Any, Any]:
+def files(folder: Path) -> dict[Any, Any]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def pictures(folder) -> dict[Any, Any]:
+def pictures(folder: Path) -> dict[Any, Any]:
     """Hashes of the videos' frames; checks that the files are those of the manifest and nothing else is there.
 
     Files aren't compared byte by byte: the encoder's bytes may differ from run to run where its pictures do not.
@@ -62,21 +62,21 @@ def pictures(folder) -> dict[Any, Any]:
     return {name: video["frames_sha256"] for name, video in manifest.videos.items()}
 
 
-def frames_in(path) -> Any:
+def frames_in(path: Path) -> Any:
     import av
 
     with av.open(str(path)) as container:
         return sum(1 for _ in container.decode(video=0))
 
 
-def copied(rendered, tmp_path: Path) -> Any:
+def copied(rendered: Any, tmp_path: Path) -> Any:
     for name, content in files(rendered[0]).items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(content)
     return tmp_path
 
 
-def test_everything_is_rendered_once(prepared: StimulusSet, rendered) -> None:
+def test_everything_is_rendered_once(prepared: StimulusSet, rendered: Any) -> None:
     folder, summary = rendered
     count = len(prepared.stimuli)
     assert (summary.videos, summary.rendered, summary.reused) == (count, count, 0)
@@ -87,13 +87,13 @@ def test_everything_is_rendered_once(prepared: StimulusSet, rendered) -> None:
     )
 
 
-def test_the_folder_holds_the_protocol_as_run(prepared: StimulusSet, rendered) -> None:
+def test_the_folder_holds_the_protocol_as_run(prepared: StimulusSet, rendered: Any) -> None:
     stored = load_protocol(rendered[0] / "protocol.toml")
     assert stored.text == prepared.protocol.text
     assert stored.sha256 == prepared.protocol.sha256
 
 
-def test_the_manifest_says_what_each_stimulus_is(prepared: StimulusSet, rendered) -> None:
+def test_the_manifest_says_what_each_stimulus_is(prepared: StimulusSet, rendered: Any) -> None:
     folder, _ = rendered
     manifest = read_manifest(folder)
     assert manifest.complete
@@ -113,7 +113,7 @@ def test_the_manifest_says_what_each_stimulus_is(prepared: StimulusSet, rendered
     assert set(data["cameras"]) == {"slow_quick", "still_slow"}
 
 
-def test_videos_hold_their_frames(prepared: StimulusSet, rendered) -> None:
+def test_videos_hold_their_frames(prepared: StimulusSet, rendered: Any) -> None:
     import av
 
     stimulus = prepared.stimuli[0]
@@ -125,7 +125,7 @@ def test_videos_hold_their_frames(prepared: StimulusSet, rendered) -> None:
     assert len({int(value) for value in frames[0].ravel()}) > 10
 
 
-def test_running_again_reuses_all(prepared: StimulusSet, rendered, tmp_path: Path) -> None:
+def test_running_again_reuses_all(prepared: StimulusSet, rendered: Any, tmp_path: Path) -> None:
     folder = copied(rendered, tmp_path)
     before = files(folder)
     summary = render(prepared, folder, workers=1)
@@ -134,7 +134,7 @@ def test_running_again_reuses_all(prepared: StimulusSet, rendered, tmp_path: Pat
 
 
 @pytest.mark.parametrize("damage", ["missing", "short", "changed"])
-def test_damaged_videos_are_rendered_again(prepared: StimulusSet, rendered, tmp_path: Path, damage: str) -> None:
+def test_damaged_videos_are_rendered_again(prepared: StimulusSet, rendered: Any, tmp_path: Path, damage: str) -> None:
     folder = copied(rendered, tmp_path)
     victim = folder / "stimuli" / f"{prepared.stimuli[1].id}.mp4"
     content = victim.read_bytes()
@@ -173,9 +173,9 @@ class StopHereError(Exception):
 
 @pytest.mark.parametrize("after", [1, 3])
 def test_an_interrupted_rendering_is_finished_by_running_it_again(
-    prepared: StimulusSet, rendered, tmp_path: Path, after: int
+    prepared: StimulusSet, rendered: Any, tmp_path: Path, after: int
 ) -> None:
-    def stop(state) -> None:
+    def stop(state: Any) -> None:
         if state.videos == after:
             raise StopHereError
 
@@ -202,7 +202,7 @@ render(prepared, sys.argv[1], 1, lambda state: print(state.videos, flush=True))
 
 
 def test_a_killed_rendering_is_finished_by_running_it_again(
-    prepared: StimulusSet, rendered, tmp_path: Path, repository: Path
+    prepared: StimulusSet, rendered: Any, tmp_path: Path, repository: Path
 ) -> None:
     """SIGKILL before the first video and in the midst of others: nothing half written, no doubles."""
     for lines, delay in ((1, 0.02), (2, 0.05)):
@@ -224,7 +224,7 @@ def test_a_killed_rendering_is_finished_by_running_it_again(
     assert pictures(tmp_path) == pictures(rendered[0])
 
 
-def test_a_folder_of_another_protocol_or_library_is_refused(prepared: StimulusSet, rendered) -> None:
+def test_a_folder_of_another_protocol_or_library_is_refused(prepared: StimulusSet, rendered: Any) -> None:
     folder = rendered[0]
     other = replace(prepared, protocol=parse_protocol(TOY_PROTOCOL + "# changed\n"))
     with pytest.raises(StimulusError, match=r"expected the results of 'toy' with sha256 \w+, found a\s+protocol.toml"):
@@ -234,7 +234,7 @@ def test_a_folder_of_another_protocol_or_library_is_refused(prepared: StimulusSe
 
 
 def test_a_library_may_be_elsewhere_when_its_motions_are_the_same(
-    prepared: StimulusSet, rendered, tmp_path: Path
+    prepared: StimulusSet, rendered: Any, tmp_path: Path
 ) -> None:
     """On another machine, or under another spelling of the folder."""
     folder = copied(rendered, tmp_path)
@@ -243,7 +243,7 @@ def test_a_library_may_be_elsewhere_when_its_motions_are_the_same(
     assert read_manifest(folder).library == "elsewhere/toy"
 
 
-def test_a_folder_that_is_rendered_whole_can_be_shown_without_its_motions(rendered, tmp_path: Path) -> None:
+def test_a_folder_that_is_rendered_whole_can_be_shown_without_its_motions(rendered: Any, tmp_path: Path) -> None:
     folder = copied(rendered, tmp_path)
     protocol = parse_protocol(TOY_PROTOCOL)
     assert rendered_before(protocol, folder) == read_manifest(folder)
@@ -281,7 +281,7 @@ def test_what_is_no_results_folder_is_refused(prepared: StimulusSet, tmp_path: P
         render(prepared, tmp_path / "file")
 
 
-def test_what_is_complete_and_unchanged_needs_no_building(rendered, tmp_path: Path) -> None:
+def test_what_is_complete_and_unchanged_needs_no_building(rendered: Any, tmp_path: Path) -> None:
     folder = copied(rendered, tmp_path)
     protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
     done = rendered_already(protocol, library, folder)
@@ -310,7 +310,9 @@ def test_what_python_compiles_meanwhile_changes_nothing() -> None:
         compiled.unlink()
 
 
-def test_a_changed_motion_file_or_a_damaged_video_is_noticed(prepared: StimulusSet, rendered, tmp_path: Path) -> None:
+def test_a_changed_motion_file_or_a_damaged_video_is_noticed(
+    prepared: StimulusSet, rendered: Any, tmp_path: Path
+) -> None:
     folder = copied(rendered, tmp_path)
     protocol, library = parse_protocol(TOY_PROTOCOL), ToyLibrary(MOTIONS)
     motion = tmp_path / "walk.bvh"

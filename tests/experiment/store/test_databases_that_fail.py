@@ -30,7 +30,7 @@ def folder(tmp_path: Path, toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> 
     return tmp_path
 
 
-def read_all(folder) -> Any:
+def read_all(folder: Path) -> Any:
     with open_answers(folder) as responses:
         session_table(responses)
         all_sessions(responses)
@@ -39,7 +39,7 @@ def read_all(folder) -> Any:
         return answers_frame(responses, all_attempts=True)
 
 
-def failed(code, said: str = "it failed") -> Any:
+def failed(code: str, said: str = "it failed") -> Any:
     """What SQLAlchemy raises for a result code of SQLite."""
     told = sqlite3.OperationalError(said)
     told.sqlite_errorcode = code
@@ -138,7 +138,7 @@ def test_a_place_that_can_not_be_written_to_is_read_from_a_copy(
             shutil.copy(part, place)
     writer.close()
 
-    def refuses(_, where) -> None:
+    def refuses(_: Any, where: Any) -> None:
         if where == str(place / "responses.sqlite"):
             raise failed(sqlite3.SQLITE_READONLY)
 

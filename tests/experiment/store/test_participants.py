@@ -31,7 +31,7 @@ NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 @pytest.fixture
-def responses(database) -> Iterator[Responses]:
+def responses(database: str) -> Iterator[Responses]:
     with open_responses(database) as opened:
         yield opened
 
@@ -40,7 +40,7 @@ def responses(database) -> Iterator[Responses]:
 def enrol(responses: Responses, toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Any:
     """`enrol(name)`: a participant who arrived, in the group that has the fewest."""
 
-    def enrol(name, groups: int = 1, at=NOW, **more) -> Any:
+    def enrol(name: str, groups: int = 1, at: Any = NOW, **more) -> Any:
         newcomer = people.Newcomer(name, f"token {name}", **more)
         places = people.Places(groups, dropped_after=timedelta(days=1))
         draw = lambda group: draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group)  # noqa: E731
@@ -50,7 +50,7 @@ def enrol(responses: Responses, toy_protocol: Protocol, toy_stimuli: FakeStimuli
     return enrol
 
 
-def code_of(responses: Responses, name) -> Any:
+def code_of(responses: Responses, name: str) -> Any:
     return people.find_by_token(responses, f"token {name}").withdrawal_code
 
 
@@ -63,7 +63,7 @@ def everything(responses: Responses) -> Any:
         return repr([connection.execute(sa.select(table)).all() for table in metadata.sorted_tables]).encode()
 
 
-def test_a_participant_is_known_by_token_and_no_token_is_stored(responses: Responses, enrol) -> None:
+def test_a_participant_is_known_by_token_and_no_token_is_stored(responses: Responses, enrol: Any) -> None:
     record = enrol("p1", parameters={"PROLIFIC_PID": "abc"}, identifying={"PROLIFIC_PID": "abc"})
     found = people.find_by_token(responses, "token p1")
     assert (found.session_id, found.group, found.parameters) == (record.id, 0, {"PROLIFIC_PID": "abc"})
@@ -83,7 +83,7 @@ def test_tokens_and_codes_do_not_repeat() -> None:
     assert all(re.fullmatch(r"([a-z2-9]{4}-){3}[a-z2-9]{4}", code) for code in codes)
 
 
-def test_groups_count_who_is_there_and_give_back_who_is_gone(responses: Responses, enrol) -> None:
+def test_groups_count_who_is_there_and_give_back_who_is_gone(responses: Responses, enrol: Any) -> None:
     finished, gone, here, declined = (
         enrol("a", 4),
         enrol("b", 4),
@@ -103,7 +103,7 @@ def test_groups_count_who_is_there_and_give_back_who_is_gone(responses: Response
 def test_a_newcomer_is_turned_away_where_there_is_no_place_or_the_name_is_known(
     responses: Responses, toy_protocol: Protocol, toy_stimuli: FakeStimuli
 ) -> None:
-    def arrive(name, token, places, **identifying) -> Any:
+    def arrive(name: str, token: str, places: Any, **identifying) -> Any:
         draw = lambda group: draw_plan(toy_protocol, toy_stimuli.pairs, name, group=group)  # noqa: E731
         newcomer = people.Newcomer(name, token, identifying, identifying)
         return people.admit(responses, toy_protocol, newcomer, places, draw)
@@ -117,7 +117,7 @@ def test_a_newcomer_is_turned_away_where_there_is_no_place_or_the_name_is_known(
     assert people.filled_groups(responses, roomy) == [1, 1]
 
 
-def test_withdrawing_deletes_everything_and_leaves_a_line(responses: Responses, enrol) -> None:
+def test_withdrawing_deletes_everything_and_leaves_a_line(responses: Responses, enrol: Any) -> None:
     stays, leaves = enrol("stays"), enrol("leaves")
     for record in (stays, leaves):
         shown = Presentation(1, 1, "first", "x", "swap", 9, 9, 1.0, True, {"mark": f"mark of {record.participant}"})
@@ -137,7 +137,7 @@ def test_withdrawing_deletes_everything_and_leaves_a_line(responses: Responses, 
     assert b"mark of leaves" not in whole
 
 
-def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(responses: Responses, enrol) -> None:
+def test_only_withdrawn_answers_can_be_deleted_and_numbers_are_not_used_again(responses: Responses, enrol: Any) -> None:
     stays, leaves = enrol("stays"), enrol("leaves")
     keep_answer(responses, stays, Answer(1, "", 1, "same", 1.0))
     people.withdraw(responses, code_of(responses, "leaves"))

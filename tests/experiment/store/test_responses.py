@@ -30,10 +30,11 @@ from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame, export_
 from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import all_sessions, begin_session, find_session, session_table
 from study.tasks.answer import Answer
+from study.tasks.trial import Trial
 
 
 @pytest.fixture
-def responses(database) -> Iterator[Responses]:
+def responses(database: str) -> Iterator[Responses]:
     with open_responses(database) as opened:
         yield opened
 
@@ -43,7 +44,7 @@ def plan(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Plan:
     return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
 
 
-def answer(trial, value: str = "same", response_s: float = 1.0, **more) -> Any:
+def answer(trial: Trial, value: str = "same", response_s: float = 1.0, **more) -> Any:
     return Answer(trial, "", more.pop("attempt", 1), value, response_s, **more)
 
 
@@ -123,7 +124,7 @@ def full(responses: Responses, toy_protocol: Protocol, plan: Plan) -> Any:
 
 
 @pytest.mark.parametrize("table", RECORDS)
-def test_records_can_be_neither_changed_nor_deleted(full, table: str) -> None:
+def test_records_can_be_neither_changed_nor_deleted(full: Any, table: str) -> None:
     column = {"sessions": "id"}.get(table, "session_id")
     statements = [f"DELETE FROM {table}"]
     if table != "participants":  # their tokens change, and when they were last seen
@@ -137,7 +138,7 @@ def test_records_can_be_neither_changed_nor_deleted(full, table: str) -> None:
         assert connection.execute(sa.text(f"SELECT count(*) FROM {table}")).scalar_one() > 0
 
 
-def test_a_withdrawn_session_can_be_deleted_from_every_table(full, plan: Plan) -> None:
+def test_a_withdrawn_session_can_be_deleted_from_every_table(full: Any, plan: Plan) -> None:
     record = find_session(full, plan.participant)
     people.erase(full, record.id)
     with full.engine.connect() as connection:

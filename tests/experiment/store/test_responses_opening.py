@@ -30,7 +30,7 @@ def plan(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Plan:
     return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
 
 
-def scalar(responses: Responses, query) -> Any:
+def scalar(responses: Responses, query: Any) -> Any:
     with responses.engine.connect() as connection:
         return connection.execute(sa.text(query)).scalar_one()
 
@@ -113,7 +113,7 @@ def test_another_file_is_refused(tmp_path: Path) -> None:
         open_responses(other)
 
 
-def refusal(url) -> str:
+def refusal(url: str) -> str:
     with pytest.raises(SessionError) as refused:
         open_responses(url)
     return str(refused.value)
@@ -200,7 +200,7 @@ def test_the_driver_may_be_left_out_and_others_are_refused(postgres_url: str) ->
 def test_without_psycopg_it_is_said_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.__import__
 
-    def without(name, *arguments, **more) -> Any:
+    def without(name: str, *arguments, **more) -> Any:
         if name.split(".")[0] == "psycopg":
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
         return real(name, *arguments, **more)

@@ -32,6 +32,7 @@ from study.experiment.store.migrations import FIRST_VERSION, MIGRATIONS, VERSION
 from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import begin_session
 from study.tasks.answer import Answer
+from study.tasks.trial import Trial
 
 WRITER = """
 import itertools, sys
@@ -148,7 +149,7 @@ def test_several_programs_fill_groups_evenly_and_keep_the_cap(database: str, rep
 
 
 @pytest.fixture
-def two(database) -> Iterator[Any]:
+def two(database: str) -> Iterator[Any]:
     """Two programs' connections to one database."""
     with open_responses(database) as one, open_responses(database) as other:
         yield one, other
@@ -159,13 +160,15 @@ def plan(toy_protocol: Protocol, toy_stimuli: FakeStimuli) -> Plan:
     return draw_plan(toy_protocol, toy_stimuli.pairs, "p01")
 
 
-def test_two_connections_that_record_the_same_answer_record_it_once(two, toy_protocol: Protocol, plan: Plan) -> None:
+def test_two_connections_that_record_the_same_answer_record_it_once(
+    two: Any, toy_protocol: Protocol, plan: Plan
+) -> None:
     record = begin_session(two[0], toy_protocol, plan)
     with ThreadPoolExecutor(2) as threads:
         for trial in range(1, 9):
             together = threading.Barrier(2)
 
-            def send(responses: Responses, trial=trial, together=together) -> Any:
+            def send(responses: Responses, trial: Trial = trial, together: Any = together) -> Any:
                 together.wait()
                 return keep_answer(responses, record, Answer(trial, "", 1, "same", 1.0))
 
@@ -173,14 +176,16 @@ def test_two_connections_that_record_the_same_answer_record_it_once(two, toy_pro
     assert len(stored_answers(two[0], record.id)) == 8
 
 
-def test_of_two_different_answers_to_one_question_the_first_stands(two, toy_protocol: Protocol, plan: Plan) -> None:
+def test_of_two_different_answers_to_one_question_the_first_stands(
+    two: Any, toy_protocol: Protocol, plan: Plan
+) -> None:
     record = begin_session(two[0], toy_protocol, plan)
     values = ("same", "different")
     with ThreadPoolExecutor(2) as threads:
         for trial in range(1, 9):
             together = threading.Barrier(2)
 
-            def send(number, trial=trial, together=together) -> Any:
+            def send(number: int, trial: Trial = trial, together: Any = together) -> Any:
                 together.wait()
                 try:
                     return keep_answer(two[number], record, Answer(trial, "", 1, values[number], 1.0))
@@ -193,7 +198,7 @@ def test_of_two_different_answers_to_one_question_the_first_stands(two, toy_prot
             assert stored_answers(two[0], record.id)[-1].value == values[outcome.index(True)]
 
 
-def test_what_reads_before_it_writes_runs_alone(two) -> None:
+def test_what_reads_before_it_writes_runs_alone(two: Any) -> None:
     """The second one begins when the first one has ended, and sees what it did."""
     count = sa.select(sa.func.count()).select_from(response_tables.withdrawals)
     line = sa.insert(response_tables.withdrawals)
@@ -210,13 +215,13 @@ def test_what_reads_before_it_writes_runs_alone(two) -> None:
 
 
 def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(
-    two, toy_protocol: Protocol, plan: Plan
+    two: Any, toy_protocol: Protocol, plan: Plan
 ) -> None:
     for number in range(8):
         record = begin_session(two[0], toy_protocol, replace(plan, participant=f"p{number}"))
         together = threading.Barrier(3)
 
-        def answer_all(record=record, together=together) -> str:
+        def answer_all(record: Any = record, together: Any = together) -> str:
             together.wait()
             for trial in range(1, 9):
                 try:
@@ -225,7 +230,7 @@ def test_a_session_that_is_answered_while_it_is_erased_twice_is_gone_whole(
                     return str(gone)
             return ""
 
-        def erase(record=record, together=together) -> None:
+        def erase(record: Any = record, together: Any = together) -> None:
             together.wait()
             people.erase(two[1], record.id)
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis.analyse import Analysis
 from study.analysis.oddity.analyse import SIGNS, Oddity, SideThreshold
@@ -16,6 +15,9 @@ from study.report.references import MACMILLAN_2005
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.report.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def oddity_section(result: Oddity, about: About) -> Section | None:

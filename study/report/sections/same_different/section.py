@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from study.analysis.analyse import Analysis
 from study.analysis.same_different.analyse import SameDifferent
@@ -32,6 +31,10 @@ from study.report.sections.same_different.tables import (
 from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.transitions.methods.method import WANG_2004
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 SUBJECTS: Mapping[str, Callable[[int], str]] = {
     "collected": lambda count: counted(count, "person", "people"),
