@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ PLAN_VERSION = 2
 
 @dataclass(frozen=True)
 class Plan:
-    """All trials of one participant, in order."""
+    """All trials of one participant, in order; `examples` are stimuli that instructions show, by study."""
 
     protocol: str
     protocol_sha256: str
@@ -38,6 +38,7 @@ class Plan:
     group: int
     trials: tuple[Trial, ...]
     courses: tuple[Course, ...] = ()
+    examples: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def last(self) -> int:
@@ -49,7 +50,7 @@ class Plan:
     def stimuli(self) -> set[str]:
         """The ids of all stimuli that may be shown."""
         shown: list[Trial | Pair] = [*self.trials, *(pair for course in self.courses for pair in course.pairs)]
-        return {name for one in shown for name in one.stimuli}
+        return {name for one in shown for name in one.stimuli} | set(self.examples.values())
 
     def practice(self, study: str) -> tuple[Trial, ...]:
         """The practice trials of a study."""
@@ -75,6 +76,8 @@ class Plan:
         """The plan as JSON; `plan_from_json` gives it back."""
         data = {"version": PLAN_VERSION, **asdict(replace(self, courses=()))}
         del data["courses"]
+        if not self.examples:
+            del data["examples"]
         if self.courses:
             data["courses"] = [course_to_json(course) for course in self.courses]
         return json.dumps(data, separators=(",", ":"))
@@ -123,9 +126,13 @@ def draw_plan(
         studies = [studies[i] for i in rng.permutation(len(studies))]
     trials: list[Trial] = []
     courses: list[Course] = []
+    examples: dict[str, str] = {}
     number = 1
     for study in studies:
         own, for_practice = _pairs_of(study, pairs)
+        if shown_before := [pair for pair in for_practice if pair.motion == study.example_transition]:
+            examples[study.name] = shown_before[0].stimuli[0]
+            for_practice = [pair for pair in for_practice if pair not in shown_before]
         if not own:
             raise SessionError(
                 f"Expected pairs for the study {study.name!r}, found none; prepare this protocol's stimuli."
@@ -144,7 +151,7 @@ def draw_plan(
         if isinstance(study.procedure, Adaptive):
             courses.append(study.procedure.course(draw, number))
             number += courses[-1].most
-    return Plan(protocol.name, protocol.sha256, participant, seed, group, tuple(trials), tuple(courses))
+    return Plan(protocol.name, protocol.sha256, participant, seed, group, tuple(trials), tuple(courses), examples)
 
 
 def _pairs_of(study: StudySpec, pairs: Sequence[Pair]) -> tuple[list[Pair], list[Pair]]:

@@ -81,7 +81,7 @@ def open_session(
     films = wording.NO_FILMS if frames is None else film_times(protocol, plan, frames)
     folded = fold(protocol, plan, before)
     breaks = breaks_of(protocol, plan) - folded.breaks
-    steps = steps_left(protocol, folded.trials.values(), before, passed, breaks, films)
+    steps = steps_left(protocol, folded.trials.values(), before, passed, breaks, films, plan.examples)
     badly_shown = frozenset((answer.trial, answer.attempt) for answer in before if not answer.shown_well)
     return Session(plan, protocol, steps, _trials_left(steps), folded, badly_shown=badly_shown)
 

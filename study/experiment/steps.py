@@ -150,8 +150,13 @@ def steps_left(
     passed: Collection[str],
     breaks: Collection[int],
     films: wording.Films,
+    examples: Mapping[str, str],
 ) -> tuple[Step, ...]:
-    """All that is left to do, in order, of the trials that are known; `breaks` are those that a break follows."""
+    """All that is left to do, in order, of the trials that are known.
+
+    `breaks` are the trials that a break follows, `examples` the stimuli that instructions show, by study, where they
+    are not the first.
+    """
     steps: list[Step] = []
     if "consent" not in passed and (text := wording.consent_text(protocol, films)):
         steps.append(Step("consent", text=text))
@@ -164,7 +169,7 @@ def steps_left(
     for trial in trials:
         studies.setdefault(trial.study, []).append(trial)
     for own in studies.values():
-        steps += _study_steps(protocol, own, earlier, breaks, films)
+        steps += _study_steps(protocol, own, earlier, breaks, films, examples)
     if "debrief" not in passed and (text := wording.debrief_text(protocol, films)):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
@@ -176,6 +181,7 @@ def _study_steps(
     earlier: Earlier,
     breaks: Collection[int],
     films: wording.Films,
+    examples: Mapping[str, str],
 ) -> list[Step]:
     """What is left of a study: its instructions, trials with breaks, and those that come again, as they were queued."""
     study = protocol.study(trials[0].study)
@@ -199,7 +205,8 @@ def _study_steps(
             steps.append(break_step(protocol, trial))
     steps += [step for _, repeated in sorted(again, key=lambda one: one[0]) for step in repeated]
     if steps and (text := wording.instructions_text(protocol, study, films)):
-        steps.insert(0, Step("instructions", study.name, text, stimulus=trials[0].stimuli[0] if study.example else ""))
+        example = examples.get(study.name, trials[0].stimuli[0]) if study.example else ""
+        steps.insert(0, Step("instructions", study.name, text, stimulus=example))
     return steps
 
 

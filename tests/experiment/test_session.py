@@ -9,7 +9,7 @@ import pytest
 from toys import FakeStimuli
 
 from study.errors import SessionError
-from study.experiment.plan import Plan, draw_plan
+from study.experiment.plan import Plan, draw_plan, plan_from_json
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import (
     Session,
@@ -327,6 +327,25 @@ def test_the_end_of_practice_is_said_once(practising: Any) -> None:
     for answers, said in ((one, True), (run(practising, 2)[1], True), (run(practising, 5)[1], False)):
         again = open_session(practising.protocol, practising.plan, answers)
         assert any(step.text == practising.protocol.texts.practice_over for step in again.steps) == said
+
+
+def test_an_example_can_have_a_transition_of_its_own(
+    toy_protocol: Protocol, make_stimuli: Callable[[Protocol], FakeStimuli]
+) -> None:
+    own = (
+        '[[transitions]]\nname = "walk_on"\ncategory = "walking"\nsource = "slow"\ndestination = "slow"\n\n[[studies]]'
+    )
+    text = toy_protocol.text.replace(*PRACTISING).replace("[[studies]]", own, 1)
+    text = text.replace('["still_slow"]', '["still_slow", "walk_on"]\nexample_transition = "walk_on"')
+    protocol = parse_protocol(text)
+    for participant in ("p01", "p02", "p03"):
+        plan = plan_from_json(draw_plan(protocol, make_stimuli(protocol).pairs, participant).to_json())
+        assert [trial.motion for trial in plan.practice("jnd")] == ["still_slow"] * 2
+        steps = open_session(protocol, plan).steps
+        (example,) = (step for step in steps if step.kind == "instructions" and step.study == "jnd" and step.stimulus)
+        assert example.stimulus.startswith("walk_on")
+        assert example.stimulus in plan.stimuli
+        assert not any(step.stimulus.startswith("walk_on") for step in steps if step.kind == "stimulus")
 
 
 def test_practice_and_example_show_transitions_of_their_own(practising: Any) -> None:

@@ -14,8 +14,9 @@ from study.analysis.analyse import analyse
 from study.analysis.preference.analyse import Preference
 from study.analysis.ratings.analyse import PairRatings, Ratings
 from study.analysis.study_result import Settings
-from study.experiment.plan import draw_plan
+from study.experiment.plan import draw_plan, plan_from_json
 from study.experiment.protocol.whole import find_protocol, load_protocol
+from study.experiment.session import open_session
 from study.experiment.simulation import simulate
 from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.store.frames import answers_frame
@@ -114,6 +115,7 @@ def test_the_study_of_2003_cuts_where_each_metric_is_least(library: str, tmp_pat
     assert check(protocol, library) == []
     prepared = prepare(protocol, library)
     (transition,) = protocol.transitions_of(protocol.studies[0])
+    assert (transition.category, transition.source) == ("dancing", "dance_turns")
     pairs = [pair for pair in prepared.pairs if pair.motion == transition.name and pair.study == "cuts"]
     assert [pair.methods[0] for pair in pairs] == ["cut-lee2002", "cut-wang2003"]
     points = []
@@ -122,9 +124,25 @@ def test_the_study_of_2003_cuts_where_each_metric_is_least(library: str, tmp_pat
         record = prepared.stimulus(pair.stimuli[0]).record
         assert (record.frames, record.blend_start, record.blend_stop) == (180, 90, 90)
         points.append((record.source.frame, record.destination.frame))
-        costs = frame_costs(*clips, metric)[90:, : clips[1].frames - 90]
-        assert costs[points[-1][0] - 90, points[-1][1]] == costs.min()
-    assert points[0] != points[1]
+        first = int(np.ceil(0.33 * clips[1].frames))  # destination_within
+        costs = frame_costs(*clips, metric)[90:, first : clips[1].frames - 90]
+        assert costs[points[-1][0] - 90, points[-1][1] - first] == costs.min()
+    # As in the paper (91 to 281, 232 to 280), they differ in both motions.
+    assert points[0][0] != points[1][0]
+    assert points[0][1] != points[1][1]
+    plan = draw_plan(protocol, prepared.pairs, "p")
+    assert plan_from_json(plan.to_json()) == plan
+    (instructions,) = (
+        step
+        for step in open_session(protocol, plan).steps
+        if step.study == "cuts" and step.stimulus and step.kind == "instructions"
+    )
+    walking, practised = prepared.stimulus(instructions.stimulus), plan.practice("cuts")
+    assert (walking.record.source.motion, walking.record.destination.motion) == ("walk", "walk")
+    assert [trial.motion for trial in practised] == ["discontinuity"]
+    # The example is a plain walk: nothing happens at three seconds that does not happen elsewhere.
+    jumps = np.linalg.norm(np.diff(walking.positions, n=2, axis=0), axis=-1).max(axis=1)
+    assert jumps[85:95].max() <= 1.05 * max(jumps[:85].max(), jumps[95:].max())
     orders = [
         tuple(
             trial.methods[0]

@@ -153,6 +153,15 @@ def _check_practice(protocol: Content, study: StudySpec, index: int) -> None:
             raise KeyMismatchError(
                 f"expected transitions that the trials do not show, found {transition.name!r}; name another", *where
             )
+    if study.example_transition is not None:
+        others = [name for name in study.practice_transitions if name != study.example_transition]
+        if not study.example or len(others) != len(study.practice_transitions) - 1 or not others:
+            raise KeyMismatchError(
+                "expected an example_transition among practice_transitions, with another one to practise with, and "
+                f"example = true, found {study.example_transition!r}; change it",
+                *where[:-1],
+                "example_transition",
+            )
 
 
 def _check_points(protocol: Content, study: StudySpec, transition: TransitionSpec, index: int) -> None:

@@ -127,6 +127,12 @@ class StudySpec(Part):
         description="Transitions for practice and the example only, so that neither shows the study's stimuli; "
         "by default the study's own.",
     )
+    example_transition: str | None = Field(
+        default=None,
+        description="One of `practice_transitions` that the instructions show as the example, and that is not "
+        "practised; by default the example is the first stimulus. With methods that cut, a transition from a motion to "
+        "itself shows that motion, uncut.",
+    )
     attention_checks: int = Field(
         default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
     )

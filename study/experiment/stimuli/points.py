@@ -101,6 +101,8 @@ def settle(
     destination = supply(library, protocol.fps, transition.destination, destination_needs, points.destination_within)
     destination = _on_rig_of(source, destination, transition)
     asked = _Asked(protocol, study, transition, points, methods, source, destination)
+    if transition.name == study.example_transition and transition.source == transition.destination:
+        return _at_itself(asked)
     if isinstance(methods[study.reference].points, OwnPoints):
         return _at_optima(asked, alike)
     return _drawn(asked, alike) if points.choose == "random" else _given(asked, alike)
@@ -161,6 +163,20 @@ def _at_optima(asked: _Asked, alike: Alike | None) -> Settled:
             "another part of them with source_within and destination_within."
         )
     return settled
+
+
+def _at_itself(asked: _Asked) -> Settled:
+    """From a motion to itself at one moment, so that a cut shows it as it is."""
+    shift = asked.destination.first - asked.source.first
+    first, stop = asked.source.window
+    low, high = (frame - shift for frame in asked.destination.window)
+    start = (max(first, low) + min(stop, high)) // 2
+    if not max(first, low) <= start < min(stop, high):
+        raise StimulusError(
+            f"transition {asked.transition.name!r}: expected a moment of {asked.source.name!r} with entry and exit "
+            "around it, found none; use a longer motion, or lower entry_s or exit_s."
+        )
+    return asked.settled(start, start + shift, asked.lengths(asked.methods.values(), start, start + shift))
 
 
 def _check_levels(asked: _Asked, settled: Settled) -> None:

@@ -119,6 +119,11 @@ def test_nothing_can_be_changed_afterwards() -> None:
         ('order = "both"', 'order = "both"\npractice_transitions = ["boxing"]', r"expected practice of one trial"),
         ('order = "both"', 'practice = 1\npractice_transitions = ["walking"]', r"do not show, found 'walking'; name"),
         ('order = "both"', 'practice = 1\npractice_transitions = ["boksing"]', r"did you mean 'boxing'\?"),
+        (
+            'order = "both"',
+            'practice = 1\npractice_transitions = ["boxing"]\nexample_transition = "boxing"',
+            r"with another one to practise with, and example = true, found 'boxing'",
+        ),
         ("[stimuli]", "[analysis]\nequivalence_points = 50\n[stimuli]", r"equivalence_points: expected below 50 in po"),
         ("[stimuli]", '[analysis]\nconfirmatory = ["jnd"]\n[stimuli]', r"confirmatory: expected names of preference"),
         ("[stimuli]", '[analysis]\nconfirmatory = ["velocity"]\n[stimuli]', r"mean 'velocity_vs_fixed'\?"),
