@@ -51,7 +51,8 @@ def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
         for axes in grid.flat[len(drawn) :]:
             axes.set_axis_off()
         figure.supylabel("difference from k, frames", fontsize=9.5)
-        for axes in grid[-1]:
+        for axes in grid.flat[max(len(drawn) - columns, 0) : len(drawn)]:
+            axes.tick_params(labelbottom=True)
             axes.set_xlabel("trial")
         add_mark(figure, mark)
         svg = to_svg(figure, f"study-{name}-tracks", "The course of every staircase", _spoken(drawn, found))
