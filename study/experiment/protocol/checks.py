@@ -5,14 +5,15 @@ A protocol comes in whose parts are sound; nothing goes out, or a `KeyMismatchEr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from difflib import get_close_matches
+from functools import partial
 
 from pydantic import ValidationError
 
 from study.counting import counted
 from study.experiment.protocol.content import Content
-from study.experiment.protocol.errors import KeyMismatchError, short
+from study.experiment.protocol.errors import KeyMismatchError, refuse_all, short
 from study.experiment.protocol.stimuli import TransitionSpec
 from study.experiment.protocol.studies import StudySpec, check_once, repeated
 from study.experiment.protocol.texts import LONGEST_NAME
@@ -24,33 +25,44 @@ MOST_TRIALS = 100_000
 
 
 def check_whole(protocol: Content) -> None:
-    """Refuse a protocol whose parts contradict each other."""
-    _check_names(protocol)
-    places = {transition.name: index for index, transition in enumerate(protocol.transitions)}
-    for study in protocol.studies:
-        for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
-            _check_points(protocol, study, transition, places[transition.name])
-    _check_analysis(protocol)
-
-
-def _check_names(protocol: Content) -> None:
-    """Refuse duplicate names, and studies that name unknown transitions."""
+    """Refuse a protocol whose parts contradict each other; what is wrong in several studies is told at once."""
     for kind in ("transitions", "methods", "studies", "form"):
-        names = [part.name for part in getattr(protocol, kind)]
-        if (index := repeated(names)) is not None:
-            message = f"expected each name in {kind} once, found {names[index]!r} twice; rename one"
-            raise KeyMismatchError(message, kind, index, "name")
+        _check_unique(protocol, kind)
     known = [transition.name for transition in protocol.transitions]
     for index, own in enumerate(protocol.methods):
         _check_known(own.method({}).make.transitions(), known, "transitions", "methods", index)
-    for index, study in enumerate(protocol.studies):
-        for key in ("transitions", "practice_transitions"):
-            names = getattr(study, key)
-            _check_known(names, known, "transitions", "studies", index, key)
-            check_once(names, "transition", "studies", index, key)
-        _check_methods(protocol, study, index)
-        _check_practice(protocol, study, index)
-        _check_lengths(protocol, study, index)
+    studies = list(enumerate(protocol.studies))
+    refuse_all(_refusals(partial(_check_study, protocol, study, index, known) for index, study in studies))
+    points = (partial(_check_points_of, protocol, study) for study in protocol.studies)
+    refuse_all(_refusals((*points, partial(_check_analysis, protocol))))
+
+
+def _refusals(checks: Iterable[Callable[[], None]]) -> Iterator[KeyMismatchError]:
+    """What checks that do not depend on each other refuse."""
+    for check in checks:
+        try:
+            check()
+        except KeyMismatchError as error:
+            yield error
+
+
+def _check_unique(protocol: Content, kind: str) -> None:
+    """Refuse duplicate names."""
+    names = [part.name for part in getattr(protocol, kind)]
+    if (index := repeated(names)) is not None:
+        message = f"expected each name in {kind} once, found {names[index]!r} twice; rename one"
+        raise KeyMismatchError(message, kind, index, "name")
+
+
+def _check_study(protocol: Content, study: StudySpec, index: int, known: Sequence[str]) -> None:
+    """Refuse unknown transitions and methods, practice that does not suit, and too few or too many trials."""
+    for key in ("transitions", "practice_transitions"):
+        names = getattr(study, key)
+        _check_known(names, known, "transitions", "studies", index, key)
+        check_once(names, "transition", "studies", index, key)
+    _check_methods(protocol, study, index)
+    _check_practice(protocol, study, index)
+    _check_lengths(protocol, study, index)
 
 
 def _check_methods(protocol: Content, study: StudySpec, index: int) -> None:
@@ -162,6 +174,13 @@ def _check_practice(protocol: Content, study: StudySpec, index: int) -> None:
                 *where[:-1],
                 "example_transition",
             )
+
+
+def _check_points_of(protocol: Content, study: StudySpec) -> None:
+    """Check the points of all transitions of a study."""
+    places = {transition.name: index for index, transition in enumerate(protocol.transitions)}
+    for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
+        _check_points(protocol, study, transition, places[transition.name])
 
 
 def _check_points(protocol: Content, study: StudySpec, transition: TransitionSpec, index: int) -> None:

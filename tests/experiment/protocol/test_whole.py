@@ -149,6 +149,14 @@ def test_all_problems_are_named_at_once() -> None:
     assert "seed: expected a whole number" in text
 
 
+def test_what_is_wrong_in_several_studies_is_told_at_once() -> None:
+    text = re.sub(r"^task = ", 'practice_transitions = ["nowhere"]\ntask = ', GOOD, flags=re.MULTILINE)
+    with pytest.raises(ProtocolError) as refusal:
+        parse_protocol(text)
+    studies = re.findall(r"studies\[(\d)\]\.practice_transitions: expected names of transitions", str(refusal.value))
+    assert studies == [str(index) for index in range(GOOD.count("[[studies]]"))]
+
+
 def test_the_line_is_the_line_of_the_key() -> None:
     text = refused('task = "preference"', 'task = "preferance"')
     line = int(text.split(":")[1])
