@@ -1,9 +1,9 @@
 """Cameras: where the eye is, and where each point of the world appears in the image.
 
 Positions `(frames, points, 3)` in metres, Y up, come in; pixels go out: x to the right and y *down* from the top left
-corner of the frame, so that the first row of a picture is the top one. One camera frames a whole group of stimuli, so
-that nothing but the motion differs between two of them (Wang and Bodenheimer 2004, section 4: groups of motions were
-shown from the same camera position).
+corner of the frame, so that the first row of a picture is the top one. One camera frames a whole group of stimuli
+(Wang and Bodenheimer 2004, section 4: groups of motions were shown from the same camera position). Where two figures
+end at different places, their pictures differ all the same.
 
 - `fixed`: it neither moves nor turns. A figure that travels far is small in it.
 - `pan`: it stands still and turns, by the same slow path in every film of the group: yaw and pitch are quadratic in the

@@ -105,6 +105,7 @@ class Figure:
     part: IntArray | None = None
     lift: FloatArray | None = None
     floor_m: float | None = None
+    ending: tuple[int, int] = (0, 0)
 
     def __post_init__(self) -> None:
         check_colour(self.background, "background colour")

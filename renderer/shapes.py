@@ -97,7 +97,33 @@ def lay_out(
         boxes = np.concatenate(
             [np.minimum(boxes[:, :2], shadow_boxes[:, :2]), np.maximum(boxes[:, 2:], shadow_boxes[:, 2:])], axis=1
         )
-    return Shapes(data, boxes)
+    return _ended(Shapes(data, boxes), figure, camera) if any(figure.ending) else Shapes(data, boxes)
+
+
+def visible_share(frames: int, ending: tuple[int, int]) -> FloatArray:
+    """How much of the picture is seen in each frame, `(frames,)`: 1, falling in the fade, 0 under the cover.
+
+    `ending` counts the frames of the fade and, after it, of the cover, at the end of the film.
+    """
+    fade, cover = ending
+    following = np.arange(frames)[::-1] - cover
+    return np.clip((following + 1) / (fade + 1), 0.0, 1.0)
+
+
+def _ended(shapes: Shapes, figure: Figure, camera: Camera) -> Shapes:
+    """The same with a disc in the colour of the background over everything, as opaque as the ending hides."""
+    hidden = 1.0 - visible_share(len(shapes.data), figure.ending)
+    ends, width, height = np.zeros((len(hidden), 1, 2, 2)), *camera.size
+    ends[..., 0], ends[..., 1] = width / 2, height / 2
+    # Over the whole picture where it hides anything, else so small that it costs nothing.
+    radius = np.where(hidden > 0, float(width + height), 0.5)
+    disc = _shader_numbers(ends, np.repeat(radius[:, None, None], 2, axis=2), None)
+    disc[..., 8:11] = np.array(to_ycbcr(figure.background)) / 255.0
+    disc[..., 11] = hidden[:, None]
+    # A box beyond the edges: such a frame is drawn by itself, and the disc covers no other.
+    whole = np.array([-2, -2, width + 2, height + 2])
+    boxes = np.where(hidden[:, None] > 0, whole, shapes.boxes)
+    return Shapes(np.concatenate([shapes.data, disc], axis=1), boxes)
 
 
 def _shadows(

@@ -129,6 +129,18 @@ def test_a_simulated_person_gives_answers_that_count_and_mean_something(task: Ta
 
 
 @every_task
+def test_a_task_that_compares_says_how_one_property_alone_would_be_answered(task: Task) -> None:
+    if task.slots == 1:
+        assert task.shortcut is None
+        return
+    assert task.shortcut is not None
+    nothing = np.zeros(1)
+    assert task.shortcut.share(nothing, nothing) == pytest.approx(task.shortcut.chance, abs=1e-6)
+    assert task.shortcut.share(np.array([1.0]), nothing) > task.shortcut.chance + 0.02
+    assert task.shortcut.share(np.array([9.0]), nothing) > 0.99
+
+
+@every_task
 def test_the_page_has_a_part_for_the_layout_and_for_the_kind_of_answer(task: Task) -> None:
     script = (ROOT / "study/apps/pages/trial.js").read_text(encoding="utf-8")
     layouts = re.search(r"const LAYOUTS = \{(.*?)\};", script, re.DOTALL)

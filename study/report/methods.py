@@ -5,6 +5,7 @@ Each sentence follows from what was run; methods that were not used are neither 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import study
@@ -127,7 +128,29 @@ def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
         f"{counted(len(manifest.records), 'transition')} between {motions} {how} Each was rendered as a "
         f"{shown.style} figure of {shown.width} × {shown.height} pixels at {protocol.fps:g} frames per second, seen by "
         f"{camera} {ground}, with {shown.entry_s:g} s before and {shown.exit_s:g} s after the {joint}."
+        f"{''.join(f' {one}' for one in _even_stimuli(protocol))}"
     )
+
+
+def _even_stimuli(protocol: Protocol) -> Iterator[str]:
+    """What was done so that the stimuli of a pair differ in little but the transition, and how large they were."""
+    shown, screen = protocol.stimuli, protocol.screen
+    if shown.view == "least-cue":
+        yield "The camera looked from the side from which the stimuli of a pair began and ended most alike."
+    if shown.match == "duration":
+        yield (
+            "Stimuli of a pair took equally long, with their blends around the same moment: entry and exit of the "
+            "comparison were each shorter or longer by half of the difference in blend length."
+        )
+    if shown.jitter_s:
+        yield f"Each stimulus ended earlier by a time drawn at random, of at most {shown.jitter_s:g} s."
+    if shown.ending != "cut":
+        how = "faded into the background" if shown.ending == "fade" else "was hidden"
+        yield f"The figure {how} in the last {shown.ending_s:g} s."
+    if screen.height_degrees is not None:
+        yield f"The picture was {screen.height_degrees:g} degrees of visual angle high."
+    else:
+        yield f"The picture took {100 * screen.height_share:g}% of the screen's height."
 
 
 def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:

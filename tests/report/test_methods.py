@@ -106,3 +106,20 @@ def test_given_transitions_are_not_called_blends(results_folder: MakeFolder) -> 
     told, _ = paragraphs(replace(material, protocol=protocol, manifest=alone))
     assert "motions were shown. Those by “ours” were read from motion files. Each was rendered" in told["Stimuli"]
     assert "after the transition." in told["Stimuli"]
+
+
+def test_what_makes_stimuli_alike_and_their_size_are_told(results_folder: MakeFolder) -> None:
+    def edit(text: str) -> str:
+        keys = 'match = "duration"\nview = "least-cue"\njitter_s = 0.3\nending = "fade"\nending_s = 0.4\n'
+        screen = "[screen]\nheight_degrees = 12.0\ndistance_cm = 60\n\n"
+        return text.replace("height = 120\n", f"height = 120\n{keys}").replace("[analysis]", f"{screen}[analysis]")
+
+    told, _ = paragraphs(gather(results_folder(2, videos=0, edit=edit)))
+    for words in (
+        "from the side from which the stimuli of a pair began and ended most alike.",
+        "took equally long, with their blends around the same moment",
+        "of at most 0.3 s.",
+        "faded into the background in the last 0.4 s.",
+        "was 12 degrees of visual angle high.",
+    ):
+        assert words in told["Stimuli"]

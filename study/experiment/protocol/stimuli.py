@@ -69,6 +69,20 @@ class StimulusSettings(Part):
         "the same times, with their blends around the same moment; `none`: each blend starts at the transition point, "
         "so a longer one makes a longer stimulus (2004).",
     )
+    jitter_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=10,
+        description="Each stimulus of a pair ends earlier by a time of at most so much, drawn from the seed, so that "
+        "neither its duration nor its last frame tells how long its blend is. [seconds]",
+    )
+    ending: Literal["cut", "fade", "cover"] = Field(
+        default="cut",
+        description="How the exit ends: `cut` in full view, `fade` into the background, or `cover`, which hides it.",
+    )
+    ending_s: float = Field(
+        default=0.5, gt=0, le=10, description="How long the fade or the cover lasts, within `exit_s`. [seconds]"
+    )
     weight: Literal["linear", "sigmoid"] = Field(default="linear", description="How the blend weight runs from 0 to 1.")
     clean_feet: bool = Field(default=True, description="Whether sliding of planted feet is removed after blending.")
     colours: Colours = Field(default=Colours(), description="Colours of the picture.")
@@ -91,6 +105,17 @@ class StimulusSettings(Part):
         if self.track_s is not None and self.camera != "track":
             raise KeyMismatchError(
                 f'expected camera = "track" with track_s, found {self.camera!r}; leave track_s out, or track', "camera"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _end(self) -> Self:
+        hidden = self.ending_s if self.ending != "cut" else 0.0
+        if self.jitter_s + hidden > self.exit_s:
+            raise KeyMismatchError(
+                f"expected an exit that is longer than jitter_s and the ending together, {self.jitter_s + hidden:g} s, "
+                f"found {self.exit_s:g}; raise exit_s, or lower them",
+                "exit_s",
             )
         return self
 

@@ -89,7 +89,9 @@ def view(moving: Moving, fps: float) -> Seen:
 
     positions, figure, camera = moving
     steps = np.diff(positions[:, 0][:, [0, 2]], axis=0)
-    joints, edges = on_picture(positions, figure, camera, fps, (0, -1))
+    # Half way through a fade, and before a cover: what is seen last.
+    last = len(positions) - 1 - figure.ending[1] - figure.ending[0] // 2
+    joints, edges = on_picture(positions, figure, camera, fps, (0, last))
     return Seen(len(positions) / fps, float(np.linalg.norm(steps, axis=1).sum()), edges, joints)
 
 

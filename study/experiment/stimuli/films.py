@@ -6,12 +6,13 @@ same, so this is also where it shows that two methods would make one film.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.counting import counted
 from study.errors import SegueError, StimulusError
+from study.experiment.chance import generator
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.points import Settled, settle
 from study.experiment.stimuli.ways import Ways
@@ -109,7 +110,17 @@ def showings(study: StudySpec, settled: Settled, ways: Ways) -> Iterator[Showing
         ]
         if ways.protocol.stimuli.match == "duration":
             films = [films[0], *(_matched(ways.protocol, film, films[0]) for film in films[1:])]
-        yield Showing(settled, condition, tuple(films))
+        yield Showing(settled, condition, tuple(_jittered(ways.protocol, study, settled, condition, films)))
+
+
+def _jittered(
+    protocol: Protocol, study: StudySpec, settled: Settled, condition: Condition, films: Sequence[Film]
+) -> Iterator[Film]:
+    """Films that end earlier by chance; the two of one pair are drawn apart, also where they show the same blend."""
+    most = round(protocol.stimuli.jitter_s * protocol.fps)
+    rng = generator(protocol.seed, "jitter", study.name, settled.transition.name, condition.name)
+    for film in films:
+        yield replace(film, frames_on=film.frames_on - int(rng.integers(0, most + 1))) if most else film
 
 
 def _matched(protocol: Protocol, film: Film, reference: Film) -> Film:

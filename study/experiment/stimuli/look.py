@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,7 +147,9 @@ def _figure(protocol: Protocol, clip: Clip) -> Figure:
     style, colours = protocol.stimuli.style, protocol.stimuli.colours
     own = {side: _rgb(text) for side in ("left", "right", "centre") if (text := getattr(colours, side))}
     background = _rgb(colours.background) if colours.background else None
-    return figure_for(clip.skeleton, style, own, background, floor_m=0.0 if protocol.stimuli.floor else None)
+    figure = figure_for(clip.skeleton, style, own, background, floor_m=0.0 if protocol.stimuli.floor else None)
+    frames = round(protocol.stimuli.ending_s * protocol.fps)
+    return replace(figure, ending={"cut": (0, 0), "fade": (frames, 0), "cover": (0, frames)}[protocol.stimuli.ending])
 
 
 def _rgb(text: str) -> tuple[int, int, int]:
@@ -160,6 +163,8 @@ def _content_hash(fps: float, positions: FloatArray, figure: Figure, camera: Cam
     floor = "" if figure.floor_m is None else f"{figure.floor_m}, fading"
     digest.update(f"{figure.background}; {figure.lit}; {floor}; {camera.track_seconds}; ".encode())
     digest.update(f"{figure.anchors}; {figure.part}; {figure.lift}; ".encode())
+    if any(figure.ending):
+        digest.update(f"ending {figure.ending}; ".encode())
     digest.update(np.round(positions * 1e4).astype("<i4").tobytes())
     for array in (figure.ends, figure.along, figure.beyond, figure.radii, figure.colours):
         digest.update(np.round(np.asarray(array, dtype=np.float64) * 1e6).astype("<i8").tobytes())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import av
 import numpy as np
 import pytest
 
-from renderer.offscreen import render_rgb
+from renderer.offscreen import plain_frame, render_frames, render_rgb
 from renderer.video import render_video
+from study.errors import ProtocolError
 from study.experiment.protocol.whole import Protocol, find_protocol, load_protocol, parse_protocol
 from study.experiment.stimuli.audit import PairAudit
 from study.experiment.stimuli.manifest import read_manifest, record
@@ -285,3 +287,66 @@ def test_single_stimuli_have_no_audit(rating_protocol: Protocol, toy_library: An
     assert singles
     assert singles.isdisjoint(one.pair for one in made.audits)
     assert all(isinstance(one, PairAudit) for one in made.audits)
+
+
+SAME = PREFERENCE.replace('task = "preference"', 'task = "same-different"').replace(
+    'reference = "fixed"\ncomparison = "geodesic"\nfixed_frames = 10',
+    'reference = "geodesic"\ndifferences_frames = [0, 20]',
+)
+
+
+def test_jitter_of_the_end_makes_durations_tell_less() -> None:
+    """Over twelve transitions; the pair without a difference has two ends as well, else equal durations would tell."""
+    apart: dict[int, list[float]] = {0: [], 20: []}
+    for seed in range(12):
+        text = SAME.replace("seed = 3", f"seed = {seed}").replace("[stimuli]", "[stimuli]\njitter_s = 1.2")
+        made = prepare(parse_protocol(text), LIBRARY)
+        for one in made.stimuli:
+            assert 0 <= 120 + one.record.blend_frames - len(one.positions) <= 36
+        for pair, audit in zip(made.pairs, made.audits, strict=True):
+            apart[pair.difference_frames or 0].append(float(np.log(audit.seconds[1] / audit.seconds[0])) / 0.05)
+    assert len(set(apart[0])) > 6
+    noise = np.random.default_rng(2).standard_normal((2, 12, 20_000)) * np.sqrt(2)
+    heard = [np.abs(np.array(apart[level])[:, None] + noise[i]) for i, level in enumerate((0, 20))]
+    best = max(((heard[1] > c).mean() + (heard[0] <= c).mean()) / 2 for c in np.linspace(0, 10, 200))
+    plain = brute_force_right(20 / 141 / 0.05, np.random.default_rng(3))
+    assert best < plain - 0.05
+
+
+@pytest.mark.parametrize(("ending", "frames_before_end"), [("fade", 7), ("cover", 15)])
+def test_an_ending_hides_the_figure_and_the_audit_looks_at_what_is_seen_last(
+    ending: str, frames_before_end: int
+) -> None:
+    text = PREFERENCE.replace("[stimuli]", f'[stimuli]\nending = "{ending}"\nending_s = 0.5')
+    made, plain = (prepare(parse_protocol(one), LIBRARY) for one in (text, PREFERENCE))
+    assert {one.id for one in made.stimuli}.isdisjoint(one.id for one in plain.stimuli)
+    stimulus = made.stimuli[0]
+    ground = np.array(stimulus.figure.background)
+    pictures = [one.astype(int) for one in render_rgb(stimulus.positions, stimulus.figure, stimulus.camera)]
+    strength = [np.abs(one - ground).max() for one in pictures[-20:]]
+    if ending == "cover":
+        *_, last = render_frames(stimulus.positions, stimulus.figure, stimulus.camera)
+        np.testing.assert_array_equal(last, plain_frame(stimulus.camera.size, stimulus.figure.background))
+        assert strength[-15:] == [0] * 15
+        assert min(strength[:5]) > 100
+    else:
+        full = np.abs(pictures[-16] - ground).max()
+        assert strength[-8] == pytest.approx(full * 8 / 16, abs=12)  # half way
+        assert strength[-1] == pytest.approx(full / 16, abs=6)
+    reference, comparison = members(made, made.audits[0].pair)
+    ends = []
+    for one in (reference, comparison):
+        seen = replace(one.figure, ending=(0, 0))
+        at = len(one.positions) - 1 - frames_before_end
+        picture = list(render_rgb(one.positions[: at + 1], seen, one.camera))[-1]
+        shown = (np.abs(picture.astype(int) - ground) > 40).any(axis=2)
+        columns, rows = np.flatnonzero(shown.any(axis=0)), np.flatnonzero(shown.any(axis=1))
+        ends.append(((columns[0] + columns[-1] + 1) / 2, rows[-1] - rows[0] + 1))
+    (x1, high1), (x2, high2) = ends
+    assert made.audits[0].last.right == pytest.approx((x2 - x1) / (high1 + high2) * 2, abs=0.03)
+
+
+def test_an_ending_that_the_exit_has_no_room_for_is_refused() -> None:
+    text = PREFERENCE.replace("[stimuli]", '[stimuli]\nending = "fade"\nending_s = 1.5\njitter_s = 1.0')
+    with pytest.raises(ProtocolError, match="an exit that is longer than jitter_s and the ending together"):
+        parse_protocol(text)

@@ -50,6 +50,7 @@ class DeadBlend(Switching):
     how = "move the source on by its decaying velocity and cross-fade it into the destination (Holden 2023)"
     sources = (HOLDEN_2023,)
     levels = True
+    moves = True
 
     shortest_halflife_s: Annotated[float, Gt(0.0), Le(10.0)] = setting(
         0.05, "Make `dead-blend`: shortest half-life of the source's velocity. [seconds]"

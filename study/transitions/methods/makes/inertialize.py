@@ -98,6 +98,7 @@ class InertializeQuintic(Switching):
     )
     sources = (BOLLO_2018,)
     levels = True
+    moves = True
 
     def switch(self, blend_frames: int, fps: float) -> Switch:
         """A decay over that many frames."""
