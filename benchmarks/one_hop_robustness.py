@@ -12,7 +12,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -82,8 +81,6 @@ class Smoothness:
         From the triggered frame to the end of the last blend.
     joint_acceleration, toe_acceleration
         The largest of any joint and of a toe in the blends and two frames about them, metres per second squared.
-    over_clips
-        The joints' largest as a multiple of the two clips' own in the same frames; of both blends the larger.
     slide_m
         How far the slower toe moves on the floor during the blends.
     skating
@@ -93,38 +90,25 @@ class Smoothness:
     seconds: float
     joint_acceleration: float
     toe_acceleration: float
-    over_clips: float
     slide_m: float
     skating: float
 
 
-def accelerations(clip: Clip) -> NDArray[np.float64]:
-    """Of each joint about each frame but the first and the last, `(frames - 2, joints)`, metres per second squared."""
-    return np.asarray(np.linalg.norm(np.diff(joint_positions(clip), n=2, axis=0), axis=-1) * clip.fps**2)
-
-
-def smoothness_of(played: Played, clips: Sequence[Clip], trigger: int, floor: float) -> Smoothness:
-    """Measure one transition between clips of one skeleton; `floor` is the height of a standing toe, metres."""
+def smoothness_of(played: Played, trigger: int, floor: float) -> Smoothness:
+    """Measure one transition; `floor` is the height of a standing toe, metres."""
     clip, fps = played.clip, played.clip.fps
-    positions, acceleration = joint_positions(clip), accelerations(clip)
+    positions = joint_positions(clip)
     toes = [clip.skeleton.role(role) for role in ("toe.L", "toe.R")]
+    acceleration = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=-1) * fps**2
     slower = np.linalg.norm(np.diff(positions[:, toes][..., [0, 2]], axis=0), axis=-1).min(axis=1)
     low = positions[:-1, toes, 1].min(axis=1) < floor + 0.04
     blends = [segment for segment in played.segments if segment.kind == "blend"]
     about = np.concatenate([acceleration[max(part.start - 3, 0) : part.stop + 1] for part in blends])
-    ratios = []
-    for before, part in pairwise(played.segments):
-        if part.kind == "blend":
-            starts = (before.clip, before.clip_start + before.stop - before.start), (part.clip, part.clip_start)
-            frames = part.stop - part.start
-            own = [accelerations(clips[number])[max(at - 3, 0) : at + frames + 1].max() for number, at in starts]
-            ratios.append(acceleration[max(part.start - 3, 0) : part.stop + 1].max() / max(own))
-    blended = np.concatenate([np.arange(part.start, part.stop) for part in blends])
+    blended = np.concatenate([np.arange(part.start, min(part.stop, len(slower))) for part in blends])
     return Smoothness(
         (blends[-1].stop - trigger) / fps,
         float(about.max()),
         float(about[:, toes].max()),
-        float(max(ratios)),
         float(slower[blended].sum()),
         float(np.mean(low[blended] & (slower[blended] * fps > 0.2))),
     )
@@ -159,7 +143,7 @@ def compare(problem: Problem) -> None:
             trigger = switch.first_trigger
             single = [Trigger(trigger, switch.destination)]
             played = play(problem.clips, table, single, first=switch.source, method=method)
-            found.append(smoothness_of(played, problem.clips, trigger, floor))
+            found.append(smoothness_of(played, trigger, floor))
             if method == "one-hop":
                 costs.append(strain(own, table, switch))
         print(f"{name}: {f'mean cost {np.mean(costs):.4f} as own lengths count it, ' if costs else ''}mean (largest)")
