@@ -1,4 +1,4 @@
-"""Transitions between captured locomotion clips: lengths, how smoothly they join, and how far planted feet slide.
+"""Transitions between captured locomotion clips: their lengths, and how smoothly they join.
 
     python benchmarks/transitions.py FOLDER [--transitions N] [--seed N]
 
@@ -76,16 +76,11 @@ def main() -> None:
     print(f"{len(found)} geodesic lengths between {len(clips)} motions: {usual:.0%} from 5 to 35 frames")
     print(f"  5, 25, 50, 75, 95%: {quartiles} frames")
     rows = np.array([judged(clips, rng) for _ in range(options.transitions)])
-    joints, roots, warped, before, after, seconds, change = rows.T
+    joints, roots, warped = rows.T
     print(f"{len(rows)} blends of 5 frames or more; changes of velocity as a share of the clips' own largest:")
     for label, values in (("joints", joints), ("root", roots), ("joints, time-warped", warped)):
         over = np.mean(values > 1)
         print(f"  {label:20} median {np.median(values):.2f}, largest {values.max():.2f}, above 1 in {over:.1%}")
-    speeds = [100 * slide.sum() / seconds.sum() for slide in (before, after)]
-    print(
-        f"planted feet: {speeds[0]:.1f} cm/s before, {speeds[1]:.2f} after; {before.sum():.2f} m to {after.sum():.3f} m"
-    )
-    print(f"  largest change of a joint for that: median {np.median(change):.0f}, most {change.max():.0f} degrees")
 
 
 def judged(clips: dict[str, Clip], rng: np.random.Generator) -> list[float]:
@@ -105,7 +100,7 @@ def judged(clips: dict[str, Clip], rng: np.random.Generator) -> list[float]:
             bent = warped_blend(source, destination, start, end, warp.source_frames, warp.destination_frames)
         except SegueError:
             continue
-        planted, slide = plant_feet(made, source, destination)
+        planted = plant_feet(made, source, destination)
         around = slice(made.blend_start - 2, made.blend_stop + 1)
         around_warp = slice(bent.blend_start - 2, bent.blend_stop + 1)
         own = max(joint_jerks(clip).max() for clip in (source, destination))
@@ -114,10 +109,6 @@ def judged(clips: dict[str, Clip], rng: np.random.Generator) -> list[float]:
             float(joint_jerks(planted.clip)[around].max() / own),
             float(root_jerks(planted.clip)[around].max() / own_root),
             float(joint_jerks(bent.clip)[around_warp].max() / own),
-            slide.slide_before_m,
-            slide.slide_after_m,
-            slide.contact_s,
-            float(np.degrees(slide.largest_change)),
         ]
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved
 from study.motion.feet import heading, stance
-from study.motion.legs import knee_bend, knee_hinge, reach
+from study.motion.legs import knee_bend, knee_hinge, lowered, reach
 from study.motion.mirror import mirror
 
 FloatArray = NDArray[np.float64]
@@ -204,7 +204,7 @@ def _with_planted_feet(base: _Period, within: FloatArray) -> Clip:
         ankle = base.clip.skeleton.role(f"ankle.{side}")
         shift = _held(corrected[:, ankle] - captured[:, ankle], _contacts(planted[:, foot], shortest), shortest)
         shifts[:, foot] = np.stack([np.interp(within, grid, shift[:, axis]) for axis in range(3)], axis=1)
-    return reach(frames, shifts)
+    return reach(*lowered(frames, shifts))
 
 
 def _contacts(planted: NDArray[np.bool_], shortest: int) -> list[tuple[int, int]]:

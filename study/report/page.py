@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from study.analysis.analyse import Analysis
 from study.counting import counted
+from study.experiment.stimuli.flawed import flaw_notes
 from study.report import conduct, course, facts, methods, power, shortcuts, stimuli, words
 from study.report.material import Material
 from study.report.media import Pictures
@@ -92,10 +93,15 @@ def compose(material: Material, analysis: Analysis) -> Page:
         power=_power(material, quality.participants),
         conduct=_conduct(material, analysis, mark),
         stimuli=Part(
-            sentences=(facts.shown_sentence(material), *shortcuts.shortcut_sentences(material)),
+            sentences=(
+                facts.shown_sentence(material),
+                *shortcuts.shortcut_sentences(material),
+                *flaw_notes(manifest.records),
+            ),
             tables=shortcuts.shortcut_tables(material),
             folded=(
                 stimuli.stimulus_table(manifest),
+                *stimuli.flaw_tables(manifest),
                 stimuli.motion_table(manifest),
                 *([shortcuts.difference_table(material)] if manifest.audits else []),
             ),

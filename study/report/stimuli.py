@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,46 @@ def stimulus_table(manifest: Manifest) -> Table:
         rows,
         headings={"difference_frames": "difference", "frames": "in all", "source": "from"},
         files_only="category notes id",
+    )
+
+
+def flaw_tables(manifest: Manifest) -> Iterator[Table]:
+    """Every stimulus beside its motions, the worst first, where it was measured."""
+    measured = [record for record in manifest.records if record.flaws]
+    if not measured:
+        return
+    rows = []
+    for record in sorted(measured, key=lambda one: -(one.flaws.severity if one.flaws else 0.0)):
+        if (flaws := record.flaws) is None:
+            raise AssertionError("only measured stimuli are listed")
+        rows.append(
+            {
+                "transition": words.readable(record.transition),
+                "method": record.method,
+                "blend_frames": record.blend_frames,
+                "unsupported_percent": 100 * flaws.unsupported_share,
+                "own_unsupported_percent": 100 * flaws.own_unsupported_share,
+                "left_skating_percent": 100 * flaws.left.skating_share,
+                "right_skating_percent": 100 * flaws.right.skating_share,
+                "own_skating_percent": 50 * (flaws.left.own_skating_share + flaws.right.own_skating_share),
+                "sink_cm": 100 * flaws.sink_m,
+                "toe_times": flaws.toe_acceleration_times,
+                "joint_times": flaws.joint_velocity_change_times,
+                "root_times": flaws.root_velocity_change_times,
+                "id": record.id,
+            }
+        )
+    yield tables.make(
+        "stimulus_flaws",
+        "How the stimuli move beside their motions, the worst first. Percent of the blended frames in which no foot "
+        "stands though one is at floor height, and in all frames of the motions; the same for each foot by itself, "
+        "where swinging low counts too; how far a foot sinks under its lowest in the motions; and the largest "
+        "acceleration of a toe and the largest changes of velocity of a joint and of the root from one frame to the "
+        "next, over the motions' own.",
+        "transition method blend_frames unsupported_percent own_unsupported_percent left_skating_percent "
+        "right_skating_percent own_skating_percent sink_cm toe_times joint_times root_times id",
+        rows,
+        files_only="id",
     )
 
 

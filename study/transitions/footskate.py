@@ -1,302 +1,366 @@
-"""Foot contacts, and feet that stay where they are planted.
+"""Feet that stand where they bear weight: the root is carried by the foot that stands, the legs follow.
 
-In: a clip, as a rule a blended one, since blending makes planted feet slide. Out: the clip with its support legs
-corrected by inverse kinematics, as Wang & Bodenheimer 2004 (section 3) correct theirs, and the slide before and
-after. The method is in the manner of Kovar et al. 2002, "Footskate cleanup for motion capture editing": find when a
-foot is planted, hold it in one place for as long, and ease the correction in and out over the frames around.
+In: a blended transition, since blending makes planted feet slide, sink and float. Out: the transition with another way
+of its root and with its legs turned by inverse kinematics, as Wang & Bodenheimer 2004 (section 3) correct their support
+legs. Kovar et al. 2002, "Footskate cleanup for motion capture editing", also move the root and ease the correction in
+and out. Here root and feet are found together: of all that holds the standing feet, the change that is least and
+smoothest.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import MotionError, TransitionError
-from study.motion import quaternions as quat
-from study.motion.clip import Clip, joint_positions
-from study.motion.legs import beyond_reach, reach
+from study.counting import counted
+from study.errors import TransitionError
+from study.motion.clip import Clip, joint_positions, retarget, trim
+from study.motion.legs import reach
 from study.transitions.blending import Transition
+from study.transitions.support import Support, find_support, footwork, toes
 
 FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
-SIDES = ("L", "R")
-
-# Captured walks and runs at 30 fps: a planted toe goes at 0.02-0.3 m/s within 3 cm of its lowest, a swinging one at
-# 1-6 m/s. A contact begins below the first of each pair and lasts while both stay below the second.
-PLANTED_SPEED, HELD_SPEED = 0.3, 0.6
-PLANTED_HEIGHT, HELD_HEIGHT = 0.03, 0.05
-SHORTEST_CONTACT_S = 0.08
 RELEASE_S = 0.2
-# A foot whose place is further out of reach takes a step instead; how high, at most and as a share of its way.
-_OUT_OF_REACH_M = 0.01
+"""A correction may end so long after the blend."""
+
+_HOLD = 1e4
+"""How much worse it is that a held foot moves than that a leg takes its foot elsewhere."""
+_FOOT_S, _ROOT_S = 0.07, 0.15
+"""Time constants: what is quicker is left to the leg (and eased over as much), what is slower moves the root."""
+_ROOT_SPEED_S = 0.5
+"""Over so long a time a speed of the root costs what its acceleration does."""
+_OWN_SHARE, _LEG_SHARE, _TOE_TIMES = 0.85, 0.6, 1.25
+"""Share of the motions' own largest accelerations that root and toes may have, that a leg may add, and how many times
+these a toe may have where the blend itself has more."""
+_REACH = 0.985
+"""Share of a leg's length that is used: beyond it a small way of the foot turns the knee far."""
+_DROP_M = 0.04
+"""How far the pelvis may come down so that a leg reaches its foot's place."""
 _LIFT_M, _LIFT_SHARE = 0.06, 0.25
-# Steps that are put into the contacts of one clip, one after the other.
+"""How high a foot is lifted that goes elsewhere, at most and as a share of its way."""
+_SLIP_M = 0.02
+"""A foot that is held and yet slips further than this takes a step, where the other foot stands meanwhile."""
 _MOST_STEPS = 4
+_STEP_S, _STEP_S_PER_M = 0.3, 0.2
+"""How long a step takes: at least, and more for each metre."""
+_ROUNDS, _STIFF, _CLOSE_M = 100, 3e3, 5e-5
+"""Rounds of looking for the least change within bounds, how firmly these are approached, and what is near enough."""
 
 
-@dataclass(frozen=True, eq=False)
-class FootslideResult:
-    """A clip without foot slide, and how much there was.
-
-    Parameters
-    ----------
-    clip
-        The corrected clip.
-    slide_before_m, slide_after_m
-        How far both feet together travel on the floor while planted, within the region, metres.
-    contact_s
-        How long they are planted there, both feet added, seconds.
-    contacts : (frames, 2)
-        Where the left and the right foot are planted.
-    largest_change
-        The largest turn of any joint that the correction made, radians.
-    """
-
-    clip: Clip
-    slide_before_m: float
-    slide_after_m: float
-    contact_s: float
-    contacts: BoolArray
-    largest_change: float
-
-    @property
-    def slide_after_m_per_s(self) -> float:
-        """Mean slide speed of a planted foot after the correction."""
-        return self.slide_after_m / self.contact_s if self.contact_s else 0.0
-
-
-def planted_points(clip: Clip) -> FloatArray:
-    """The point of each foot to plant, `(frames, 2, 3)`, left then right: the toe, or the ankle where none is."""
-    positions = joint_positions(clip)
-    roles = clip.skeleton.roles
-    return positions[:, [roles.get(f"toe.{side}", clip.skeleton.role(f"ankle.{side}")) for side in SIDES]]
-
-
-def find_contacts(clip: Clip) -> BoolArray:
-    """When each foot is planted, `(frames, 2)`, by height and speed with hysteresis.
-
-    A contact starts where the point is low and slow, and reaches, both ways, as far as it is fairly low and
-    fairly slow; shorter ones than 0.08 s are dropped. Height counts from the point's own lowest (its 5% quantile).
-    """
-    points = planted_points(clip)
-    height = points[..., 1] - np.quantile(points[..., 1], 0.05, axis=0)
-    velocity = np.gradient(points, axis=0) * clip.fps if clip.frames > 1 else np.zeros_like(points)
-    speed = np.linalg.norm(velocity, axis=-1)
-    sure = (height < PLANTED_HEIGHT) & (speed < PLANTED_SPEED)
-    held = (height < HELD_HEIGHT) & (speed < HELD_SPEED)
-    contacts = np.zeros((clip.frames, 2), dtype=bool)
-    for foot in range(2):
-        for start, stop in _runs(held[:, foot]):
-            if sure[start:stop, foot].any() and stop - start >= max(2, SHORTEST_CONTACT_S * clip.fps):
-                contacts[start:stop, foot] = True
-    return contacts
-
-
-def transition_contacts(transition: Transition, source: Clip, destination: Clip) -> BoolArray:
-    """When each foot of a transition is planted, `(frames, 2)`, with what the two clips know.
-
-    A sliding foot may be too fast to be found in the blend itself. So a foot counts as planted there if it is found
-    planted, or planted in both clips at once, or planted in the clip that has the larger share while the blended foot
-    is still low. Outside the blend the clips' own contacts hold.
-    """
-    first, last = transition.blend_start, transition.blend_stop
-    frames, count = transition.clip.frames, transition.blend_frames
-    from_source, from_destination = np.zeros((2, frames, 2), dtype=bool)
-    before, after = find_contacts(source), find_contacts(destination)
-    from_source[:first] = before[:first]
-    from_destination[last:] = after[transition.destination_frames[1] :]
-    # In a time-warped blend a clip has fewer frames than the blend, and each of them serves several times.
-    share = (np.arange(count) + 0.5) / max(count, 1)
-    for contacts, known, (start, stop) in (
-        (from_source, before, transition.source_frames),
-        (from_destination, after, transition.destination_frames),
-    ):
-        contacts[first:last] = known[start + np.floor(share * (stop - start)).astype(np.int64)]
-    half = (first + last) // 2
-    larger = np.where(np.arange(frames)[:, None] < half, from_source, from_destination)
-    height = planted_points(transition.clip)[..., 1]
-    low = height - np.quantile(height, 0.05, axis=0) < HELD_HEIGHT
-    blended = find_contacts(transition.clip) | (from_source & from_destination) | (larger & low)
-    inside = (np.arange(frames) >= first) & (np.arange(frames) < last)
-    return np.where(inside[:, None], blended, larger)
-
-
-def plant_feet(transition: Transition, source: Clip, destination: Clip) -> tuple[Transition, FootslideResult]:
-    """A transition whose feet stand still in its blend while they are planted, and what that took.
-
-    `remove_foot_slide` with `transition_contacts` over the blended frames. Frames before the blend are unchanged, and
-    so are those after it except for a foot that stays planted from early in the blend until it lifts, and the easing
-    out.
-    """
-    if transition.blend_frames == 0:
-        raise TransitionError("Expected a blended transition to plant the feet in; a cut has no blended frames.")
-    contacts = transition_contacts(transition, source, destination)
-    result = remove_foot_slide(transition.clip, contacts, (transition.blend_start, transition.blend_stop))
-    return replace(transition, clip=result.clip, note=f"{transition.note}; {result.clip.history[-1]}"), result
-
-
-def foot_slide(clip: Clip, contacts: BoolArray, region: tuple[int, int] | None = None) -> tuple[float, float]:
-    """How far planted feet travel on the floor, metres, and for how long they are planted, seconds.
-
-    Steps between two planted frames within the region (all frames by default) count, both feet added.
-    """
-    start, stop = region or (0, clip.frames)
-    floor = planted_points(clip)[start:stop][..., [0, 2]]
-    steps = np.linalg.norm(np.diff(floor, axis=0), axis=-1)
-    both = contacts[start : stop - 1] & contacts[start + 1 : stop]
-    return float(np.sum(steps[both])), float(np.count_nonzero(both)) / clip.fps
-
-
-def remove_foot_slide(
-    clip: Clip, contacts: BoolArray | None = None, region: tuple[int, int] | None = None
-) -> FootslideResult:
-    """Hold planted feet in place by two-bone inverse kinematics of the support legs.
+def plant_feet(transition: Transition, source: Clip, destination: Clip) -> Transition:
+    """The transition with feet that stand where they bear weight, neither sink nor float, and step where they must.
 
     Parameters
     ----------
-    clip
-        A clip on a rig with hips, knees and ankles; toes where there are any.
-    contacts : (frames, 2)
-        When the left and the right foot are planted; `find_contacts` by default.
-    region
-        Frames `(start, stop)` within which feet are held, as a slice counts them; all by default. For a transition,
-        its blend: no frame before it changes. A foot that was planted before the blend, or comes down within 0.2 s
-        of its start, stays where it stood until it lifts; one that comes down later and stays planted after the blend
-        comes to stand where it will.
-
-    Returns
-    -------
-    FootslideResult
+    transition
+        A blend of the two clips.
+    source, destination
+        What it was made from; they say which foot bears weight.
 
     Notes
     -----
-    A planted point is held on the floor, not in height, and the foot keeps its rotation in the world. Corrections
-    ease in and out over 0.2 s beside a contact, so the lock releases without a pop. A leg is never stretched beyond
-    its length nor beyond where it was already; where the place is out of reach, the pelvis comes down, at most 3 cm.
-    Where that is not enough, as when someone who stood is under way before the blend is over, the foot takes a step:
-    it is released where it moves fastest, and lifted on its way to its next stance.
+    Frames before the blend are unchanged. The destination comes to stand elsewhere; its frames are unchanged but for
+    a foot that is eased to its place within 0.2 s after the blend. The last sentence of the note says how much was
+    changed, and whether a foot that bears weight still slips because there was no time for a step.
+
+    Raises
+    ------
+    TransitionError
+        For a cut, which has no blended frames.
     """
-    contacts = find_contacts(clip) if contacts is None else np.asarray(contacts, dtype=bool)
-    if contacts.shape != (clip.frames, 2):
-        raise MotionError(f"Expected foot contacts of shape {(clip.frames, 2)}, got {contacts.shape}.")
-    start, stop = region or (0, clip.frames)
-    if not 0 <= start < stop <= clip.frames:
-        raise MotionError(f"Expected a region within frames 0 to {clip.frames}, got {start} to {stop}.")
-    contacts, shifts = _shifts_within_reach(clip, contacts, start, stop)
-    corrected = reach(clip, shifts, start) if shifts.any() else clip
-    # A margin of one frame, so that the steps into and out of the region count.
-    margin = (max(0, start - 1), min(clip.frames, stop + 1))
-    before, seconds = foot_slide(clip, contacts, margin)
-    after, _ = foot_slide(corrected, contacts, margin)
-    change = float(np.max(2.0 * quat.half_angle_between(clip.rotations, corrected.rotations)))
-    corrected = replace(
-        corrected,
-        history=(*clip.history, f"foot slide reduced from {100 * before:.1f} to {100 * after:.1f} cm"),
+    if transition.blend_frames == 0:
+        raise TransitionError("Expected a blended transition to plant the feet in; a cut has no blended frames.")
+    clip = transition.clip
+    source, destination = (retarget(each, clip.skeleton) for each in (source, destination))
+    support = find_support(transition, source, destination, round(RELEASE_S * clip.fps))
+    body = _body(clip, (source, destination), support)
+    way, feet = _over_floor(support, body, clip.fps)
+    steps = 0
+    while steps < _MOST_STEPS and (stepping := _with_step(support, way, feet, clip.fps)):
+        steps, support = steps + 1, stepping
+        way, feet = _over_floor(support, body, clip.fps)
+    way[:, 1], feet[..., 1] = _above_floor(support, body, clip.fps, way, feet)
+    return _corrected(transition, support, way, feet, steps)
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """What bounds a correction, over the frames that may change and two on either side, metres.
+
+    `root (frames + 4, 3)` and `toes (frames + 4, 2, 3)` are the blend's; `legs (frames, 2, 3)` from hip to ankle, and
+    `reach (frames, 2)` how long they may be. `root_bends` and `toe_bends` as `Footwork` has them, of both motions.
+    """
+
+    root: FloatArray
+    toes: FloatArray
+    legs: FloatArray
+    reach: FloatArray
+    root_bends: FloatArray
+    toe_bends: FloatArray
+
+
+def _body(clip: Clip, motions: tuple[Clip, Clip], support: Support) -> _Body:
+    first, last = support.first, support.first + support.frames
+    part = trim(clip, max(first - 2, 0), min(last + 2, clip.frames))
+    missing = (max(2 - first, 0), max(last + 2 - clip.frames, 0))
+    positions = joint_positions(part)
+    inside = positions[2 - missing[0] :][: support.frames]
+    hips, knees, ankles = (
+        inside[:, [clip.skeleton.role(f"{joint}.{side}") for side in "LR"]] for joint in ("hip", "knee", "ankle")
     )
-    return FootslideResult(corrected, before, after, seconds, contacts, change)
+    lengths = np.linalg.norm(knees - hips, axis=-1) + np.linalg.norm(ankles - knees, axis=-1)
+    own = [footwork(motion) for motion in motions]
+    return _Body(
+        _continued(positions[:, 0], missing),
+        _continued(toes(part), missing),
+        ankles - hips,
+        np.maximum(_REACH * lengths, np.linalg.norm(ankles - hips, axis=-1)),
+        np.max([each.root_bends for each in own], axis=0),
+        np.max([each.toe_bends for each in own], axis=0),
+    )
 
 
-def _shifts_within_reach(clip: Clip, contacts: BoolArray, start: int, stop: int) -> tuple[BoolArray, FloatArray]:
-    """Contacts, with a step in those that no leg could hold through, and how far to move each foot in each frame."""
-    points = planted_points(clip)
-    contacts = contacts.copy()
-    lifts = np.zeros((clip.frames, 2))
-    for attempt in range(_MOST_STEPS + 1):
-        shifts = np.stack(
-            [_shifts(points[:, foot], contacts[:, foot], start, stop, clip.fps) for foot in range(2)], axis=1
-        )
-        excess = np.where(contacts, beyond_reach(clip, shifts), 0.0)
-        if attempt == _MOST_STEPS or not (excess > _OUT_OF_REACH_M).any():
-            break
-        for foot in range(2):
-            for run in _runs(contacts[:, foot]):
-                within = run[0] < stop and run[1] > start
-                if within and excess[run[0] : run[1], foot].max() > _OUT_OF_REACH_M:
-                    first, last = _step(points[:, foot], run, (start, stop), clip.fps)
-                    contacts[first:last, foot] = False
-                    travel = np.linalg.norm((points[last - 1, foot] - points[first, foot])[[0, 2]])
-                    bump = np.sin(np.pi * np.arange(1, last - first + 1) / (last - first + 1)) ** 2
-                    lifts[first:last, foot] = min(_LIFT_M, _LIFT_SHARE * travel) * bump
-    shifts[..., 1] += lifts
-    return contacts, shifts
+def _continued(path: FloatArray, missing: tuple[int, int]) -> FloatArray:
+    """A path `(frames, ...)` with so many frames before and after it, at the speed that it has there."""
+    step_before, step_after = (path[1] - path[0], path[-1] - path[-2]) if len(path) > 1 else (0.0 * path[0],) * 2
+    before = [path[0] - k * step_before for k in range(missing[0], 0, -1)]
+    after = [path[-1] + k * step_after for k in range(1, missing[1] + 1)]
+    return np.stack([*before, *path, *after])
 
 
-def _step(point: FloatArray, run: tuple[int, int], region: tuple[int, int], fps: float) -> tuple[int, int]:
-    """The frames of a contact, within the region, in which the foot had better step: around where it goes fastest."""
-    first, last = max(run[0], region[0]), min(run[1], region[1])
-    speed = np.linalg.norm(np.gradient(point, axis=0)[first:last, [0, 2]], axis=1)
-    fastest = int(np.argmax(speed))
-    quick = speed >= 0.5 * speed[fastest]
-    half = max(1, round(0.5 * RELEASE_S * fps))
-    low, high = max(fastest - half, 0), min(fastest + half + 1, len(speed))
-    while low > 0 and quick[low - 1]:
-        low -= 1
-    while high < len(speed) and quick[high]:
-        high += 1
-    return first + low, first + high
+def _corrected(transition: Transition, support: Support, way: FloatArray, feet: FloatArray, steps: int) -> Transition:
+    """The transition with its root moved by `way (frames, 3)` and each foot beyond that by `feet (frames, 2, 3)`."""
+    clip, first, last = transition.clip, support.first, support.first + support.frames
+    moves, shifts = np.zeros((clip.frames, 3)), np.zeros((clip.frames, 2, 3))
+    moves[first:last], moves[last:] = way, way[-1] * [1.0, 0.0, 1.0]
+    shifts[first:last] = np.where(np.linalg.norm(feet, axis=-1, keepdims=True) < _CLOSE_M, 0.0, feet)
+    done = reach(replace(clip, root_positions=clip.root_positions + moves), shifts)
+    farthest = [100 * float(np.linalg.norm(each, axis=-1).max()) for each in (way, feet)]
+    told = f"feet held by moving the root up to {farthest[0]:.1f} cm and feet up to {farthest[1]:.1f} cm beyond it"
+    if steps:
+        told += f", with {counted(steps, 'step')}"
+    slip = float((_slip(support, way, feet) * (support.held[:-1] > 0.5)).sum(axis=0).max())
+    if slip > _SLIP_M:
+        told += f"; a foot that bears weight still slips {100 * slip:.0f} cm, as the blend leaves no time for a step"
+    x, y, z = transition.alignment.translation
+    alignment = replace(transition.alignment, translation=(x + float(moves[-1, 0]), y, z + float(moves[-1, 2])))
+    note = f"{transition.note}; {told}"
+    return replace(transition, clip=done.noting(told), alignment=alignment, note=note)
 
 
-def _runs(flags: BoolArray) -> list[tuple[int, int]]:
+def _slip(support: Support, way: FloatArray, feet: FloatArray) -> FloatArray:
+    """How far each foot is from moving as a held one in the step into each frame, `(frames, 2)`, metres."""
+    moved = np.diff(way[:, None] + feet, axis=0, prepend=0.0) + support.excess[:-1]
+    return np.asarray(np.linalg.norm(moved[..., [0, 2]], axis=-1))
+
+
+def _over_floor(support: Support, body: _Body, fps: float) -> tuple[FloatArray, FloatArray]:
+    """Where the root goes, `(frames, 3)`, and the feet beyond it, `(frames, 2, 3)`, metres: over the floor.
+
+    Minimised are the movement of held feet, the size and the acceleration of what the legs do, and the acceleration
+    and the speed of what the root does; both are at rest at the ends, the root wherever it then is. Accelerations of
+    root and toes stay within those of the motions, and feet within reach.
+    """
+    frames, free = support.frames, min(support.blend_frames + 1, support.frames)
+    # After the blend the destination goes its own way, wherever it has come to.
+    parts = _Parts(_embedded(free, frames, stays=True), _embedded(frames, frames), fps)
+    held = _HOLD * support.held**2
+    cost, right = parts.cost((_ROOT_S * fps) ** 4 / (_ROOT_SPEED_S * fps) ** 2, 0.0), np.zeros((parts.size, 2))
+    for foot in range(2):
+        steps = parts.of_foot(foot, 1)[1:-1]
+        cost += steps.T @ (held[:, foot, None] * steps)
+        right -= steps.T @ (held[:, foot, None] * support.excess[:, foot][:, [0, 2]])
+    bounds = [_calm(parts.of_root(2), np.diff(body.root[:, [0, 2]], n=2, axis=0), body.root_bends[0])]
+    for foot in range(2):
+        toe = np.diff(body.toes[:, foot][:, [0, 2]], n=2, axis=0)
+        bounds.append(_calm(parts.of_foot(foot, 2), toe, body.toe_bends[0], _TOE_TIMES))
+        bounds.append(_calm(parts.of_leg(foot, 2), 0.0 * toe, _LEG_SHARE * body.toe_bends[0]))
+        high = np.maximum(-body.legs[:, foot, 1] - _DROP_M, 0.0)
+        far = np.sqrt(np.maximum(body.reach[:, foot] ** 2 - high**2, 0.0))
+        legs = body.legs[:, foot][:, [0, 2]]
+        bounds.append(_within(parts.of_leg(foot), legs, np.maximum(far, np.linalg.norm(legs, axis=1))))
+    found = _least(cost, right, bounds)
+    way, feet = np.zeros((frames, 3)), np.zeros((frames, 2, 3))
+    way[:, [0, 2]] = parts.of_root(0)[2:-2] @ found
+    for foot in range(2):
+        feet[:, foot, [0, 2]] = parts.of_leg(foot) @ found
+    return way, feet
+
+
+def _above_floor(
+    support: Support, body: _Body, fps: float, way: FloatArray, feet: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The change of the root's height `(frames,)` and of each foot's beyond it `(frames, 2)`, metres.
+
+    As over the floor, with held feet at their height, the floor as a bound for all of a foot, and legs as long as they
+    are.
+    """
+    frames, free = support.frames, support.blend_frames
+    parts = _Parts(_embedded(free, frames), _embedded(frames, frames), fps)
+    held = _HOLD * np.maximum(support.held[:-1], support.held[1:]) ** 2
+    cost, right = parts.cost(0.0, 1.0), np.zeros((parts.size, 1))
+    bounds = [_calm(parts.of_root(2), np.diff(body.root[:, [1]], n=2, axis=0), body.root_bends[1])]
+    for foot in range(2):
+        heights = parts.of_foot(foot, 0)[2:-2]
+        cost += heights.T @ (held[:, foot, None] * heights)
+        right[:, 0] -= heights.T @ (held[:, foot] * support.over[:, foot])
+        toe = np.diff(body.toes[:, foot][:, [1]], n=2, axis=0)
+        bounds.append(_calm(parts.of_foot(foot, 2), toe, body.toe_bends[1], _TOE_TIMES))
+        bounds.append(_calm(parts.of_leg(foot, 2), 0.0 * toe, _LEG_SHARE * body.toe_bends[1]))
+        bounds.append(_at_least(heights, support.room[:, foot] - _lift(support, way, feet, foot)))
+        across = np.linalg.norm((body.legs[:, foot] + feet[:, foot])[:, [0, 2]], axis=1)
+        least = -np.sqrt(np.maximum(body.reach[:, foot] ** 2 - across**2, 0.0))
+        bounds.append(_at_least(parts.of_leg(foot), body.legs[:, foot, 1] - least))
+    found = _least(cost, right, bounds)[:, 0]
+    return parts.of_root(0)[2:-2] @ found, np.stack([parts.of_leg(foot) @ found for foot in range(2)], axis=1)
+
+
+def _with_step(support: Support, way: FloatArray, feet: FloatArray, fps: float) -> Support | None:
+    """The support with one foot let go for a step: that which slips; None where none does that could step."""
+    slip = _slip(support, way, feet)
+    far = np.linalg.norm(support.excess[:-1][..., [0, 2]], axis=-1)
+    held = support.held[:-1] > 0.5
+    both, best = held[:, 0] & held[:, 1], (0.0, 0, 0, 0)
+    for start, stop in _runs(both):
+        if slip[start:stop].sum(axis=0).max() > _SLIP_M:
+            # Two feet that go apart share the slip; the one steps that the blend moves more.
+            foot = int(np.argmax(far[start:stop].sum(axis=0)))
+            if (size := float(slip[start:stop].sum())) > best[0]:
+                best = (size, foot, start, stop)
+    size, foot, start, stop = best
+    if not size:
+        return None
+    frames = round((_STEP_S + _STEP_S_PER_M * float(far[start:stop, foot].sum())) * fps)
+    middle = start + float(np.average(np.arange(stop - start) + 0.5, weights=far[start:stop, foot] + 1e-6))
+    first = int(np.clip(round(middle - frames / 2), start, max(start, stop - frames)))
+    window = slice(first, min(stop, first + frames))
+    released, apart = support.held.copy(), support.apart.copy()
+    released[window, foot], apart[window, foot] = 0.0, 1.0
+    return replace(support, held=released, apart=apart)
+
+
+def _lift(support: Support, way: FloatArray, feet: FloatArray, foot: int) -> FloatArray:
+    """How high one foot must be, `(frames,)`, metres: lifted where it goes while one of the motions has it stand."""
+    lift = np.zeros(support.frames)
+    loose = np.minimum(support.held[:-1, foot], support.held[1:, foot]) < 0.5
+    moved = np.diff(way + feet[:, foot], axis=0, prepend=0.0) + support.excess[:-1, foot]
+    for start, stop in _runs(loose):
+        travel = float(np.linalg.norm(moved[start:stop].sum(axis=0)[[0, 2]]))
+        apart = float(support.apart[start : stop + 1, foot].max())
+        rise = np.sin(np.pi * (np.arange(stop - start) + 0.5) / (stop - start)) ** 2
+        lift[start:stop] = apart * min(_LIFT_M, _LIFT_SHARE * travel) * rise
+    return lift
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Stretches of true, as slices count them."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Hold:
-    """Frames `first .. last - 1` in which a foot is held, and by how much it is moved in each, `(last - first, 3)`."""
+def _embedded(free: int, frames: int, *, stays: bool = False) -> FloatArray:
+    """From `free` values to those of all frames and of two on either side, `(frames + 4, free)`.
 
-    first: int
-    last: int
-    shift: FloatArray
-    ease_in: bool
-    ease_out: bool
-
-
-def _hold(point: FloatArray, contact: tuple[int, int], region: tuple[int, int], release: int) -> _Hold:
-    """How a contact is held, so that no frame before the region moves, and none after it without need.
-
-    A foot that comes down before the region, or too soon after its start to be led to a place, stays where it came
-    down, until it lifts. One that stays down after the region stands where it will stand. Any other has its mean place.
+    0 before the first, and after the last 0 or, with `stays`, the last.
     """
-    (first, last), (start, stop) = contact, region
-    ease_in = ease_out = True
-    if first < start + release:
-        place, ease_in = point[max(first, start - 1)], False
-        first = max(first, start)
-    elif last > stop:
-        place, last, ease_out = point[stop], stop, False
-    else:
-        place = np.mean(point[first:last], axis=0)
-    return _Hold(first, last, (place - point[first:last]) * np.array([1.0, 0.0, 1.0]), ease_in, ease_out)
+    rows = np.zeros((frames + 4, free))
+    rows[2 : 2 + free] = np.eye(free)
+    if stays:
+        rows[2 + free :, -1] = 1.0
+    return rows
 
 
-def _shifts(point: FloatArray, contacts: BoolArray, start: int, stop: int, fps: float) -> FloatArray:
-    """How far to move one foot in each frame, `(frames, 3)`, metres: to its place while planted, eased around."""
-    release = max(1, round(RELEASE_S * fps))
-    runs = [run for run in _runs(contacts) if run[1] > start and run[0] < stop]
-    holds = [_hold(point, run, (start, stop), release) for run in runs]
-    shifts = np.zeros_like(point)
-    for k, hold in enumerate(holds):
-        shifts[hold.first : hold.last] = hold.shift
-        # A contact that is nearer than the release takes over that much sooner.
-        room_before = min(release, hold.first - holds[k - 1].last) if k else release
-        room_after = min(release, holds[k + 1].first - hold.last) if k + 1 < len(holds) else release
-        if hold.ease_in:
-            ramp = hold.shift[0] * _ease_out(room_before)[::-1, None]
-            frames = np.arange(hold.first - room_before, hold.first)
-            shifts[frames[frames >= 0]] += ramp[frames >= 0]
-        if hold.ease_out:
-            frames = np.arange(hold.last, hold.last + room_after)
-            ramp = hold.shift[-1] * _ease_out(room_after)[:, None]
-            shifts[frames[frames < len(point)]] += ramp[frames < len(point)]
-    return shifts
+class _Parts:
+    """The unknowns (root, left leg, right leg), and their values, steps or changes of steps as rows over them."""
+
+    def __init__(self, root: FloatArray, leg: FloatArray, fps: float) -> None:
+        self._root, self._leg, self._fps = root, leg, fps
+        self.size = root.shape[1] + 2 * leg.shape[1]
+
+    def of_root(self, order: int) -> FloatArray:
+        """Differences of the root's change, `(frames + 4 - order, size)`."""
+        rows = np.zeros((len(self._root) - order, self.size))
+        rows[:, : self._root.shape[1]] = np.diff(self._root, n=order, axis=0)
+        return rows
+
+    def of_leg(self, foot: int, order: int = 0) -> FloatArray:
+        """Differences of what a leg adds to that: of order 0 in the frames alone, else `(frames + 4 - order, size)`."""
+        leg = np.diff(self._leg, n=order, axis=0) if order else self._leg[2:-2]
+        rows, first = np.zeros((len(leg), self.size)), self._root.shape[1] + foot * leg.shape[1]
+        rows[:, first : first + leg.shape[1]] = leg
+        return rows
+
+    def of_foot(self, foot: int, order: int) -> FloatArray:
+        """Differences of a foot's change, `(frames + 4 - order, size)`."""
+        rows, first = self.of_root(order), self._root.shape[1] + foot * self._leg.shape[1]
+        rows[:, first : first + self._leg.shape[1]] = np.diff(self._leg, n=order, axis=0)
+        return rows
+
+    def cost(self, root_speed: float, root_size: float) -> FloatArray:
+        """What changes cost: accelerations of root and legs, size of the legs', and speed and size of the root's."""
+        quick, slow = (_FOOT_S * self._fps) ** 4, (_ROOT_S * self._fps) ** 4
+        matrix = np.zeros((self.size, self.size))
+        for weight, rows in (
+            (slow, self.of_root(2)),
+            (root_speed, self.of_root(1)),
+            (root_size, self.of_root(0)),
+            *((quick, self.of_leg(foot, 2)) for foot in range(2)),
+            *((1.0, self.of_leg(foot)) for foot in range(2)),
+        ):
+            matrix += weight * (rows.T @ rows)
+        return matrix
 
 
-def _ease_out(count: int) -> FloatArray:
-    """Shares `(count,)` that fall smoothly from 1 (the frame before them) to 0 (the frame after them)."""
-    x = 1.0 - np.arange(1, count + 1) / (count + 1.0)
-    return x * x * (3.0 - 2.0 * x)
+@dataclass(frozen=True, eq=False)
+class _Bound:
+    """`rows @ unknowns + base` is to stay where `nearest` puts it."""
+
+    rows: FloatArray
+    base: FloatArray
+    nearest: Callable[[FloatArray], FloatArray]
+
+
+def _calm(rows: FloatArray, base: FloatArray, bends: FloatArray, times: float = 1.0) -> _Bound:
+    """Accelerations within most of the motions' own; where the blend has larger ones, within these so many times."""
+    return _within(rows, base, np.clip(np.linalg.norm(base, axis=1), _OWN_SHARE * bends[0], times * bends.max()))
+
+
+def _within(rows: FloatArray, base: FloatArray, radius: FloatArray) -> _Bound:
+    """Vectors no longer than a radius each."""
+
+    def nearest(values: FloatArray) -> FloatArray:
+        length = np.linalg.norm(values, axis=1, keepdims=True)
+        return np.asarray(values * np.minimum(1.0, radius[:, None] / np.maximum(length, 1e-12)))
+
+    return _Bound(rows, base, nearest)
+
+
+def _at_least(rows: FloatArray, base: FloatArray) -> _Bound:
+    """Values `(rows, 1)` not below 0."""
+    return _Bound(rows, base[:, None], lambda values: np.maximum(values, 0.0))
+
+
+def _least(cost: FloatArray, right: FloatArray, bounds: Sequence[_Bound]) -> FloatArray:
+    """The unknowns of least cost within bounds, `(size, axes)`, by the alternating direction method of multipliers.
+
+    Boyd et al. (2011), Distributed optimization and statistical learning via the alternating direction method of
+    multipliers, section 3.1.1. Where bounds contradict each other it ends between them.
+    """
+    rows, base = np.concatenate([b.rows for b in bounds]), np.concatenate([b.base for b in bounds])
+    ends = np.cumsum([len(b.rows) for b in bounds])[:-1]
+    inverse = np.linalg.inv(cost + _STIFF * (rows.T @ rows))
+    found = np.linalg.solve(cost, right)
+    owed = np.zeros_like(base)
+    for _ in range(_ROUNDS):
+        values = rows @ found + base
+        split = np.split(values + owed, ends)
+        near = np.concatenate([bound.nearest(part) for bound, part in zip(bounds, split, strict=True)])
+        if np.linalg.norm(values - near, axis=1).max() < _CLOSE_M:
+            break
+        owed += values - near
+        found = inverse @ (right + _STIFF * (rows.T @ (near - owed - base)))
+    return np.asarray(found)

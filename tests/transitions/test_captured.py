@@ -13,7 +13,9 @@ from study.motion.clip import Clip, joint_positions, moved, resample, trim
 from study.motion.readers.registry import read_clip
 from study.transitions.blend_length import blend_length, joint_costs
 from study.transitions.blending import blend, cut, facing
-from study.transitions.footskate import find_contacts, plant_feet
+from study.transitions.flaws import find_flaws
+from study.transitions.footskate import plant_feet
+from study.transitions.support import footwork
 from study.transitions.timewarp import warp_length
 from study.transitions.weights import joint_weights
 
@@ -68,31 +70,29 @@ def test_the_root_moves_no_more_abruptly_than_in_the_clips(clips: Any, name: str
 
 
 @pytest.mark.parametrize("name", PAIRS)
-def test_feet_stop_sliding_and_joints_do_not_pop(clips: Any, name: str) -> None:
+def test_feet_stand_and_joints_do_not_pop(clips: Any, name: str) -> None:
     source, destination, start, end, length = chosen(clips, name)
     raw = blend(source, destination, start, end, length)
-    planted, result = plant_feet(raw, source, destination)
-    assert result.slide_before_m > 0.03
-    assert result.slide_after_m <= 0.2 * result.slide_before_m
-    assert result.slide_after_m_per_s < 0.01
+    planted = plant_feet(raw, source, destination)
+    before, after = (
+        find_flaws(one.clip, (one.blend_start, one.blend_stop), (source, destination)) for one in (raw, planted)
+    )
+    assert after.unsupported_share <= max(after.own_unsupported_share, 0.3 * before.unsupported_share) + 0.1
+    assert after.sink_m < 0.01
+    assert after.toe_acceleration_times < 1.5
+    assert after.joint_velocity_change_times <= 1.0
+    assert after.root_velocity_change_times <= 1.0
     np.testing.assert_array_equal(planted.clip.rotations[: raw.blend_start], raw.clip.rotations[: raw.blend_start])
     np.testing.assert_array_equal(planted.clip.root_positions[: raw.blend_start], source.root_positions[:start])
 
-    def largest_kick(clip: Clip) -> Any:
-        steps = quat.half_angle_between(clip.rotations[1:], clip.rotations[:-1])
-        return np.max(np.abs(np.diff(steps, axis=0)))
 
-    assert largest_kick(planted.clip) <= max(largest_kick(clip) for clip in (source, destination)) + 1e-9
-
-
-def test_contacts_of_a_walk_alternate(clips: Any) -> None:
-    contacts = find_contacts(clips["16_15"])
-    share = contacts.mean(axis=0)
-    # A foot bears weight for some 60% of a walking cycle, a toe a little less or more.
-    assert np.all((share > 0.4) & (share < 0.8))
-    assert contacts.any(axis=1).mean() > 0.95
-    running = find_contacts(clips["16_35"])
-    assert running.all(axis=1).mean() < 0.05
+def test_the_feet_of_a_walk_bear_weight_in_turn(clips: Any) -> None:
+    weight = footwork(clips["16_15"]).weight
+    assert (weight.max(axis=1) > 0.5).mean() > 0.95
+    share = (weight > 0.5).mean(axis=0)
+    # A foot bears weight for some 60% of a walking cycle.
+    assert np.all((share > 0.45) & (share < 0.8))
+    assert (footwork(clips["16_35"]).weight > 0.5).all(axis=1).mean() < 0.05
 
 
 def test_walking_has_the_cost_curve_of_2004_figures_3_and_5(clips: Any) -> None:

@@ -7,20 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study.errors import MotionError, TransitionError
+from study.errors import TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, global_rotations, joint_positions, moved
-from study.motion.legs import reach
+from study.motion.clip import Clip, global_rotations, joint_positions, moved, trim
+from study.motion.legs import lowered, reach
 from study.motion.synthetic import synthesize
-from study.transitions.blending import blend, cut
-from study.transitions.footskate import (
-    find_contacts,
-    foot_slide,
-    plant_feet,
-    planted_points,
-    remove_foot_slide,
-    transition_contacts,
-)
+from study.transitions.blending import Transition, blend, cut
+from study.transitions.flaws import find_flaws
+from study.transitions.footskate import plant_feet
+from study.transitions.support import find_support, toes
 from study.transitions.timewarp import warped_blend
 
 
@@ -50,58 +45,168 @@ def knee_bend(clip: Clip, side: Any) -> Any:
     )
 
 
-def test_contacts_start_low_and_slow_and_last_while_fairly_so(slider: Clip) -> None:
-    speed = np.zeros(90)
-    speed[20:30], speed[30:40], speed[40:] = 0.2, 0.5, 0.9  # m/s: planted, held, swinging
-    positions = slider.root_positions.copy()
-    positions[:, 2] = np.concatenate([[0.0], np.cumsum(speed[1:])]) / 30
-    gliding = replace(slider, root_positions=positions)
-    contacts = find_contacts(gliding)
-    assert contacts[:39].all()
-    assert not contacts[42:].any()
-    # Fairly slow alone starts no contact.
-    positions[:, 2] = np.arange(90) * 0.5 / 30
-    assert not find_contacts(replace(slider, root_positions=positions)).any()
+def still(slider: Clip, ahead_m: float = 0.0) -> Clip:
+    """The bent legs at rest, with the left foot so much further ahead (and the right one behind)."""
+    rotations = np.tile(slider.rotations[:1], (90, 1, 1))
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        hip = slider.skeleton.role(f"hip.{side}")
+        rotations[:, hip] = quat.from_axis_angle([1.0, 0.0, 0.0], -0.4 - sign * ahead_m / 2 / 0.8)
+    positions = np.tile([0.0, 0.85, 0.0], (90, 1))
+    clip = replace(slider, root_positions=positions, rotations=rotations)
+    # Both stances stand on one floor.
+    return replace(clip, root_positions=positions - [0.0, toes(clip)[0, :, 1].min() - toes(slider)[0, 0, 1], 0.0])
 
 
-def test_a_foot_that_is_high_is_not_planted(slider: Clip) -> None:
-    rotations = slider.rotations.copy()
-    raised = slice(40, 60)
-    rotations[raised, slider.skeleton.role("hip.L")] = quat.from_axis_angle([1.0, 0.0, 0.0], -1.0)
-    contacts = find_contacts(replace(slider, rotations=rotations))
-    assert not contacts[raised, 0].any()
-    assert contacts[raised, 1].all()
+def with_root(made: Transition, moves: Any) -> Transition:
+    """The transition with its root moved by `moves (blend_frames, 3)`, and what follows as the last of them."""
+    positions = made.clip.root_positions.copy()
+    positions[made.blend_start : made.blend_stop] += moves
+    positions[made.blend_stop :] += moves[-1] * [1.0, 0.0, 1.0]
+    return replace(made, clip=replace(made.clip, root_positions=positions))
 
 
-def test_slide_is_the_way_that_planted_feet_go(slider: Clip) -> None:
-    contacts = np.ones((90, 2), dtype=bool)
-    slide, seconds = foot_slide(slider, contacts)
-    assert slide == pytest.approx(2 * 89 * 0.2 / 30)
-    assert seconds == pytest.approx(2 * 89 / 30)
-    contacts[45] = False  # two steps fewer, of each foot
-    assert foot_slide(slider, contacts)[0] == pytest.approx(2 * 87 * 0.2 / 30)
+def speeds(clip: Clip) -> Any:
+    return np.linalg.norm(np.diff(toes(clip)[..., [0, 2]], axis=0), axis=-1) * clip.fps
 
 
-def test_planted_feet_stand_still_and_nothing_pops(slider: Clip) -> None:
-    contacts = np.zeros((90, 2), dtype=bool)
-    contacts[20:50, 0] = contacts[45:70, 1] = True
-    result = remove_foot_slide(slider, contacts)
-    assert result.slide_before_m == pytest.approx((29 + 24) * 0.2 / 30)
-    assert result.slide_after_m < 1e-4
-    assert result.slide_after_m_per_s < 1e-4
-    points = planted_points(result.clip)
-    np.testing.assert_allclose(points[20:50, 0, [0, 2]], np.tile(points[20, 0, [0, 2]], (30, 1)), atol=2e-5)
-    # The foot moves 10 cm back to its course over the release: at a smoothstep's 1.5 times the mean speed, no more.
-    speed = np.linalg.norm(np.diff(points, axis=0), axis=-1) * 30
-    assert speed.max() < 0.2 + 1.6 * 0.1 / 0.2
-    steps = quat.half_angle_between(result.clip.rotations[1:], result.clip.rotations[:-1])
-    assert np.max(np.abs(np.diff(steps, axis=0))) < 0.05
-    # Frames away from contacts and their easing are untouched; so is every joint but those of the legs.
-    np.testing.assert_array_equal(result.clip.rotations[:14], slider.rotations[:14])
-    legs = {slider.skeleton.role(f"{part}.{side}") for part in ("hip", "knee", "ankle") for side in "LR"}
-    others = [joint for joint in range(slider.skeleton.joints) if joint not in legs]
-    np.testing.assert_array_equal(result.clip.rotations[:, others], slider.rotations[:, others])
-    assert "foot slide reduced from" in result.clip.history[-1]
+@pytest.mark.parametrize("blend_frames", [1, 10, 30])
+def test_a_blend_of_a_walk_with_itself_in_phase_needs_nothing(blend_frames: int) -> None:
+    walk = synthesize("walk", seconds=5.0)
+    made = blend(walk, walk, 60, 59 + blend_frames, blend_frames)
+    np.testing.assert_allclose(joint_positions(plant_feet(made, walk, walk).clip), joint_positions(walk), atol=1e-9)
+
+
+def test_feet_that_stand_in_both_clips_are_not_moved() -> None:
+    stand = synthesize("stand", seconds=4.0)
+    made = blend(stand, stand, 40, 90, 20)
+    planted = joint_positions(plant_feet(made, stand, stand).clip)
+    np.testing.assert_allclose(planted, joint_positions(made.clip), atol=0.004)
+
+
+def test_a_root_that_glides_over_standing_feet_is_brought_back(slider: Clip) -> None:
+    """Both clips stand; the blend drifts by 0.3 m. Least squares have it stand where it stood, and what follows too."""
+    stance = still(slider)
+    made = blend(stance, stance, 40, 60, 20)
+    moves = np.outer(np.linspace(0.0, 0.3, 21)[1:] ** 2 / 0.3, [0.0, 0.0, 1.0])
+    planted = plant_feet(with_root(made, moves), stance, stance)
+    np.testing.assert_allclose(toes(planted.clip), np.tile(toes(stance)[:1], (planted.clip.frames, 1, 1)), atol=0.006)
+    np.testing.assert_allclose(planted.clip.root_positions[-1], stance.root_positions[0], atol=0.006)
+
+
+def test_the_floor_holds(slider: Clip) -> None:
+    """The blend sinks by 6 cm and comes up again; feet stay at their height, and the figure neither pops nor floats."""
+    stance = still(slider)
+    made = blend(stance, stance, 40, 60, 20)
+    moves = np.outer(-0.06 * np.sin(np.linspace(0, np.pi, 20)) ** 2, [0.0, 1.0, 0.0])
+    planted = plant_feet(with_root(made, moves), stance, stance)
+    np.testing.assert_allclose(toes(planted.clip)[..., 1], toes(stance)[0, 0, 1], atol=0.002)
+
+
+@pytest.mark.parametrize("blend_frames", [10, 20])
+def test_from_one_stance_into_another_a_foot_steps(slider: Clip, blend_frames: int) -> None:
+    """No root can hold both feet: one stands all the time, the other is lifted and takes its time."""
+    source, destination = still(slider), still(slider, 0.24)
+    # Clips that only stand allow no acceleration; somewhere else they walk.
+    walk = replace(slider, rotations=slider.rotations.copy())
+    hips = [slider.skeleton.role(f"hip.{side}") for side in "LR"]
+    swing = 0.5 * np.sin(2 * np.pi * np.arange(90) / 25)
+    for hip, sign in zip(hips, (1, -1), strict=True):
+        walk.rotations.setflags(write=True)
+        walk.rotations[:, hip] = quat.from_axis_angle([1.0, 0.0, 0.0], -0.4 + sign * swing)
+        walk.rotations.setflags(write=False)
+    source, destination = (_followed(clip, walk) for clip in (source, destination))
+    made = blend(source, destination, 40, 60, blend_frames)
+    planted = plant_feet(made, source, destination)
+    assert "1 step" in planted.note
+    around = slice(made.blend_start - 1, made.blend_stop + 7)
+    speed, height = speeds(planted.clip)[around], toes(planted.clip)[around, :, 1] - toes(source)[0, 0, 1]
+    standing = int(np.argmin(speed.max(axis=0)))
+    assert speed[:, standing].max() < 0.15
+    assert 0.02 < height[:, 1 - standing].max() < 0.1
+    assert height.min() > -0.003
+    assert np.count_nonzero(speed[:, 1 - standing] > 0.1) / 30 >= 0.25
+
+
+def _followed(clip: Clip, other: Clip) -> Clip:
+    """A clip, and what the other one does after it."""
+    arrays = [np.concatenate([getattr(one, name) for one in (clip, other)]) for name in ("root_positions", "rotations")]
+    return replace(clip, root_positions=arrays[0], rotations=arrays[1])
+
+
+CASES = [("stand", "walk", 60, 100, 20), ("walk", "run", 70, 60, 12), ("walk", "walk_turn_left", 40, 80, 25)]
+
+
+@pytest.mark.parametrize("case", [*CASES, ("dance_modern", "dance", 200, 300, 30)])
+def test_blended_motions_stand_on_the_floor_and_start_no_sooner(case: tuple[Any, ...]) -> None:
+    source, destination = (synthesize(name, seconds=12.0) for name in case[:2])
+    raw = blend(source, destination, *case[2:])
+    planted = plant_feet(raw, source, destination)
+    before, after = (
+        find_flaws(one.clip, (one.blend_start, one.blend_stop), (source, destination)) for one in (raw, planted)
+    )
+    assert after.unsupported_share <= max(after.own_unsupported_share + 0.1, 0.5 * before.unsupported_share)
+    assert after.sink_m < 0.005
+    assert after.toe_acceleration_times < 1.5
+    assert after.root_velocity_change_times < max(1.0, before.root_velocity_change_times) + 0.15
+    # Nothing before the blend, and nothing 0.2 s after it.
+    np.testing.assert_array_equal(planted.clip.rotations[: raw.blend_start], source.rotations[: raw.blend_start])
+    entry = planted.clip.root_positions[: raw.blend_start]
+    np.testing.assert_array_equal(entry, source.root_positions[: raw.blend_start])
+    tail = moved(destination, planted.alignment.yaw, np.array(planted.alignment.translation))
+    np.testing.assert_allclose(
+        joint_positions(planted.clip)[raw.blend_stop + 6 :],
+        joint_positions(tail)[raw.destination_frames[1] + 6 :],
+        atol=1e-6,
+    )
+
+
+def test_of_two_motions_the_one_with_more_share_says_which_foot_stands() -> None:
+    source, destination = synthesize("stand", seconds=4.0), synthesize("walk", seconds=6.0)
+    support = find_support(blend(source, destination, 40, 96, 40), source, destination, 6)
+    assert support.frames == 46
+    assert support.held.shape == (47, 2)
+    assert support.held[:10].min() > 0.9, "both feet of the stance"
+    alternating = support.held[-12:] > 0.5
+    assert alternating.any(axis=1).all()
+    assert not alternating.all()
+
+
+@pytest.mark.parametrize("lengths", [(12, 24), (24, 12)])
+def test_time_warped_blends_are_planted_too(lengths: tuple[int, int]) -> None:
+    source, destination = synthesize("walk", seconds=5.0), synthesize("walk_fast", seconds=5.0)
+    raw = warped_blend(source, destination, 60, 80, *lengths)
+    planted = plant_feet(raw, source, destination)
+    flaws = find_flaws(planted.clip, (raw.blend_start, raw.blend_stop), (source, destination))
+    assert flaws.sink_m < 0.005
+    assert flaws.unsupported_share <= flaws.own_unsupported_share + 0.1
+    assert planted.source_frames == (60, 60 + lengths[0])
+
+
+def test_where_the_clips_stand_does_not_matter() -> None:
+    source, destination = synthesize("walk", seconds=5.0), synthesize("run", seconds=5.0)
+    turn, shift = 2.0, np.array([3.0, 0.0, 1.0])
+    here = plant_feet(blend(source, destination, 60, 80, 12), source, destination)
+    away = moved(source, turn, shift)
+    there = plant_feet(blend(away, destination, 60, 80, 12), away, destination)
+    expected = joint_positions(moved(here.clip, turn, shift))
+    np.testing.assert_allclose(joint_positions(there.clip), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 20])
+def test_clips_that_are_no_longer_than_their_blend(frames: int) -> None:
+    source, destination = (trim(synthesize(name, seconds=2.0), 0, frames) for name in ("walk", "run"))
+    planted = plant_feet(blend(source, destination, 0, frames - 1, frames), source, destination)
+    assert planted.clip.frames == frames
+
+
+def test_a_cut_has_no_feet_to_plant(slider: Clip) -> None:
+    with pytest.raises(TransitionError, match="a cut has no blended frames"):
+        plant_feet(cut(slider, slider, 20, 40), slider, slider)
+
+
+def test_what_cannot_be_done_is_said() -> None:
+    source, destination = synthesize("walk", seconds=5.0), synthesize("run", seconds=5.0)
+    assert "leaves no time for a step" in plant_feet(blend(source, destination, 60, 90, 2), source, destination).note
 
 
 def test_the_foot_keeps_its_rotation_in_the_world(slider: Clip) -> None:
@@ -128,9 +233,12 @@ def test_knees_are_neither_inverted_nor_overstretched(
     assert bend.min() > 0.1  # 0.995 of the leg's length leaves 11 degrees
     assert bend.max() < 2.61
     assert np.max(np.abs(np.diff(bend))) < 0.5
-    root_drop = slider.root_positions[:, 1] - done.root_positions[:, 1]
-    assert root_drop.min() >= 0.0
-    assert root_drop.max() <= 0.03 + 1e-12
+    np.testing.assert_array_equal(done.root_positions, slider.root_positions)
+    low, shifts_of_low = lowered(slider, shifts)
+    drop = slider.root_positions[:, 1] - low.root_positions[:, 1]
+    assert drop.min() >= 0.0
+    assert drop.max() <= 0.03 + 1e-12
+    np.testing.assert_allclose(shifts_of_low[..., 1] - shifts[..., 1], np.stack([drop, drop], axis=1), atol=1e-12)
 
 
 def test_a_straight_leg_bends_forward_at_the_knee(make_walk: Callable[..., Clip]) -> None:
@@ -145,102 +253,3 @@ def test_a_straight_leg_bends_forward_at_the_knee(make_walk: Callable[..., Clip]
     np.testing.assert_allclose(
         joint_positions(done)[5:35, ankle], (joint_positions(still)[:, ankle] + shifts[:, 0])[5:35], atol=2e-3
     )
-
-
-def test_a_transition_keeps_the_feet_where_source_and_destination_had_them(make_walk: Callable[..., Clip]) -> None:
-    source, destination = make_walk(120, speed=0.9), make_walk(120, speed=1.4, phase=1.0)
-    raw = blend(source, destination, 50, 80, 20)
-    planted, result = plant_feet(raw, source, destination)
-    assert result.slide_after_m <= 0.2 * result.slide_before_m
-    assert result.slide_after_m_per_s < 0.01
-    assert planted.blend_start == raw.blend_start
-    np.testing.assert_array_equal(
-        planted.clip.rotations[: raw.blend_start - 7], raw.clip.rotations[: raw.blend_start - 7]
-    )
-    assert "foot slide reduced" in planted.note
-    contacts = transition_contacts(raw, source, destination)
-    np.testing.assert_array_equal(contacts[: raw.blend_start], find_contacts(source)[: raw.blend_start])
-    after = find_contacts(destination)[raw.destination_frames[1] :]
-    np.testing.assert_array_equal(contacts[raw.blend_stop :], after)
-
-
-@pytest.mark.parametrize("lengths", [(12, 24), (24, 12)])
-def test_a_time_warped_blend_knows_its_clips_contacts(make_walk: Callable[..., Clip], lengths: tuple[int, ...]) -> None:
-    source, destination = make_walk(120, speed=0.9), make_walk(120, speed=0.9, phase=1.0)
-    raw = warped_blend(source, destination, 50, 80, *lengths)
-    contacts = transition_contacts(raw, source, destination)
-    own = find_contacts(source)[50 : 50 + lengths[0]], find_contacts(destination)[81 - lengths[1] : 81]
-    slowed = [np.repeat(known, 24 // len(known), axis=0) for known in own]
-    assert np.all(contacts[50:74] >= (slowed[0] & slowed[1]))
-    planted, result = plant_feet(raw, source, destination)
-    assert result.slide_after_m <= 0.2 * result.slide_before_m
-    assert planted.source_frames == (50, 50 + lengths[0])
-
-
-def test_feet_planted_before_the_region_stay_and_the_frames_before_it_are_untouched(slider: Clip) -> None:
-    contacts = np.zeros((90, 2), dtype=bool)
-    contacts[10:50, 0] = True
-    result = remove_foot_slide(slider, contacts, (30, 60))
-    np.testing.assert_array_equal(result.clip.rotations[:30], slider.rotations[:30])
-    np.testing.assert_array_equal(result.clip.root_positions[:30], slider.root_positions[:30])
-    points = planted_points(result.clip)[:, 0]
-    np.testing.assert_allclose(points[30:50, [0, 2]], np.tile(points[29, [0, 2]], (20, 1)), atol=2e-5)
-    contacts = np.zeros((90, 2), dtype=bool)
-    contacts[40:80, 1] = True
-    result = remove_foot_slide(slider, contacts, (30, 60))
-    np.testing.assert_array_equal(result.clip.rotations[60:], slider.rotations[60:])
-    points = planted_points(result.clip)[:, 1]
-    np.testing.assert_allclose(points[40:60, [0, 2]], np.tile(points[60, [0, 2]], (20, 1)), atol=2e-5)
-
-
-def test_a_foot_that_comes_down_just_after_the_start_stays_where_it_came_down(slider: Clip) -> None:
-    contacts = np.zeros((90, 2), dtype=bool)
-    contacts[32:70, 0] = True
-    result = remove_foot_slide(slider, contacts, (30, 60))
-    np.testing.assert_array_equal(result.clip.rotations[:33], slider.rotations[:33])
-    points = planted_points(result.clip)[:, 0]
-    np.testing.assert_allclose(points[32:70, [0, 2]], np.tile(points[32, [0, 2]], (38, 1)), atol=2e-5)
-    assert np.max(np.abs(np.diff(points[:, 2]))) * 30 < 3.0
-
-
-def test_where_the_clip_stands_does_not_matter(slider: Clip) -> None:
-    contacts = np.zeros((90, 2), dtype=bool)
-    contacts[20:50, 0] = True
-    here = remove_foot_slide(slider, contacts)
-    there = remove_foot_slide(moved(slider, 2.0, np.array([3.0, 0.0, 1.0])), contacts)
-    expected = moved(here.clip, 2.0, np.array([3.0, 0.0, 1.0]))
-    np.testing.assert_allclose(joint_positions(there.clip), joint_positions(expected), atol=1e-9)
-
-
-def test_what_cannot_be_planted_is_refused(slider: Clip) -> None:
-    with pytest.raises(MotionError, match=r"shape \(90, 2\), got \(10, 2\)"):
-        remove_foot_slide(slider, np.zeros((10, 2), dtype=bool))
-    with pytest.raises(MotionError, match="region within frames 0 to 90, got 60 to 95"):
-        remove_foot_slide(slider, region=(60, 95))
-    with pytest.raises(TransitionError, match="a cut has no blended frames"):
-        plant_feet(cut(slider, slider, 20, 40), slider, slider)
-
-
-def test_a_foot_that_no_leg_can_hold_takes_a_step() -> None:
-    """From standing into a walk over a long blend: the body is away before the feet of the stance may lift."""
-    source, destination = synthesize("stand", seconds=4.0), synthesize("walk", seconds=6.0)
-    joined = blend(source, destination, 40, 96, 40)
-    known = transition_contacts(joined, source, destination)
-    planted, found = plant_feet(joined, source, destination)
-    assert found.slide_after_m < 0.01
-    assert found.slide_after_m_per_s < 0.01
-    stepping = known & ~found.contacts
-    assert stepping.any(), "a step was put in"
-    assert not (found.contacts & ~known).any(), "nothing is planted that was not"
-    assert not stepping[: joined.blend_start].any()
-    height = planted_points(planted.clip)[..., 1]
-    before = planted_points(joined.clip)[..., 1]
-    for foot in range(2):
-        frames = np.flatnonzero(stepping[:, foot])
-        if len(frames):
-            assert 0.01 < np.max(height[frames, foot] - before[frames, foot]) < 0.09, "lifted, and not high"
-    steps = quat.half_angle_between(planted.clip.rotations[1:], planted.clip.rotations[:-1])
-    own = max(
-        np.max(quat.half_angle_between(clip.rotations[1:], clip.rotations[:-1])) for clip in (source, destination)
-    )
-    assert np.max(steps[joined.blend_start - 2 : joined.blend_stop + 2]) < 1.5 * own

@@ -116,7 +116,7 @@ def _strip(source: Clip, destination: Clip, found: Advice, folder: Path) -> Path
     from study.transitions.blending import blend
     from study.transitions.footskate import plant_feet
 
-    made, _ = plant_feet(
+    made = plant_feet(
         blend(source, destination, found.start_frame, found.end_frame, found.blend_frames), source, destination
     )
     around = round(1.5 * source.fps)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -202,6 +203,7 @@ def transition(
     from study.motion.drawing import draw_clip
     from study.motion.library_file import UNITS
     from study.motion.readers.bvh_writing import write_bvh
+    from study.transitions.flaws import find_flaws, has_feet
     from study.transitions.footskate import plant_feet
     from study.transitions.rates import remade
 
@@ -215,7 +217,6 @@ def transition(
     )
     points = {**moment(first, start, "start"), **moment(second, end, "end")}
     where = f"from {in_words(first, start, source)} to {in_words(second, end, destination)}"
-    slide = {}
     told = click.get_current_context().get_parameter_source("fps") is not ParameterSource.DEFAULT
     if out.suffix.lower() == ".bvh" and not told and first.file_fps:
         first, second = clip_pair(source, destination, library, first.file_fps, tell=False)
@@ -225,8 +226,9 @@ def transition(
             count = frames if found is None else found.blend_frames
             joined = switched(switch, first, second, (start, end), count or 1, fps)
     if not keep_slide:
-        joined, planted = plant_feet(joined, first, second)
-        slide = {"slide_before_m": planted.slide_before_m, "slide_after_m": planted.slide_after_m}
+        joined = plant_feet(joined, first, second)
+    blended = joined.blend_start, joined.blend_stop
+    flaws = find_flaws(joined.clip, blended, (first, second)) if has_feet(joined.clip) else None
     if out.suffix.lower() == ".bvh":
         write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
     else:
@@ -249,12 +251,12 @@ def transition(
         "unclipped_s": getattr(found, "unclipped_s", None),
         "note": "; ".join(filter(None, (joined.note, "" if found is None else found.note))),
         "history": list(joined.clip.history),
-        **slide,
+        "flaws": asdict(flaws) if flaws else None,
     }
     text = (
         f"{out}: {counted(joined.clip.frames, 'frame')} ({joined.clip.seconds:.3f} s at {rate:g} fps), "
         f"{joined.blend_frames} of them blended ({joined.blend_frames / rate:.3f} s), {where}; {result['note']}"
-    )
+    ) + "".join(f"; {what}" for what in (flaws.told() if flaws else ()))
     emit(result, as_json, text)
 
 

@@ -17,6 +17,7 @@ from study.experiment.stimuli.ways import Ways
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
 from study.transitions.blending import blend, facing
+from study.transitions.flaws import Flaws, find_flaws, has_feet
 
 FloatArray = NDArray[np.float64]
 
@@ -25,7 +26,10 @@ _TRAVELS_M = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A stimulus before it has a camera: `positions (frames, points, 3)` in metres, and the frames that are blended."""
+    """A stimulus before it has a camera: `positions (frames, points, 3)` in metres, and the frames that are blended.
+
+    `flaws` are None for a figure without feet; `holds_feet` says whether its feet are to stand.
+    """
 
     settled: Settled
     method: str
@@ -35,6 +39,8 @@ class Draft:
     blend: tuple[int, int]
     positions: FloatArray
     notes: tuple[str, ...]
+    flaws: Flaws | None
+    holds_feet: bool
 
 
 def add_drafts(protocol: Protocol, planned: Planned, drafts: dict[Film, Draft], ways: Ways) -> None:
@@ -50,13 +56,16 @@ def _draft(protocol: Protocol, planned: Planned, method: str, difference: int, f
     """Make the frames, cut them to entry and exit, and place them at the origin with the common heading."""
     settled = planned.settled.at(method)
     points = replace(settled, start_frame=film.start_frame, end_frame=film.end_frame)
-    made = film.way.made(ways.place(planned.study, points))
+    place = ways.place(planned.study, points)
+    made = film.way.made(place)
     first = made.blend_start - film.way.lead - film.frames_before - protocol.entry_frames
     clip = trim(made.clip, first, made.blend_stop + film.frames_on + protocol.exit_frames)
     notes = tuple(note for note in (made.note, settled.lengths[method].note) if note)
     positions = _placed(joint_positions(clip, ends=True), protocol, settled)
     blended = made.blend_start - first, made.blend_stop - first
-    return Draft(points, method, difference, film.way.blend_frames, clip, blended, positions, notes)
+    flaws = find_flaws(clip, blended, film.way.motions(place)) if has_feet(clip) else None
+    frames, holds = film.way.blend_frames, film.way.holds_feet
+    return Draft(points, method, difference, frames, clip, blended, positions, notes, flaws, holds)
 
 
 def _placed(positions: FloatArray, protocol: Protocol, settled: Settled) -> FloatArray:

@@ -127,6 +127,8 @@ def _stimulus(
         group=group,
         synthetic=library.synthetic,
         notes=draft.notes,
+        flaws=draft.flaws,
+        holds_feet=draft.holds_feet,
     )
     return Stimulus(record, draft.positions, figure, camera)
 

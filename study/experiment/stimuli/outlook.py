@@ -14,6 +14,7 @@ from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.audit import PairAudit
 from study.experiment.stimuli.films import Film, Planned, Showing, plan_all
+from study.experiment.stimuli.flawed import flaw_notes
 from study.experiment.stimuli.prepare import made_of
 from study.experiment.stimuli.shortcuts import ShortcutShare, shortcuts_of, told_away
 from study.experiment.stimuli.supply import Supply
@@ -107,10 +108,12 @@ def look_ahead(protocol: Protocol, library: Library) -> Outlook:
     planned, problems = plan_all(protocol, library, ways)
     audits: tuple[PairAudit, ...] = ()
     shortcuts: tuple[ShortcutShare, ...] = ()
+    flaws: tuple[str, ...] = ()
     if not problems:
         try:
             made = made_of(protocol, library, planned, ways)
             audits, shortcuts = made.audits, shortcuts_of(protocol, made.pairs, made.audits)
+            flaws = tuple(flaw_notes(made.records))
         except StimulusError as error:
             problems = [str(error)]
     times = {study.name: found for study in protocol.studies if (found := _times(study, protocol, planned))}
@@ -119,7 +122,7 @@ def look_ahead(protocol: Protocol, library: Library) -> Outlook:
     return Outlook(
         tuple(_row(protocol, each) for each in planned),
         tuple(problems),
-        (*_too_alike(protocol, planned), *told_away(protocol, shortcuts)),
+        (*_too_alike(protocol, planned), *told_away(protocol, shortcuts), *flaws),
         sum(protocol.fewest_trials_of(study) for study in protocol.studies),
         sum(protocol.trials_of(study) for study in protocol.studies),
         len(films),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from study.errors import StimulusError
 from study.experiment.stimuli.audit import PairAudit
 from study.tasks.trial import Pair
+from study.transitions.flaws import Flaws
 
 if TYPE_CHECKING:
     from renderer.camera import Camera
@@ -63,6 +64,10 @@ class StimulusRecord:
         Whether a program made the motion up.
     notes
         How it was made, in words.
+    flaws
+        How its feet and its velocities compare with those of its motions; None for a figure without feet.
+    holds_feet
+        Whether feet that bear weight are to stand.
     """
 
     id: str
@@ -80,6 +85,8 @@ class StimulusRecord:
     group: str
     synthetic: bool
     notes: tuple[str, ...] = ()
+    flaws: Flaws | None = None
+    holds_feet: bool = False
 
 
 @dataclass(frozen=True, eq=False)

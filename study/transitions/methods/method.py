@@ -136,6 +136,15 @@ class Way(ABC):
     def made(self, place: Place) -> Made:
         """Make the frames."""
 
+    @property
+    def holds_feet(self) -> bool:
+        """Whether feet that bear weight are to stand."""
+        return False
+
+    def motions(self, place: Place) -> tuple[Clip, ...]:
+        """The motions that it is made from, beside which it is measured."""
+        return place.source, place.destination
+
     def lacking(self, entry: int, after: int) -> str:
         """What is missing for so many frames of entry and after the blend, in words; empty where nothing is."""
         del entry, after

@@ -18,7 +18,7 @@ def finished(made: Transition, place: Place, clean_feet: bool) -> Made:
 
     if clean_feet:
         # The clips themselves know when a foot is planted; a sliding one may be too fast to be found in the blend.
-        made, _ = plant_feet(made, place.source, place.destination)
+        made = plant_feet(made, place.source, place.destination)
     return Made(made.clip, made.blend_start, made.blend_stop, made.note)
 
 
@@ -35,6 +35,11 @@ class Blended(Way):
         """The longer of the two windows."""
         return max(self.windows)
 
+    @property
+    def holds_feet(self) -> bool:
+        """As `clean_feet` says; a cut has no feet to hold."""
+        return self.clean_feet and self.blend_frames > 0
+
     def made(self, place: Place) -> Made:
         """Cut, blend, or warp and blend; then plant the feet."""
         from study.transitions.blending import blend, cut
@@ -47,7 +52,7 @@ class Blended(Way):
             made = warped_blend(*clips, *points, *self.windows, weight=self.weight)
         else:
             made = blend(*clips, *points, self.blend_frames, weight=self.weight)
-        return finished(made, place, self.clean_feet and self.blend_frames > 0)
+        return finished(made, place, self.holds_feet)
 
     def longer_than(self, other: Way) -> int | None:
         """The larger difference of the two windows; a cut differs from a blend in its length alone."""

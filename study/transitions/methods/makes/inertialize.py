@@ -39,6 +39,11 @@ class Switch(Way):
         """Frames that hold something of the source."""
         return self.blend
 
+    @property
+    def holds_feet(self) -> bool:
+        """As `clean_feet` says."""
+        return self.clean_feet
+
     @abstractmethod
     def joined(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Transition:
         """The transition, its feet as they come."""

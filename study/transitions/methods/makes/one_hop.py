@@ -98,7 +98,18 @@ class Hop(Way):
         from study.transitions.footskate import plant_feet
 
         made = blend(source, destination, start, into, self.hop_blend_frames, weight=self.curve, specification="left")
-        return plant_feet(made, source, destination)[0] if self.clean_feet else made
+        return plant_feet(made, source, destination) if self.clean_feet else made
+
+    @property
+    def holds_feet(self) -> bool:
+        """As `clean_feet` says."""
+        return self.clean_feet
+
+    def motions(self, place: Place) -> tuple[Clip, ...]:
+        """The two motions, and the hop between them."""
+        return (
+            (place.source, place.destination) if self.direct else (place.source, self._clip(place), place.destination)
+        )
 
     def _clip(self, place: Place) -> Clip:
         if self.name.endswith(_SOURCE):
