@@ -172,7 +172,7 @@ def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:
     )
     if True in feet:
         where = ", if the method includes this" if False in feet else ""
-        how += f" Sliding of planted feet was removed after blending{where}."
+        how += f" After blending, root and legs were moved so that feet that bear weight stand{where}."
     return how + "".join(others), "blend or the cut" if cuts else "blend"
 
 
