@@ -272,8 +272,9 @@ def test_check_reports_the_audit_and_warns(paper: StimulusSet, panned: StimulusS
     (note,) = (one for one in outlook.notes if "threshold of 75%" in one)
     assert "size in the last frame" in note
     assert 'match = "duration"' in note
+    # A foot that bears weight carries the root, so where a turn ends depends on the length of the blend.
     assert all(
-        one.furthest < 0.6
+        one.furthest < 0.72
         for one in shortcuts_of(panned.protocol, panned.pairs, panned.audits)
         if one.cue != "duration"
     )
