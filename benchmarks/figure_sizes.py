@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,6 @@ from PIL import Image, ImageDraw
 
 from renderer.colour import nv12_to_rgb
 from renderer.offscreen import render_frames
-from renderer.screen import fitted_camera
 from study.experiment.protocol.whole import load_protocol
 from study.experiment.stimuli.prepare import prepare
 from study.experiment.stimuli.stimulus import Stimulus
@@ -36,7 +36,9 @@ POSES = 10
 def measured(stimulus: Stimulus, fps: float) -> tuple[dict[str, NDArray[np.float64]], list[NDArray[np.uint8]]]:
     """Height, distance of the middle and touched edges of each frame, and some frames as RGB."""
     width, height = stimulus.camera.size
-    camera = fitted_camera(stimulus.camera, (width // 4, height // 4), True)
+    camera = replace(
+        stimulus.camera, size=(width // 8 * 2, height // 8 * 2), focal_pixels=stimulus.camera.focal_pixels / 4
+    )
     frames = list(render_frames(stimulus.positions, stimulus.figure, camera, fps=fps))
     rows: dict[str, list[float]] = {"height": [], "aside": [], "touches": []}
     for frame in frames:
