@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from renderer.figure import Figure
 
 AROUND_S = 2.0
-"""What a video of a transition shows before and after its blend, as the stimuli of 2004 do (section 4.2)."""
+"""What is shown of a transition before and after its blend, as the stimuli of 2004 do (section 4.2)."""
 
 # Hip to ankle over stature (Winter, Biomechanics and Motor Control of Human Movement, anthropometric table).
 LEG_SHARE = 0.491
@@ -61,7 +61,7 @@ def draw_clip(
     *,
     size: tuple[int, int] = (1280, 720),
     view: str = "three-quarter",
-    style: str = "stick",
+    style: str = "mannequin",
     poses: int = 9,
     camera: str = "track",
     floor: bool = False,
@@ -82,14 +82,14 @@ def draw_clip(
     floor
         Draw the ground, at height 0, with contact shadows.
     blended
-        Frames of a transition's blend, as a slice counts them: source, blend and destination are coloured apart. A
-        video then shows `AROUND_S` before and after the blend, and no more.
+        Frames of a transition's blend, as a slice counts them: source, blend and destination are coloured apart, and
+        no more is shown than `AROUND_S` before and after the blend.
     """
     from renderer.segments import Segment
 
     if out.suffix.lower() not in (".mp4", ".png"):
         raise StimulusError(f"{out}: expected a name that ends in .mp4 or .png, found {out.suffix or 'no ending'!r}.")
-    if blended is not None and out.suffix.lower() == ".mp4":
+    if blended is not None:
         around = round(AROUND_S * clip.fps)
         first, stop = max(blended[0] - around, 0), min(blended[1] + around, clip.frames)
         clip, blended = trim(clip, first, stop), (blended[0] - first, blended[1] - first)

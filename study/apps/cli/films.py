@@ -1,4 +1,4 @@
-"""Options of verbs that make a film to look at: from where, by which camera, how large."""
+"""Options of verbs that make a film to look at: the figure, from where, by which camera, how large."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 
 
 def film_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds `--view`, `--camera` and `--size` to a verb."""
+    """Adds `--style`, `--view`, `--camera` and `--size` to a verb."""
     for decorate in (
         click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Of the film, in pixels."),
         click.option(
@@ -25,6 +25,13 @@ def film_options(command: Callable[..., Any]) -> Callable[..., Any]:
             default="three-quarter",
             show_default=True,
             help="From where, relative to the way the figure goes.",
+        ),
+        click.option(
+            "--style",
+            type=click.Choice(["mannequin", "stick", "points"]),
+            default="mannequin",
+            show_default=True,
+            help="How the figure is drawn.",
         ),
     ):
         command = decorate(command)

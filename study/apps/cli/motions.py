@@ -172,7 +172,6 @@ def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.mp4, or X.png: a strip.")
 @click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video (default: that of the clip).")
 @film_options
-@click.option("--style", type=click.Choice(["stick", "points", "mannequin"]), default="stick", show_default=True)
 @click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Of the strip.")
 @click.option("--floor", is_flag=True, help="Draw the ground, with contact shadows.")
 @json_option
@@ -181,10 +180,10 @@ def preview(
     library: str | None,
     out: Path,
     fps: float | None,
+    style: str,
     view: str,
     camera: str,
     size: str,
-    style: str,
     poses: int,
     floor: bool,
     as_json: bool,

@@ -190,6 +190,7 @@ def transition(
     keep_slide: bool,
     unit: str | None,
     out: Path,
+    style: str,
     view: str,
     camera: str,
     size: str,
@@ -197,8 +198,8 @@ def transition(
 ) -> None:
     """Blend from frame --start of SRC to frame --end of DST and write the result.
 
-    --start, --end and --frames are frames at --fps. A film shows two seconds before and after the blend; source, blend
-    and destination have the colours that they have in a strip.
+    --start, --end and --frames are frames at --fps. A film or strip shows two seconds before and after the blend;
+    source, blend and destination have colours of their own.
     """
     from study.motion.drawing import draw_clip
     from study.motion.library_file import UNITS
@@ -233,7 +234,7 @@ def transition(
         write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
     else:
         blended = joined.blend_start, joined.blend_stop
-        draw_clip(joined.clip, out, size=wanted, view=view, camera=camera, blended=blended)
+        draw_clip(joined.clip, out, size=wanted, style=style, view=view, camera=camera, blended=blended)
     rate = joined.clip.fps
     result = {
         "file": str(out),
