@@ -2,6 +2,7 @@
 
     python benchmarks/one_hop.py                       the paper's size: one pair, 1,000 triggered frames
     python benchmarks/one_hop.py --all                 also all 380 ordered pairs, every frame a trigger
+    python benchmarks/one_hop.py --adaptive            blends of their own length beside those of one, on four clips
     python benchmarks/one_hop.py --clips A.amc B.amc   sampled entries on these clips against trying all
     python benchmarks/one_hop.py --json                one JSON object
 
@@ -34,6 +35,7 @@ from study.motion.clip import Clip, resample, retarget, trim
 from study.motion.mending import mend
 from study.motion.readers.registry import read_clip
 from study.motion.synthetic import synthesize
+from study.transitions.one_hop.adaptive import adaptive
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.problem import (
     FORBIDDEN,
@@ -160,6 +162,25 @@ def all_pairs(clips: tuple[Clip, ...]) -> dict[str, Any]:
     return result
 
 
+def adaptive_size(clips: tuple[Clip, ...], repeats: int) -> dict[str, Any]:
+    """How much longer the search takes where blends have their own length, by turns; all pairs of the clips."""
+    rows: dict[str, Any] = {}
+    for name, alignment in ALIGNMENTS.items():
+        pairs = [(a, b) for a in range(len(clips)) for b in range(len(clips)) if a != b]
+        switches = tuple(Switch(*pair, alignment) for pair in pairs)
+        fixed = Problem(clips, switches, Settings(), weight_in_counts(WEIGHT, PointCloudDistance()))
+        taken: dict[str, list[float]] = {"fixed": [], "adaptive": []}
+        for _ in range(repeats):
+            for kind, problem in (("fixed", fixed), ("adaptive", adaptive(fixed))):
+                started = time.process_time()
+                build_table(problem)
+                taken[kind].append(time.process_time() - started)
+        seconds = {f"{kind}_cpu_seconds": statistics.median(values) for kind, values in taken.items()}
+        ratio = statistics.median(a / b for a, b in zip(taken["adaptive"], taken["fixed"], strict=True))
+        rows[name] = {**seconds, "ratio": ratio}
+    return rows
+
+
 def own_clips(files: Sequence[Path], samples: int) -> dict[str, Any]:
     """Sampled entries for all pairs of captured clips, at 60 fps on one body."""
     clips = [replace(resample(mend(read_clip(file)), 60.0), name=file.stem) for file in files]
@@ -179,6 +200,7 @@ def own_clips(files: Sequence[Path], samples: int) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--all", action="store_true", help="all 380 ordered pairs, too")
+    parser.add_argument("--adaptive", action="store_true", help="blends of their own length, beside those of one")
     parser.add_argument("--clips", nargs="+", type=Path, default=[], help="motion files of one rig")
     parser.add_argument("--samples", type=int, default=10, help="entries to check on them")
     parser.add_argument("--repeats", type=int, default=5)
@@ -187,6 +209,8 @@ def main() -> None:
     result: dict[str, Any] = {"cores": cores(), "numpy": np.__version__}
     if chosen.clips:
         result["clips"] = own_clips(chosen.clips, chosen.samples)
+    elif chosen.adaptive:
+        result["adaptive"] = adaptive_size(dances(4, 600), chosen.repeats)
     else:
         clips = dances()
         result["paper_size"] = paper_size(clips, chosen.repeats)
