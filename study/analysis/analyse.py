@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
 
 from study.analysis.confirmatory import ConfirmatoryTest, confirmatory
 from study.analysis.exclusions import Exclusions, Rules, exclude, rules_of
+from study.analysis.headline import Headline
 from study.analysis.preference.analyse import Preference
 from study.analysis.quality import Quality, quality
 from study.analysis.registry import ANALYSES, analysis_of
@@ -90,6 +91,14 @@ class Analysis(Results):
     data: Data
     confidence: float
     alpha: float
+
+    @property
+    def headline(self) -> tuple[Headline, ...]:
+        """What each study found: see `headline`."""
+        found = (
+            one for name, study in self.studies.items() for one in study.headlines(name, self.alpha, self.confidence)
+        )
+        return _adjusted(found, self.confirmatory)
 
     def sentences(self) -> list[str]:
         """Return the answers of all studies in words."""
@@ -192,6 +201,7 @@ def analysis_json(analysis: Analysis) -> dict[str, Any]:
     """Return what JSON holds of an analysis: the results of each kind under keys of their own, by name of the study."""
     other = analysis.without_exclusions
     return _results_json(analysis) | {
+        "headline": to_json(analysis.headline),
         "exclusions": to_json(analysis.exclusions),
         "without_exclusions": None if other is None else _results_json(other),
         "quality": to_json(analysis.quality),
@@ -208,6 +218,17 @@ def _results_json(results: Results) -> dict[str, Any]:
         for key, attribute in kind.keys.items():
             found[key] = {name: to_json(getattr(one, attribute) if attribute else one) for name, one in own.items()}
     return found | {"confirmatory": to_json(results.confirmatory)}
+
+
+def _adjusted(headlines: Iterable[Headline], tests: Iterable[ConfirmatoryTest]) -> tuple[Headline, ...]:
+    """The headlines, those of confirmatory tests with their adjusted p-values; each study's tests come in its order."""
+    waiting: dict[str, list[ConfirmatoryTest]] = {}
+    for test in tests:
+        waiting.setdefault(test.study, []).append(test)
+    return tuple(
+        replace(one, p_adjusted=waiting[one.study].pop(0).holm_p_value) if waiting.get(one.study) else one
+        for one in headlines
+    )
 
 
 def kind_of_data(answers: pd.DataFrame) -> Data:

@@ -40,14 +40,14 @@ def confirmatory(
         if family is None or name in family
         for compared in study.comparisons
     ]
-    adjusted = holm([compared.participants.p_value for _, compared in found])
+    adjusted = holm([compared.default.p_value for _, compared in found])
     return tuple(
         ConfirmatoryTest(
             study=name,
             method_a=compared.method_a,
             method_b=compared.method_b,
-            test=compared.participants.test,
-            p_value=compared.participants.p_value,
+            test=compared.default.test,
+            p_value=compared.default.p_value,
             note=compared.participants.note if p_value is None else "",
             holm_p_value=p_value,
         )

@@ -12,6 +12,8 @@ from study.models.up_down import UpDown
 if TYPE_CHECKING:
     import pandas as pd
 
+    from study.analysis.headline import Headline
+
 
 class StudyResult(Protocol):
     """The result of one study: a frozen dataclass of its task.
@@ -27,6 +29,9 @@ class StudyResult(Protocol):
 
     def sentences(self, alpha: float) -> list[str]:
         """Return the answers of the study in words, at a level of significance."""
+
+    def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
+        """Return what the study of this name found, one for each question that it asks."""
 
 
 @dataclass(frozen=True)

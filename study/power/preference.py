@@ -11,7 +11,7 @@ from scipy.special import expit
 
 from study.analysis.analyse import Analysis
 from study.analysis.preference.analyse import Preference
-from study.analysis.preference.participants import default_p_values
+from study.analysis.preference.default_test import p_values_of_studies
 from study.errors import AnalysisError
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
@@ -28,7 +28,7 @@ def preference_effect(study: StudySpec, options: Mapping[str, float], decided: A
         observer=preference_observer(study, share, correlation, bias, options["missed"]),
         stated={"share": share, "correlation": correlation, "order_bias": bias},
         icc=correlation,
-        test=f"Student's t over participants at {alpha:g}",
+        test=f"Student's t over participants and motions at {alpha:g}",
         aim=f"find a preference of {100 * share:g}% at the level {alpha:g}",
         study=lambda design: preference_study(design, alpha, share),
         found=lambda analysis: preference_found(analysis, study.name, share, alpha),
@@ -38,10 +38,10 @@ def preference_effect(study: StudySpec, options: Mapping[str, float], decided: A
 def preference_found(analysis: Analysis, name: str, share: float, alpha: float) -> bool:
     """Return whether the default test found the preference, in the right direction."""
     result = analysis.of(Preference).get(name)
-    test = result.comparisons[0].participants if result and result.comparisons else None
-    if test is None or test.p_value is None or test.mean_percent is None:
+    test = result.comparisons[0].default if result and result.comparisons else None
+    if test is None or test.p_value is None or test.percent is None:
         return False
-    return test.p_value < alpha and (share == 0.5 or (test.mean_percent > 50) == (share > 0.5))
+    return test.p_value < alpha and (share == 0.5 or (test.percent > 50) == (share > 0.5))
 
 
 def preference_observer(
@@ -97,9 +97,11 @@ def logit_normal(share: float, correlation: float, order_bias: float = 0.0) -> t
 
 
 def preference_study(design: Design, alpha: float, share: float) -> Run:
-    """Whether the test over participants finds the preference, in the right direction (2004 section 5.2)."""
+    """Whether the default test finds the preference, in the right direction (2004 section 5.2)."""
     trials, typical = design.trials(), design.settings.preference
     signs = np.array([[1.0 if trial.a_first else -1.0 for trial in own] for own in trials])
+    names = sorted({trial.motion for own in trials for trial in own})
+    of_motion = np.array([[[float(trial.motion == name) for name in names] for trial in own] for own in trials])
     lean = typical.utility[design.study.reference] - typical.utility.get(design.study.comparison or "", 0.0)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
@@ -110,17 +112,17 @@ def preference_study(design: Design, alpha: float, share: float) -> Run:
         chose_a = rng.random(chance.shape) < chance
         response_s, given = times(design, rng, np.abs(2 * chance - 1))
         kept = kept_of(design, rng, response_s, given)
-        chosen, shown = (chose_a & kept).sum(axis=2), kept.sum(axis=2)
-        return np.column_stack(
-            [_found(chosen[:, :size].astype(float), shown[:, :size].astype(float), share, alpha) for size in sizes]
+        chosen, shown = (
+            np.einsum("spt,ptm->spm", answers.astype(np.float64), of_motion[:people])
+            for answers in (chose_a & kept, kept)
         )
+        return np.column_stack([_found(chosen[:, :size], shown[:, :size], share, alpha) for size in sizes])
 
     return run
 
 
 def _found(chosen: FloatArray, shown: FloatArray, share: float, alpha: float) -> BoolArray:
     """Significant, and towards the method that is really favoured (either way where none is)."""
-    people = np.maximum((shown > 0).sum(axis=1), 1)
-    mean = (chosen / np.maximum(shown, 1)).sum(axis=1) / people
+    mean = chosen.sum(axis=(1, 2)) / np.maximum(shown.sum(axis=(1, 2)), 1)
     towards = (mean > 0.5) == (share > 0.5) if share != 0.5 else np.ones(len(chosen), dtype=bool)
-    return np.asarray((default_p_values(chosen, shown) < alpha) & towards)
+    return np.asarray((p_values_of_studies(chosen, shown) < alpha) & towards)

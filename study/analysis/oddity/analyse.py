@@ -8,11 +8,12 @@ of one third; its threshold lies half of the way from chance to never wrong, at 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from study.analysis import estimates
-from study.analysis.psychometric.analyse import PsychometricStudy, analyse_psychometric
+from study.analysis.headline import Headline
+from study.analysis.psychometric.analyse import BelievedThreshold, PsychometricStudy, analyse_psychometric
 from study.analysis.psychometric.model import make_model
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
@@ -56,16 +57,6 @@ class OddityLevel:
 
 
 @dataclass(frozen=True)
-class SideThreshold:
-    """A threshold in frames of difference, over participants where there are several."""
-
-    frames: float | None
-    low: float | None
-    high: float | None
-    note: str
-
-
-@dataclass(frozen=True)
 class Oddity:
     """The result of an oddity study.
 
@@ -86,9 +77,18 @@ class Oddity:
     staircases: Staircases | None = None
 
     @property
-    def thresholds(self) -> dict[Side, SideThreshold]:
+    def thresholds(self) -> dict[Side, BelievedThreshold]:
         """Return the threshold to be believed of each side."""
-        return {side: _believed(found) for side, found in self.functions.items()}
+        return {side: found.believed for side, found in self.functions.items()}
+
+    def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
+        """Return the threshold of each side, by the estimate to be believed."""
+        found = []
+        for side, function in self.functions.items():
+            (own,) = function.headlines(study, alpha, confidence)
+            said = f"Blends that are {side}: {own.statement}"
+            found.append(replace(own, statement=said, unit=f"frames {side} than the reference"))
+        return found
 
     def sentences(self, alpha: float) -> list[str]:
         """Return how well the odd one was found, and the thresholds, in words."""
@@ -102,17 +102,6 @@ class Oddity:
         ]
         told += [self.staircases.in_words("right")] if self.staircases else []
         return [*told, *(f"Blends that are {side}: {found.answer}" for side, found in self.functions.items())]
-
-
-def _believed(found: PsychometricStudy) -> SideThreshold:
-    mixed, group, alone = found.mixed, found.group, found.pooled.threshold
-    if mixed is not None and mixed.threshold is not None:
-        return SideThreshold(mixed.threshold, mixed.low, mixed.high, "of a typical participant")
-    if group.participants > 1 and group.mean_threshold is not None:
-        return SideThreshold(group.mean_threshold, group.low, group.high, "mean over participants")
-    if alone is None:
-        return SideThreshold(None, None, None, found.pooled.note)
-    return SideThreshold(alone.value, alone.interval.low, alone.interval.high, alone.note or "of all answers")
 
 
 def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddity:

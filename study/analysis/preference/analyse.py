@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from study.analysis import estimates
-from study.analysis.estimates import NotFitted
+from study.analysis.estimates import Interval, NotFitted
+from study.analysis.headline import Headline
 from study.analysis.preference.answers import preference_answers
 from study.analysis.preference.bradley_terry import BradleyTerry, fit_bradley_terry
+from study.analysis.preference.default_test import DefaultTest, default_test
 from study.analysis.preference.models import PreferenceModels, preference_models
 from study.analysis.preference.motions import MotionsAsSample, motions_as_sample
 from study.analysis.preference.no_effect import MARGIN, NoEffect, no_preference
@@ -34,7 +36,8 @@ if TYPE_CHECKING:
 class Comparison:
     """Two methods compared.
 
-    `published` leaves `ties` out, the test over `participants` takes them as half an answer; `answer` is a sentence.
+    `published` leaves `ties` out, the other tests take them as half an answer; `default` is the test that the sentence
+    in `answer` rests on.
     `models` is None where they were not asked for.
     """
 
@@ -48,6 +51,7 @@ class Comparison:
     motions_as_sample: MotionsAsSample
     order: OrderEffect
     no_preference: NoEffect
+    default: DefaultTest
     answer: str
     models: PreferenceModels | None
 
@@ -66,6 +70,24 @@ class Preference:
         del alpha
         told = [compared.answer for compared in self.comparisons]
         return [*told, strengths_in_words(self.strengths)] if self.strengths else told
+
+    def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
+        """Return each comparison's share by the default test."""
+        del alpha
+        return [
+            Headline(
+                study=study,
+                statement=compared.answer,
+                estimate=compared.default.percent,
+                unit=f"percent favouring {compared.method_a} over {compared.method_b}",
+                interval=Interval(compared.default.low, compared.default.high, confidence),
+                p=compared.default.p_value,
+                p_adjusted=compared.default.p_value,
+                test=compared.default.test,
+                generalises_to=compared.default.generalises_to,
+            )
+            for compared in self.comparisons
+        ]
 
 
 def compare(
@@ -100,6 +122,8 @@ def compare(
         published = without_ties(part, confidence)
         participants = participant_tests(chosen, shown, confidence)
         order = order_effect(part, confidence)
+        motions = motions_as_sample(part, confidence)
+        default = default_test(participants, motions)
         results.append(
             Comparison(
                 *names,
@@ -108,11 +132,11 @@ def compare(
                 participants=participants,
                 clustering=estimates.clustering(chosen, shown),
                 motions=by_motion(part, confidence),
-                motions_as_sample=motions_as_sample(part, confidence),
+                motions_as_sample=motions,
                 order=order,
                 no_preference=no_preference(chosen[shown > 0] / shown[shown > 0], margin),
-                answer=_order_in_words(*names, order, alpha)
-                or _in_words(*names, published, participants, order, alpha),
+                default=default,
+                answer=_order_in_words(*names, order, alpha) or _in_words(*names, published, default, order, alpha),
                 models=preference_models(part, confidence) if models else None,
             )
         )
@@ -183,21 +207,20 @@ def _in_words(
     method_a: str,
     method_b: str,
     published: Published,
-    participants: ParticipantTests,
+    default: DefaultTest,
     order: OrderEffect,
     alpha: float,
 ) -> str:
     """Who was favoured, how often, whether it can be told from chance, and what the order had to do with it."""
     if published.percent is None:
         return f"There are no answers that choose between {method_a} and {method_b}."
-    p_value = participants.p_value
+    p_value = default.p_value
     share = f"{published.percent:.1f}% of {counted(published.answers, 'answer')} favoured {method_a} over {method_b}"
     if p_value is None:
         said = f"{share}; one participant says nothing about others."
-    elif p_value < alpha:
-        said = f"{share}; across participants this is significant (p {_p_in_words(p_value)})."
     else:
-        said = f"{share}; across participants this is not significant (p {_p_in_words(p_value)})."
+        verdict = "significant" if p_value < alpha else "not significant"
+        said = f"{share}; across {default.generalises_to}, this is {verdict} (p {_p_in_words(p_value)})."
     if ONE_ORDER in order.note:
         return f"{said} {ONE_ORDER[0].upper()}{ONE_ORDER[1:]}."
     if order.p_value is not None and order.p_value < alpha:

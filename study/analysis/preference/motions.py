@@ -1,24 +1,17 @@
-"""Tests of a preference that hold for other motions too: answers in, p-values and intervals out.
-
-Clark 1973 asks for tests that take the motions for a sample; where participants vary with them, the variance is that of
-Cameron, Gelbach & Miller 2011.
-"""
+"""Tests of a preference that hold for other motions too (Clark 1973): answers in, p-values and intervals out."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis import estimates
+from study.analysis.preference.crossed import crossed
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -36,17 +29,14 @@ class ByMotion:
 
 @dataclass(frozen=True)
 class BothVary:
-    """The pooled share with a variance that lets participants and motions vary, by Student's t.
-
-    The degrees of freedom are the smaller number of participants and motions, less one.
-    """
+    """The share with an error that lets participants and motions vary, by Student's t; see `crossed`."""
 
     percent: float
     standard_error: float
     low: float
     high: float
     t: float
-    degrees_of_freedom: int
+    degrees_of_freedom: float
     p_value: float
 
 
@@ -66,13 +56,6 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> MotionsAs
     ----------
     part
         Columns `participant`, `motion`, `chose_a` (0, 1, or one half for a tie).
-
-    Notes
-    -----
-    A mixed model with crossed random effects would rest its intervals on a normal approximation over as few motions as
-    there are (8 in 2004), so it is not used. The variance in `both` is that of sums over participants, plus that over
-    motions, less that of single answers, each corrected for its number of groups; never below the last, so that the
-    test errs too seldom rather than too often where neither participants nor motions differ.
     """
     if "motion" not in part.columns or part["motion"].nunique() < 2:
         return MotionsAsSample(None, None, "fewer than two motions: they can't represent other motions")
@@ -92,35 +75,25 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> MotionsAs
 
 
 def _both_vary(part: pd.DataFrame, confidence: float) -> tuple[BothVary | None, str]:
-    chosen = part["chose_a"].to_numpy(dtype=np.float64)
     names = [part[column].astype(str).to_numpy() for column in ("participant", "motion")]
     groups = [np.unique(name, return_inverse=True)[1] for name in names]
-    fewest = min(int(group.max()) + 1 for group in groups)
-    if fewest < 2:
+    shape = tuple(int(group.max()) + 1 for group in groups)
+    if min(shape) < 2:
         return None, "one participant: results do not generalise to others"
-    cells = np.unique(np.column_stack(groups), axis=0, return_inverse=True)[1].ravel()
-    apart = chosen - chosen.mean()
-    variances = [_variance_of_sums(apart, group) for group in groups]
-    # Answers of one participant to one motion count in both sums, and so once too often; by themselves they are the
-    # least that there can be.
-    single = float((np.bincount(cells, apart) ** 2).sum()) / len(chosen) ** 2
-    variance = max(sum(variances) - single, single)
-    if variance <= 1e-12:
+    chosen, shown = np.zeros(shape), np.zeros(shape)
+    np.add.at(chosen, (groups[0], groups[1]), part["chose_a"].to_numpy(dtype=np.float64))
+    np.add.at(shown, (groups[0], groups[1]), 1.0)
+    found = crossed(chosen, shown)
+    share, error, freedom = (float(value) for value in (found.share, found.error, found.freedom))
+    if error <= 1e-6:
         return None, "all answers are the same: there is no spread to estimate"
-    error, mean = math.sqrt(variance), float(chosen.mean())
-    half = estimates.t_quantile(confidence, fewest - 1) * error
-    found = BothVary(
-        percent=100 * mean,
+    half = estimates.t_quantile(confidence, freedom) * error
+    return BothVary(
+        percent=100 * share,
         standard_error=100 * error,
-        low=100 * max(mean - half, 0.0),
-        high=100 * min(mean + half, 1.0),
-        t=(mean - 0.5) / error,
-        degrees_of_freedom=fewest - 1,
-        p_value=estimates.t_probability((mean - 0.5) / error, fewest - 1),
-    )
-    return found, ""
-
-
-def _variance_of_sums(apart: FloatArray, group: NDArray[np.intp]) -> float:
-    count = int(group.max()) + 1
-    return float((np.bincount(group, apart) ** 2).sum()) * count / (count - 1) / len(apart) ** 2
+        low=100 * max(share - half, 0.0),
+        high=100 * min(share + half, 1.0),
+        t=(share - 0.5) / error,
+        degrees_of_freedom=freedom,
+        p_value=float(found.p_values()),
+    ), ""

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
-from study.analysis.estimates import NotFitted
+from study.analysis.estimates import Interval, NotFitted
+from study.analysis.headline import PEOPLE_ALONE, Headline
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
 from study.analysis.psychometric.mixed import TypicalThreshold, psychometric_mixed
 from study.analysis.psychometric.model import Model, make_model
@@ -72,6 +73,16 @@ class LevelAnswers:
 
 
 @dataclass(frozen=True)
+class BelievedThreshold:
+    """A threshold on the scale of the levels, over participants if there are several; `note` says whose it is."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    note: str
+
+
+@dataclass(frozen=True)
 class PsychometricStudy:
     """The result of a 2AFC or yes-no study.
 
@@ -88,6 +99,37 @@ class PsychometricStudy:
     mixed_note: str
     levels: tuple[LevelAnswers, ...]
     answer: str
+
+    @property
+    def believed(self) -> BelievedThreshold:
+        """Return the threshold that `answer` is about: of a typical participant, the mean over them, or of one."""
+        mixed, group, alone = self.mixed, self.group, self.pooled.threshold
+        if mixed is not None and mixed.threshold is not None:
+            return BelievedThreshold(mixed.threshold, mixed.low, mixed.high, "of a typical participant")
+        if group.participants > 1 and group.mean_threshold is not None:
+            return BelievedThreshold(group.mean_threshold, group.low, group.high, "mean over participants")
+        if alone is None:
+            return BelievedThreshold(None, None, None, self.pooled.note)
+        return BelievedThreshold(alone.value, alone.interval.low, alone.interval.high, alone.note or "of all answers")
+
+    def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
+        """Return the threshold to be believed."""
+        del alpha
+        found = self.believed
+        several = len(self.participants) > 1
+        return [
+            Headline(
+                study=study,
+                statement=self.answer,
+                estimate=found.value,
+                unit="the unit of the levels",
+                interval=Interval(found.low, found.high, confidence),
+                p=None,
+                p_adjusted=None,
+                test=found.note,
+                generalises_to=PEOPLE_ALONE if several else "further answers of this participant",
+            )
+        ]
 
 
 def analyse_psychometric(

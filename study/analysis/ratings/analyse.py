@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from study.analysis.estimates import Interval
+from study.analysis.headline import PEOPLE_ALONE, Headline
 from study.analysis.ratings.answers import of_pairs
 from study.analysis.ratings.comparisons import MethodDifference, Question, rating_anova
 from study.analysis.ratings.pairs import PairQuestion, pair_ratings, pair_sentences
@@ -37,6 +39,24 @@ class Ratings:
         ]
         return [*anova_sentences(self.questions, alpha), *means]
 
+    def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
+        """Return each difference of two methods over participants, in each question."""
+        return [
+            Headline(
+                study=study,
+                statement=f"{question.item or 'rating'}: {_difference(row, alpha)}.",
+                estimate=row.mean,
+                unit="points of the scale",
+                interval=Interval(row.low, row.high, confidence),
+                p=row.p_value,
+                p_adjusted=row.p_value if row.holm_p_value is None else row.holm_p_value,
+                test=row.test,
+                generalises_to=PEOPLE_ALONE,
+            )
+            for question in self.questions
+            for row in question.differences
+        ]
+
 
 @dataclass(frozen=True)
 class PairRatings:
@@ -49,6 +69,23 @@ class PairRatings:
     def sentences(self, alpha: float) -> list[str]:
         """Return how the methods compare in each question, in words."""
         return pair_sentences(self.questions, alpha)
+
+    def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
+        """Return the mean score of each question over participants."""
+        return [
+            Headline(
+                study=study,
+                statement=f"{sentence}.",
+                estimate=question.participants.mean,
+                unit=f"points of the scale, {question.middle:g} being the same",
+                interval=Interval(question.participants.low, question.participants.high, confidence),
+                p=question.participants.p_value,
+                p_adjusted=question.participants.p_value,
+                test="Student's t over participants",
+                generalises_to=PEOPLE_ALONE,
+            )
+            for question, sentence in zip(self.questions, pair_sentences(self.questions, alpha), strict=True)
+        ]
 
 
 def analyse_ratings(answers: pd.DataFrame, name: str, settings: Settings) -> Ratings | PairRatings:

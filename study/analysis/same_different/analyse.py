@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
+from study.analysis.headline import PEOPLE_ALONE, Headline
 from study.analysis.same_different.counts import (
     Counts,
     PercentDifferent,
@@ -106,6 +107,27 @@ class SameDifferent(Thresholds):
         """Return the thresholds in words; they rest on no level of significance."""
         del alpha
         return [self.answer]
+
+    def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
+        """Return the threshold of the median observer on each side; that of the group where it can't be fitted."""
+        del alpha, confidence
+        found, whose = (self.mixed.typical, "median observer") if self.mixed else ({}, "")
+        if not found and self.model is not None:
+            found, whose = self.model.jnd, "group"
+        return [
+            Headline(
+                study=study,
+                statement=f"The {whose}'s just noticeable difference is {_sides_in_words({side: threshold})}.",
+                estimate=threshold.frames,
+                unit=f"frames {side} than the reference",
+                interval=threshold.interval,
+                p=None,
+                p_adjusted=None,
+                test=threshold.method,
+                generalises_to=PEOPLE_ALONE,
+            )
+            for side, threshold in found.items()
+        ]
 
 
 def analyse_jnd(

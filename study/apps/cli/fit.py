@@ -204,7 +204,10 @@ def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
         read, analysed = FITS[task](read_table(data, needed, options["delimiter"]), options | {"task": task})
     except AnalysisError as error:
         raise AnalysisError(f"{data}: {error}") from error
-    found = to_json(analysed())
+    result = analysed()
+    found = to_json(result)
+    if hasattr(result, "headlines"):  # what goes through `analyse` has them already
+        found["headline"] = to_json(result.headlines(data.stem, options["alpha"] or 0.05, options["confidence"]))
     counts = {"rows": read.rows, "used": read.used, "blank": read.blank, "missed": read.missed}
     people = read.table["participant"].nunique()
     text = (

@@ -6,7 +6,8 @@ from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from study.analysis.analyse import Analysis
-from study.analysis.oddity.analyse import SIGNS, Oddity, SideThreshold
+from study.analysis.oddity.analyse import SIGNS, Oddity
+from study.analysis.psychometric.analyse import BelievedThreshold
 from study.counting import counted
 from study.models.oddity import CHANCE, HALFWAY
 from study.report import tables, words
@@ -75,10 +76,10 @@ def oddity_figure(result: Oddity, name: str, mark: str) -> str:
         return to_svg(figure, name, "Percent of right answers by difference in blend length", spoken)
 
 
-def _frames(found: SideThreshold, fps: float) -> str:
-    if found.frames is None:
+def _frames(found: BelievedThreshold, fps: float) -> str:
+    if found.value is None:
         return f"is not known ({found.note})"
-    return f"is {found.frames:.1f} frames ({found.frames / fps:.3f} s)"
+    return f"is {found.value:.1f} frames ({found.value / fps:.3f} s)"
 
 
 def _headline(result: Oddity, fps: float) -> Headline:
@@ -102,8 +103,8 @@ def _levels_table(name: str, result: Oddity) -> Table:
 
 def _threshold_table(name: str, result: Oddity, fps: float) -> Table:
     rows = [
-        {"side": side, "frames": found.frames, "low": found.low, "high": found.high, "remark": found.note}
-        | {"seconds": None if found.frames is None else found.frames / fps}
+        {"side": side, "frames": found.value, "low": found.low, "high": found.high, "remark": found.note}
+        | {"seconds": None if found.value is None else found.value / fps}
         for side, found in result.thresholds.items()
     ]
     caption = f"Thresholds: the difference at which 67% of the answers are right; seconds at {fps:g} fps."
@@ -115,21 +116,21 @@ def _recovered(name: str, result: Oddity, about: About) -> Table:
     rows = []
     for side, found in result.thresholds.items():
         known = abs(float(about.known[f"threshold_{side}_frames"]))
-        rows.append({"side": side, "known": known, "found": found.frames, "low": found.low, "high": found.high})
+        rows.append({"side": side, "known": known, "found": found.value, "low": found.low, "high": found.high})
     caption = "Thresholds of the simulated observers, and as found, in frames."
     return tables.make(f"{name}_recovery", caption, "side known found low high", rows)
 
 
 def _readings(result: Oddity) -> Iterator[Reading]:
     for side, found in result.thresholds.items():
-        if found.frames is not None:
-            told = f"{found.frames:.1f} [{words.bare_interval(found.low, found.high)}]"
+        if found.value is not None:
+            told = f"{found.value:.1f} [{words.bare_interval(found.low, found.high)}]"
             yield Reading(f"threshold, {side} [frames]", "", told)
 
 
 def _main_results(result: Oddity, study: str) -> Iterator[MainResult]:
     for side, found in result.thresholds.items():
-        yield MainResult(f"{words.readable(study)}: threshold, {side} [frames]", found.frames, found.low, found.high)
+        yield MainResult(f"{words.readable(study)}: threshold, {side} [frames]", found.value, found.low, found.high)
 
 
 def _methods(found: Collection[Oddity], analysis: Analysis) -> str:

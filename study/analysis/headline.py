@@ -1,0 +1,43 @@
+"""Headlines: the one estimate of each question that a study asks, with the interval and the test that it claims.
+
+The rule (docs/analysis.md, *Headlines*): the estimate that answers the question asked, the interval that generalises as
+the statement says, and the p-value, also adjusted over the family of tests that it belongs to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from study.analysis.estimates import Interval
+
+PEOPLE_ALONE = "participants, for these motions"
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What a study found, in a sentence and in numbers; what can't be given is None.
+
+    Attributes
+    ----------
+    study
+        Its name.
+    statement
+        In words.
+    estimate, unit, interval
+        A number, what it counts, and its confidence interval.
+    p, p_adjusted, test
+        Of the null hypothesis; adjusted for the other tests of its family, as it is where there are none; and what was
+        done.
+    generalises_to
+        What the interval holds for beyond the data.
+    """
+
+    study: str
+    statement: str
+    estimate: float | None
+    unit: str
+    interval: Interval
+    p: float | None
+    p_adjusted: float | None
+    test: str
+    generalises_to: str

@@ -1,0 +1,72 @@
+"""The test of a preference that headlines, families and `segue power` rest on: the one that generalises furthest.
+
+With three motions or more it is Student's t over participants and motions (`crossed`); with fewer, over participants,
+and the result holds for these motions alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from study.analysis.preference.crossed import crossed
+from study.analysis.preference.participants import default_p_values
+
+if TYPE_CHECKING:
+    from study.analysis.preference.motions import MotionsAsSample
+    from study.analysis.preference.participants import ParticipantTests
+
+FEWEST_MOTIONS = 3
+"""Two can't say how far motions differ."""
+
+OVER_BOTH = "Student's t over participants and motions"
+
+
+@dataclass(frozen=True)
+class DefaultTest:
+    """The share of the first method with the interval and the test that hold for what `generalises_to` names.
+
+    `percent` is of all answers where motions are a sample, else the mean over participants; the rest is None where it
+    can't be given.
+    """
+
+    percent: float | None
+    low: float | None
+    high: float | None
+    p_value: float | None
+    test: str
+    generalises_to: str
+
+
+def default_test(people: ParticipantTests, motions: MotionsAsSample) -> DefaultTest:
+    """Choose between the tests that were made."""
+    by_motion, both = motions.by_motion, motions.both
+    if both is not None and by_motion is not None and by_motion.motions >= FEWEST_MOTIONS:
+        return DefaultTest(both.percent, both.low, both.high, both.p_value, OVER_BOTH, "participants and motions")
+    holds = "participants, for these motions" if people.participants > 1 else "these participants and motions"
+    return DefaultTest(people.mean_percent, people.low, people.high, people.p_value, people.test, holds)
+
+
+def p_values_of_studies(chosen: ArrayLike, shown: ArrayLike) -> NDArray[np.float64]:
+    """Return the p-values of the default test of many studies at once.
+
+    Parameters
+    ----------
+    chosen, shown : array_like, shape (..., participants, motions)
+        How often each participant favoured the first method in each motion, of how many answers.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        NaN where no test can be made.
+    """
+    yes, total = np.asarray(chosen, dtype=np.float64), np.asarray(shown, dtype=np.float64)
+    people = default_p_values(yes.sum(axis=-1), total.sum(axis=-1))
+    if yes.shape[-1] < FEWEST_MOTIONS:
+        return people
+    both = crossed(yes, total).p_values()
+    enough = (total > 0).any(axis=-2).sum(axis=-1) >= FEWEST_MOTIONS
+    return np.asarray(np.where(enough & ~np.isnan(both), both, people))
