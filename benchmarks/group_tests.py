@@ -1,8 +1,8 @@
 """How far tests of groups can be trusted: simulated studies, with and without an effect, through the real analysis.
 
 Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of preference, motions,
-models, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code that the
-analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
+crossed, models, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code that
+the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import expit, ndtr
 
+from study.analysis.preference.crossed import crossed
 from study.analysis.preference.models import preference_models
 from study.analysis.preference.motions import motions_as_sample
 from study.analysis.preference.no_effect import no_preference
@@ -90,6 +91,26 @@ def motions(studies, seed):
             rows.append((participant_tests(*by).p_value, found.by_motion.p_value, both))
         rates = [rate(column) for column in zip(*rows, strict=True)]
         print(f"{people:6} {count:7} {own:9} {other:10} " + "{:7.3f} {:8.3f} {:6.3f}".format(*rates), flush=True)
+
+
+def crossed_test(studies, seed):
+    """Errors at .05 of the test over participants and motions, with no effect and with one of 0.6 logits."""
+    print("crossed: errors at .05 over participants and motions; mean and range over people, effects and sd of people")
+    print(f"{'motions':>7} {'sd motions':>10} {'mean':>6} {'lowest':>7} {'highest':>8}")
+    rng = np.random.default_rng([seed, 6])
+    for count in (3, 4, 6, 8):
+        for other in (0.0, 0.25, 0.5, 1.0):
+            found = []
+            for people in (12, 20, 35):
+                for own in (0.0, 0.6, 1.2):
+                    for effect in (0.0, 0.6):
+                        size = (studies, people, count)
+                        lean = own * rng.normal(size=(*size[:2], 1)) + other * rng.normal(size=(studies, 1, count))
+                        shown = rng.binomial(2, 0.97, size=size)
+                        chosen = rng.binomial(shown, expit(effect + lean))
+                        mean = expit(effect + np.hypot(own, other) * rng.normal(size=400_000)).mean()
+                        found.append(float((crossed(chosen, shown).p_values(mean if effect else 0.5) < 0.05).mean()))
+            print(f"{count:7} {other:10} {np.mean(found):6.3f} {min(found):7.3f} {max(found):8.3f}", flush=True)
 
 
 def models(studies, seed):
@@ -203,6 +224,7 @@ def power(studies, seed):
 PARTS = {
     "preference": preference,
     "motions": motions,
+    "crossed": crossed_test,
     "models": models,
     "ratings": ratings,
     "mixed": mixed,

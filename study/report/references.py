@@ -33,6 +33,14 @@ ROUDER_2009 = (
     "Rouder, J. N., Speckman, P. L., Sun, D., Morey, R. D., & Iverson, G. (2009). Bayesian t tests for accepting and "
     "rejecting the null hypothesis. Psychonomic Bulletin & Review, 16, 225–237."
 )
+CLARK_1973 = (
+    "Clark, H. H. (1973). The language-as-fixed-effect fallacy: A critique of language statistics in psychological "
+    "research. Journal of Verbal Learning and Verbal Behavior, 12, 335–359."
+)
+SATTERTHWAITE_1946 = (
+    "Satterthwaite, F. E. (1946). An approximate distribution of estimates of variance components. Biometrics "
+    "Bulletin, 2, 110–114."
+)
 BRADLEY_1952 = (
     "Bradley, R. A., & Terry, M. E. (1952). Rank analysis of incomplete block designs. Biometrika, 39, 324–345."
 )

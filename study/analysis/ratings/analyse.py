@@ -55,6 +55,7 @@ class Ratings:
             )
             for question in self.questions
             for row in question.differences
+            if row.participants
         ]
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import binom, nct, t
+from scipy.stats import binom, f, nct, t
 
 from study.analysis.analyse import Analysis
 from study.analysis.exclusions import Rules
@@ -37,17 +37,52 @@ def share_found(run_of: Any, size: int, studies: int = 4000, seed: int = 1) -> f
     return float(run_of(np.random.default_rng(seed), studies, [size]).mean())
 
 
-def test_without_correlation_power_is_that_of_closed_forms(preference: Design) -> None:
-    """280 independent answers at 65%: Student's t by the noncentral t, and near the exact binomial test's power."""
-    shift = 0.15 / np.sqrt(0.65 * 0.35 / 8) * np.sqrt(np.array([12, 35]))
-    alpha = 0.001
-    for size, noncentrality in zip((12, 35), shift, strict=True):
-        found = share_found(preferences.preference_study(preference, alpha, 0.65), size)
-        theory = nct.sf(t.ppf(1 - alpha / 2, size - 1), size - 1, noncentrality)
-        assert found == pytest.approx(theory, abs=0.03)
+def quasi_f(rng: np.random.Generator, people: int, studies: int, alpha: float) -> float:
+    """How often the textbook's quasi-F finds 65% in one answer to each of eight motions, by sums of squares."""
+    share = (rng.random((studies, people, 8)) < 0.65).astype(float)
+    mean = share.mean(axis=(1, 2))
+    rows, columns = share.mean(axis=2) - mean[:, None], share.mean(axis=1) - mean[:, None]
+    rest = share - mean[:, None, None] - rows[:, :, None] - columns[:, None, :]
+    squares = np.stack([8 * (rows**2).sum(axis=1), people * (columns**2).sum(axis=1), (rest**2).sum(axis=(1, 2))])
+    freedom = np.array([people - 1, 7, 7 * (people - 1)])
+    middle = squares / freedom[:, None]
+    keep = np.stack([f.sf(middle[k] / middle[2], freedom[k], freedom[2]) < 0.5 for k in range(2)])
+    joined = np.stack([*~keep, np.ones(studies, dtype=bool)])
+    pool_freedom = (joined * freedom[:, None]).sum(axis=0)
+    pool = (joined * squares).sum(axis=0) / pool_freedom
+    times = 1.0 - keep.sum(axis=0)
+    variance = (keep * middle[:2]).sum(axis=0) + times * pool
+    wide = (1 + 0.6 / freedom[:2])[:, None] * middle[:2]
+    spread = (keep * wide**2 / freedom[:2, None]).sum(axis=0) + (times * pool) ** 2 / pool_freedom
+    variance = np.maximum(variance, pool)
+    statistic = (mean - 0.5) / np.sqrt(variance / (8 * people))
+    return float((t.sf(statistic, np.maximum(variance**2 / spread, 1)) < alpha / 2).mean())
+
+
+def test_without_correlation_power_is_that_of_the_textbook(preference: Design) -> None:
+    """Independent answers at 65%: by a quasi-F of our own, and below the exact binomial test, which knows of no motions."""
+    for people in (12, 35):
+        found = share_found(preferences.preference_study(preference, 0.001, 0.65), people)
+        assert found == pytest.approx(quasi_f(np.random.default_rng(7), people, 4000, 0.001), abs=0.03)
     counts = np.arange(281)
-    critical = next(k for k in counts if 2 * binom.sf(k - 1, 280, 0.5) < alpha)
-    assert found == pytest.approx(binom.sf(critical - 1, 280, 0.65), abs=0.06)
+    critical = next(k for k in counts if 2 * binom.sf(k - 1, 280, 0.5) < 0.001)
+    exact = binom.sf(critical - 1, 280, 0.65)
+    assert exact - 0.25 < found < exact
+
+
+def test_two_motions_are_no_sample_and_power_is_that_of_closed_forms(preference: Design) -> None:
+    """Over participants alone: Student's t by the noncentral t."""
+    names = sorted({trial.motion for trial in preference.trials()[0]})
+    as_two = {name: names[place % 2] for place, name in enumerate(names)}
+    plans = tuple(
+        replace(plan, trials=tuple(replace(one, motion=as_two.get(one.motion, one.motion)) for one in plan.trials))
+        for plan in preference.plans
+    )
+    for size in (12, 35):
+        found = share_found(preferences.preference_study(replace(preference, plans=plans), 0.001, 0.65), size)
+        noncentrality = 0.15 / np.sqrt(0.65 * 0.35 / 8) * np.sqrt(size)
+        theory = nct.sf(t.ppf(1 - 0.001 / 2, size - 1), size - 1, noncentrality)
+        assert found == pytest.approx(theory, abs=0.03)
 
 
 def test_without_an_effect_power_is_the_level(preference: Design) -> None:
@@ -140,7 +175,7 @@ def test_the_verb_writes_what_the_report_reads(tmp_path: Path, capsys: pytest.Ca
     assert powers[1] > 0.8
     assert 4 < printed["needed"] <= 30
     assert (printed["icc"], printed["simulations"], printed["answers_per_participant"]) == (0.1, 200, 8)
-    assert "Student's t over participants at 0.01" in printed["test"]
+    assert "Student's t over participants and motions at 0.01" in printed["test"]
     with (tmp_path / "power_geodesic_vs_fixed.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["power"]) for row in rows] == powers

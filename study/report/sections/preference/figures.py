@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from study.analysis.preference.analyse import Comparison
+from study.analysis.preference.default_test import OVER_BOTH
 from study.report.drawing import (
     BLUE,
     INK,
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 
 
 def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
-    """Percent favouring the first method: every motion with Wilson's interval, and all together over participants."""
-    motions, people, pooled = comparison.motions, comparison.participants, comparison.published
+    """Percent favouring the first method: every motion with Wilson's interval, and all together by the default test."""
+    motions, found, pooled = comparison.motions, comparison.default, comparison.published
     labels = [readable(row.motion) for row in motions]
     with style():
         figure, axes = new_figure(7.2, 0.34 * (len(motions) + 3) + 0.9)
@@ -43,13 +44,15 @@ def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
             axes.plot(ends, [foot, foot], color=INK, linewidth=2.4)
             axes.plot([pooled.percent], [foot], "o", color=INK, markersize=6)
         _at_the_right(axes, foot, f"{pooled.favouring} / {pooled.answers}")
-        if people.low is not None:
-            axes.plot([people.low, people.high], [foot - 1, foot - 1], color=BLUE, linewidth=2.4)
-        axes.plot([people.mean_percent], [foot - 1], "s", color=BLUE, markersize=6)
-        _at_the_right(axes, foot - 1, f"{people.mean_percent:.1f}%", BLUE)
+        if found.low is not None:
+            axes.plot([found.low, found.high], [foot - 1, foot - 1], color=BLUE, linewidth=2.4)
+        if found.percent is not None:
+            axes.plot([found.percent], [foot - 1], "s", color=BLUE, markersize=6)
+            _at_the_right(axes, foot - 1, f"{found.percent:.1f}%", BLUE)
         axes.axhline(-len(motions) + 0.35, color=RULE, linewidth=0.9)
         places = [*(-row for row in range(len(motions))), foot, foot - 1]
-        axes.set_yticks(places, [*labels, "all answers", "all, over participants"])
+        over = "all, over participants" + (" and motions" if found.test == OVER_BOTH else "")
+        axes.set_yticks(places, [*labels, "all answers", over])
         axes.tick_params(axis="y", labelcolor=INK)
         axes.spines["left"].set_visible(False)
         quiet_grid(axes, "x")

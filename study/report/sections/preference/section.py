@@ -14,15 +14,18 @@ from study.analysis.confirmatory import ConfirmatoryTest
 from study.analysis.estimates import Interval
 from study.analysis.preference.analyse import Comparison, Preference
 from study.analysis.preference.bradley_terry import BradleyTerry
+from study.analysis.preference.default_test import OVER_BOTH
 from study.analysis.preference.no_effect import NoEffect
 from study.counting import counted
 from study.report import tables, words
 from study.report.references import (
     BRADLEY_1952,
+    CLARK_1973,
     HOLM_1979,
     LIANG_1986,
     MANCL_2001,
     ROUDER_2009,
+    SATTERTHWAITE_1946,
     SCHUIRMANN_1987,
     WILSON_1927,
 )
@@ -63,8 +66,8 @@ def preference_section(result: Preference, about: About) -> Section | None:
 def _drawing(name: str, comparison: Comparison, mark: str) -> Drawing:
     caption = (
         "Answers that favoured the first method, for every motion pair with Wilson’s 95% interval; below, all answers "
-        "as if independent (Wilson), and the mean over participants (Student’s t). At the right, how many favoured it "
-        "of how many answers."
+        f"as if independent (Wilson), and the default test ({comparison.default.test}). At the right, how many "
+        "favoured it of how many answers."
     )
     return Drawing(name, preference_figure(comparison, f"study-{name}", mark), caption)
 
@@ -79,12 +82,13 @@ def methods_of(comparison: Comparison | ConfirmatoryTest) -> tuple[str, str]:
 
 def headline(comparison: Comparison) -> Headline:
     """Return a preference as a statement and what it rests on."""
-    published, people = comparison.published, comparison.participants
+    published, people, found = comparison.published, comparison.participants, comparison.default
     parts = []
-    if people.low is not None:
+    if found.low is not None:
         parts.append(
-            f"Mean over {counted(people.participants, 'participant')} {people.mean_percent:.1f}%, 95% "
-            f"interval {words.interval(people.low, people.high, unit='%')}."
+            f"{found.percent:.1f}%, 95% interval over {found.generalises_to} "
+            f"{words.interval(found.low, found.high, unit='%')}; {counted(people.participants, 'participant')}, "
+            f"{counted(len(comparison.motions), 'motion')}."
         )
     elif people.note:
         parts.append(f"{words.sentence(people.note)}.")
@@ -175,11 +179,11 @@ def preference_table(name: str, comparison: Comparison) -> Table:
         f"{name}_preference",
         f"Percent favouring {first} over {second}. As published: all answers as independent (Wilson’s interval), "
         "which a participant’s "
-        "answers are not. Corrected: each participant’s percentage, by Student’s t (the default test) and by ranks; "
-        "and the "
+        "answers are not. Corrected: each participant’s percentage, by Student’s t and by ranks; and the "
         "pooled percentage with its variance over participants. Orders balanced: the mean of the percentages with the "
         "first method shown first and second. A typical participant and the population: models with a term for the "
-        "order, which differ where participants do. Other motions: tests that take the motions for a sample too.",
+        "order, which differ where participants do. Other motions: tests that take the motions for a sample too. The "
+        f"default test is {comparison.default.test}.",
         "reading percent low:one high:one test statistic p_value",
         [
             *_published_rows(comparison),
@@ -239,7 +243,8 @@ def _sample_rows(comparison: Comparison) -> list[dict[str, Any]]:
         rows.append(vars(both) | {"reading": "other participants and motions"})
     tested = ((row, row["t"]) for row in rows)
     return [
-        row | {"test": "none" if t is None else f"t({row['degrees_of_freedom']})", "statistic": t} for row, t in tested
+        row | {"test": "none" if t is None else f"t({row['degrees_of_freedom']:.3g})", "statistic": t}
+        for row, t in tested
     ]
 
 
@@ -341,20 +346,27 @@ def confirmatory_table(tests: Sequence[ConfirmatoryTest]) -> Table | None:
 
 def _main_results(result: Preference, study: str) -> Iterator[MainResult]:
     for compared in result.comparisons:
-        people = compared.participants
+        found = compared.default
         what = f"{words.readable(study)}: {' over '.join(methods_of(compared))} [%]"
-        yield MainResult(what, people.mean_percent, people.low, people.high, people.p_value)
+        yield MainResult(what, found.percent, found.low, found.high, found.p_value)
 
 
 def _methods(found: Collection[Preference], analysis: Analysis) -> str:
-    del found
     count = len(analysis.confirmatory)
-    family = f" and adjusted by Holm’s method over {count} comparisons" if count > 1 else ""
+    family = f" P-values were adjusted by Holm’s method over {count} comparisons." if count > 1 else ""
+    tests = {compared.default.test for result in found for compared in result.comparisons}
+    test = "Student’s t of each participant’s percentage against 50%, which holds for the motions shown"
+    if OVER_BOTH in tests:
+        test = (
+            "Student’s t of the percentage against 50%, with participants and motions as samples (Clark 1973) and "
+            "Satterthwaite’s degrees of freedom (1946), made smaller for few motions"
+        )
+        if len(tests) > 1:
+            test += "; where fewer than three motions were shown, by Student’s t over participants"
     return (
-        "Preferences were tested by Student’s t of each participant’s percentage against 50%"
-        f"{family}; chi-square and exact binomial tests of all responses are given as published, with Wilson’s "
-        "intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite quadrature) and generalised "
-        "estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) account for the order of "
+        f"Preferences were tested by {test}.{family} Chi-square and exact binomial tests of all responses are given as "
+        "published, with Wilson’s intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite "
+        "quadrature) and generalised estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) account for the order of "
         "presentation. Evidence for no preference is an equivalence test (Schuirmann 1987) and a Bayes factor "
         "(Rouder et al. 2009)."
     )
@@ -362,6 +374,7 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
 
 def _references(found: Collection[Preference]) -> set[str]:
     several = {BRADLEY_1952} if any(result.strengths for result in found) else set()
+    several |= {CLARK_1973, SATTERTHWAITE_1946}
     return {WILSON_1927, HOLM_1979, LIANG_1986, MANCL_2001, SCHUIRMANN_1987, ROUDER_2009} | several
 
 
