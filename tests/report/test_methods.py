@@ -80,7 +80,7 @@ def test_own_methods_are_described_by_their_parts_and_settings(results_folder: M
     words = "“eased in” (blends of 7 frames; sigmoid weight, sliding of planted feet left in)"
     assert f"blends as long as the geodesic distance gives (2004) and {words}" in told["Participants and design"]
     assert "under a linear or sigmoid weight" in told["Stimuli"]
-    assert "removed after blending, if the method includes this." in told["Stimuli"]
+    assert "so that feet that bear weight stand, if the method includes this." in told["Stimuli"]
     assert any(work.startswith("Shoemake") for work in cited)
 
 

@@ -60,14 +60,14 @@ def quasi_f(rng: np.random.Generator, people: int, studies: int, alpha: float) -
 
 
 def test_without_correlation_power_is_that_of_the_textbook(preference: Design) -> None:
-    """Independent answers at 65%: by a quasi-F of our own, and below the exact binomial test, which knows of no motions."""
+    """Independent answers at 65%: by a quasi-F of our own; the exact test, which knows no motions, finds more."""
     for people in (12, 35):
         found = share_found(preferences.preference_study(preference, 0.001, 0.65), people)
         assert found == pytest.approx(quasi_f(np.random.default_rng(7), people, 4000, 0.001), abs=0.03)
     counts = np.arange(281)
     critical = next(k for k in counts if 2 * binom.sf(k - 1, 280, 0.5) < 0.001)
     exact = binom.sf(critical - 1, 280, 0.65)
-    assert exact - 0.25 < found < exact
+    assert 0.4 < found < exact - 0.2, "eight motions are a small sample, which costs much at this level"
 
 
 def test_two_motions_are_no_sample_and_power_is_that_of_closed_forms(preference: Design) -> None:

@@ -366,9 +366,9 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
     return (
         f"Preferences were tested by {test}.{family} Chi-square and exact binomial tests of all responses are given as "
         "published, with Wilson’s intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite "
-        "quadrature) and generalised estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) account for the order of "
-        "presentation. Evidence for no preference is an equivalence test (Schuirmann 1987) and a Bayes factor "
-        "(Rouder et al. 2009)."
+        "quadrature) and generalised estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) "
+        "account for the order of presentation. Evidence for no preference is an equivalence test (Schuirmann 1987) "
+        "and a Bayes factor (Rouder et al. 2009)."
     )
 
 
