@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from study.analysis.estimates import Interval
 
+NO_TEST = "a threshold is estimated, and no hypothesis tested"
 PEOPLE_ALONE = "participants, for these motions"
 
 
@@ -30,6 +31,8 @@ class Headline:
         done.
     generalises_to
         What the interval holds for beyond the data.
+    note
+        Why something can't be given.
     """
 
     study: str
@@ -41,3 +44,4 @@ class Headline:
     p_adjusted: float | None
     test: str
     generalises_to: str
+    note: str = ""

@@ -85,6 +85,7 @@ class Preference:
                 p_adjusted=compared.default.p_value,
                 test=compared.default.test,
                 generalises_to=compared.default.generalises_to,
+                note=compared.default.note or compared.published.note,
             )
             for compared in self.comparisons
         ]

@@ -29,8 +29,8 @@ OVER_BOTH = "Student's t over participants and motions"
 class DefaultTest:
     """The share of the first method with the interval and the test that hold for what `generalises_to` names.
 
-    `percent` is of all answers where motions are a sample, else the mean over participants; the rest is None where it
-    can't be given.
+    `percent` is of all answers if motions are a sample, otherwise the mean over participants; what can't be given is
+    None, and `note` says why.
     """
 
     percent: float | None
@@ -39,15 +39,16 @@ class DefaultTest:
     p_value: float | None
     test: str
     generalises_to: str
+    note: str
 
 
 def default_test(people: ParticipantTests, motions: MotionsAsSample) -> DefaultTest:
     """Choose between the tests that were made."""
     by_motion, both = motions.by_motion, motions.both
     if both is not None and by_motion is not None and by_motion.motions >= FEWEST_MOTIONS:
-        return DefaultTest(both.percent, both.low, both.high, both.p_value, OVER_BOTH, "participants and motions")
+        return DefaultTest(both.percent, both.low, both.high, both.p_value, OVER_BOTH, "participants and motions", "")
     holds = "participants, for these motions" if people.participants > 1 else "these participants and motions"
-    return DefaultTest(people.mean_percent, people.low, people.high, people.p_value, people.test, holds)
+    return DefaultTest(people.mean_percent, people.low, people.high, people.p_value, people.test, holds, people.note)
 
 
 def p_values_of_studies(chosen: ArrayLike, shown: ArrayLike) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from study.analysis import estimates
 from study.analysis.estimates import Interval, NotFitted
-from study.analysis.headline import PEOPLE_ALONE, Headline
+from study.analysis.headline import NO_TEST, PEOPLE_ALONE, Headline
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
 from study.analysis.psychometric.mixed import TypicalThreshold, psychometric_mixed
 from study.analysis.psychometric.model import Model, make_model
@@ -128,6 +128,7 @@ class PsychometricStudy:
                 p_adjusted=None,
                 test=found.note,
                 generalises_to=PEOPLE_ALONE if several else "further answers of this participant",
+                note=NO_TEST,
             )
         ]
 

@@ -52,6 +52,7 @@ class Ratings:
                 p_adjusted=row.p_value if row.holm_p_value is None else row.holm_p_value,
                 test=row.test,
                 generalises_to=PEOPLE_ALONE,
+                note=row.note,
             )
             for question in self.questions
             for row in question.differences
@@ -84,6 +85,7 @@ class PairRatings:
                 p_adjusted=question.participants.p_value,
                 test="Student's t over participants",
                 generalises_to=PEOPLE_ALONE,
+                note=question.participants.note,
             )
             for question, sentence in zip(self.questions, pair_sentences(self.questions, alpha), strict=True)
         ]

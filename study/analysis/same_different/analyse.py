@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.headline import PEOPLE_ALONE, Headline
+from study.analysis.headline import NO_TEST, PEOPLE_ALONE, Headline
 from study.analysis.same_different.counts import (
     Counts,
     PercentDifferent,
@@ -125,6 +125,7 @@ class SameDifferent(Thresholds):
                 p_adjusted=None,
                 test=threshold.method,
                 generalises_to=PEOPLE_ALONE,
+                note="; ".join(filter(None, (threshold.note, NO_TEST))),
             )
             for side, threshold in found.items()
         ]

@@ -178,8 +178,9 @@ def test_check_tells_the_time_and_what_is_to_be_written(capsys: pytest.CaptureFi
     found = ask(capsys, "check", "geodesic_vs_fixed", "--texts")
     assert found["problems"] == []
     assert 3 <= found["minutes"] <= found["minutes_at_most"] <= 15  # type: ignore[operator]
-    alike, note = found["notes"]  # type: ignore[misc]
+    alike, flawed, note = found["notes"]  # type: ignore[misc]
     assert "geodesic and fixed differ by less than the just noticeable difference" in alike
+    assert "stimuli move as their motions don't" in flawed
     assert "consent.contact" in note
     read = {one["where"]: one["text"] for one in found["texts"]}  # type: ignore[attr-defined]
     assert f"about {found['minutes']} minutes" in read["consent.text"].replace("\n", " ")
