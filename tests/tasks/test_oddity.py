@@ -163,7 +163,7 @@ def test_a_simulated_study_finds_the_known_thresholds(protocol: Protocol, tmp_pa
     known = truth(protocol, default_observer())["studies"]["odd"]
     assert known["level"] == pytest.approx(2 / 3, abs=1e-6)
     for side, threshold in found.thresholds.items():
-        assert threshold.frames == pytest.approx(abs(known[f"threshold_{side}_frames"]), rel=0.12)
+        assert threshold.value == pytest.approx(abs(known[f"threshold_{side}_frames"]), rel=0.12)
     observer = default_observer().same_different
     level = next(one for one in found.levels if one.difference_frames == 10)
     people = np.exp(observer.log_sensitivity_sd * np.random.default_rng(1).standard_normal(4000))

@@ -78,5 +78,6 @@ def _spoken(people: Sequence[str], found: Staircases) -> str:
     for participant in people:
         runs = [run for run in found.runs if run.participant == participant]
         trials, turns = sum(run.trials for run in runs), sum(run.reversals for run in runs)
-        parts.append(f"{participant}: {counted(len(runs), 'staircase')}, {trials} trials, {turns} reversals")
+        told = counted(len(runs), "staircase"), counted(trials, "trial"), counted(turns, "reversal")
+        parts.append(f"{participant}: {', '.join(told)}")
     return "; ".join(parts)
