@@ -86,7 +86,7 @@ def headline(comparison: Comparison) -> Headline:
     parts = []
     if found.low is not None:
         parts.append(
-            f"{found.percent:.1f}%, 95% interval over {found.generalises_to} "
+            f"{found.percent:.1f}%; 95% interval over {found.generalises_to}: "
             f"{words.interval(found.low, found.high, unit='%')}; {counted(people.participants, 'participant')}, "
             f"{counted(len(comparison.motions), 'motion')}."
         )
@@ -101,7 +101,8 @@ def headline(comparison: Comparison) -> Headline:
 
 
 def _reading(comparison: Comparison) -> Reading:
-    published, people = comparison.published, comparison.participants
+    published, people, both = comparison.published, comparison.participants, comparison.motions_as_sample.both
+    found = comparison.default
     first, second = methods_of(comparison)
     pooled, corrected = "no answers", "no answers"
     if published.percent is not None and published.chi_square is not None and published.p_value is not None:
@@ -110,12 +111,13 @@ def _reading(comparison: Comparison) -> Reading:
             f"{published.percent:.1f}% [{words.bare_interval(low, high)}]; chi-square(1, N = {published.answers}) = "
             f"{published.chi_square:.2f}, {words.p(published.p_value)}"
         )
-    if people.mean_percent is not None:
-        corrected = f"{people.mean_percent:.1f}% [{words.bare_interval(people.low, people.high)}]"
-        if people.t is not None:
-            corrected += f"; t({people.degrees_of_freedom}) = {words.decimals(people.t, 2)}"
-        if people.p_value is not None:
-            corrected += f"{', ' if people.t is not None else '; sign test '}{words.p(people.p_value)}"
+    if found.percent is not None:
+        corrected = f"{found.percent:.1f}% [{words.bare_interval(found.low, found.high)}]"
+        test = both if both is not None and found.test == OVER_BOTH else people
+        if test.t is not None:
+            corrected += f"; t({test.degrees_of_freedom:.3g}) = {words.decimals(test.t, 2)}"
+        if found.p_value is not None:
+            corrected += f"{', ' if test.t is not None else '; sign test '}{words.p(found.p_value)}"
     return Reading(f"{first} over {second}", pooled, corrected)
 
 
