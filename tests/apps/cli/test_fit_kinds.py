@@ -367,3 +367,10 @@ def test_a_method_that_never_loses_leaves_the_others_estimated(fitted: Fitted, o
     assert strengths["C"]["standard_error"] > 0
     assert "A: the answers for or against it all go one way" in found["answer"]
     assert "Strengths in logits beside B: C " in found["answer"]
+
+
+def test_the_only_answer_of_an_object_needs_no_name(fitted: Fitted) -> None:
+    named = fitted(json.dumps(trials()), "--task", "rating", "--answer", "response.Q0", "--method", "level")
+    unnamed = fitted(json.dumps(trials()), "--task", "rating", "--answer", "response", "--method", "level")
+    assert unnamed["used"] == 60
+    assert unnamed["ratings"] == named["ratings"]
