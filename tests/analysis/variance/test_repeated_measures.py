@@ -96,3 +96,15 @@ def test_likeness_is_recovered_and_is_that_of_the_error_strata() -> None:
     assert found.within_effect == pytest.approx(within / pooled)
     assert likeness(np.ones((4, 2)), [0, 0, 1, 1]).intraclass_correlation is None
     assert likeness(np.ones((4, 1)), [0, 0, 1, 1]).intraclass_correlation is None
+
+
+def test_two_values_a_participant_have_the_correlation_of_the_textbook() -> None:
+    """Consistency by mean squares, (B - W) / (B + W), of two columns; with one column there is nothing to compare."""
+    values = np.array([[1.0, 2.0], [2.0, 4.0], [4.0, 5.0], [6.0, 6.0], [3.0, 5.0]])
+    people = values.mean(axis=1) - values.mean()
+    rest = values - values.mean(axis=0) - people[:, None]
+    between, within = 2 * (people**2).sum() / 4, (rest**2).sum() / 4
+    found = likeness(values, ["all"] * 5)
+    assert found.intraclass_correlation == pytest.approx((between - within) / (between + within))
+    assert found.between_effect == pytest.approx(1 + found.intraclass_correlation)
+    assert likeness(values[:, :1], ["all"] * 5).intraclass_correlation is None
