@@ -266,20 +266,27 @@ def test_the_manifest_keeps_the_audit_and_older_ones_open(paper: StimulusSet, tm
     assert read_manifest(tmp_path).audits == ()
 
 
-def test_check_reports_the_audit_and_warns(paper: StimulusSet, panned: StimulusSet) -> None:
+def test_check_reports_the_audit_and_warns(paper: StimulusSet) -> None:
     outlook = look_ahead(paper.protocol, LIBRARY)
     assert outlook.audits == paper.audits
     (note,) = (one for one in outlook.notes if "threshold of 75%" in one)
     assert "size in the last frame" in note
     assert 'match = "duration"' in note
-    # A foot that bears weight carries the root, so where a turn ends depends on the length of the blend.
-    assert all(
-        one.furthest < 0.72
-        for one in shortcuts_of(panned.protocol, panned.pairs, panned.audits)
-        if one.cue != "duration"
-    )
     matched = look_ahead(load_protocol(find_protocol("blend_length_jnd_matched")), LIBRARY)
     assert not [one for one in matched.notes if "threshold" in one]
+
+
+def test_the_published_study_takes_the_view_that_gives_least_away(panned: StimulusSet) -> None:
+    """Of the same films seen by the same kind of camera, no named view leaves the shortcut observers less."""
+
+    def most(made: StimulusSet) -> float:
+        shares = shortcuts_of(made.protocol, made.pairs, made.audits)
+        return max(one.furthest for one in shares if one.cue != "duration")
+
+    text = find_protocol("blend_length_jnd").read_text(encoding="utf-8")
+    for view in ("front", "side", "three-quarter", "clearest"):
+        named = parse_protocol(text.replace('view = "least-cue"', f'view = "{view}"'))
+        assert most(panned) <= most(prepare(named, LIBRARY)) + 1e-9, view
 
 
 def test_single_stimuli_have_no_audit(rating_protocol: Protocol, toy_library: Any) -> None:
