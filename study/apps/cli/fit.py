@@ -17,9 +17,11 @@ if TYPE_CHECKING:
 
     from study.analysis.foreign.answers import ForeignAnswers
     from study.analysis.foreign.trials import Trials
+    from study.analysis.psychometric.analyse import PsychometricStudy
+    from study.analysis.same_different.analyse import SameDifferent
 
-Read = tuple["Trials | ForeignAnswers", Callable[[], object]]
-"""What was read, and its analysis: what JSON can be made of, with `answer` in words."""
+Read = tuple["Trials | ForeignAnswers", Callable[[], dict[str, Any]]]
+"""What was read, and its analysis: as JSON holds it, with `answer` in words and `headline`."""
 
 # The options of each task, in addition to the common ones; others are refused.
 OWN = {
@@ -86,7 +88,10 @@ def _function(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     model = make_model(
         options["task"], sigmoid=options["sigmoid"] or "normal", choices=options["choices"] or 2, **settings
     )
-    return trials, lambda: analyse_psychometric(trials.table, model, confidence=options["confidence"], simulations=500)
+    confidence = options["confidence"]
+    return trials, lambda: _told(
+        analyse_psychometric(trials.table, model, confidence=confidence, simulations=500), options
+    )
 
 
 def _same_different(table: pd.DataFrame, options: dict[str, Any]) -> Read:
@@ -95,7 +100,17 @@ def _same_different(table: pd.DataFrame, options: dict[str, Any]) -> Read:
 
     trials = _trials(table, options)
     level, confidence = options["threshold"] or 0.75, options["confidence"]
-    return trials, lambda: analyse_jnd(_pairs_answered(trials.table, options), level=level, confidence=confidence)
+    return trials, lambda: _told(
+        analyse_jnd(_pairs_answered(trials.table, options), level=level, confidence=confidence), options
+    )
+
+
+def _told(result: PsychometricStudy | SameDifferent, options: dict[str, Any]) -> dict[str, Any]:
+    """A result as JSON, with its headlines."""
+    from study.analysis.to_json import to_json
+
+    headlines = result.headlines(options["study"], options["alpha"] or 0.05, options["confidence"])
+    return {**to_json(result), "headline": to_json(headlines)}
 
 
 def _pairs_answered(table: pd.DataFrame, options: dict[str, Any]) -> pd.DataFrame:
@@ -196,18 +211,15 @@ def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
 
     Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
     """
-    from study.analysis.to_json import to_json
-
     _refuse_others(task, options)
     needed = tuple(options[name] for name in COLUMNS if options[name]) + tuple(name for name, _ in _where(options))
     try:
-        read, analysed = FITS[task](read_table(data, needed, options["delimiter"]), options | {"task": task})
+        read, analysed = FITS[task](
+            read_table(data, needed, options["delimiter"]), options | {"task": task, "study": data.stem}
+        )
     except AnalysisError as error:
         raise AnalysisError(f"{data}: {error}") from error
-    result = analysed()
-    found = to_json(result)
-    if hasattr(result, "headlines"):  # what goes through `analyse` has them already
-        found["headline"] = to_json(result.headlines(data.stem, options["alpha"] or 0.05, options["confidence"]))
+    found = analysed()
     counts = {"rows": read.rows, "used": read.used, "blank": read.blank, "missed": read.missed}
     people = read.table["participant"].nunique()
     text = (
