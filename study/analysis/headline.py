@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from study.analysis.estimates import Interval
 
 NO_TEST = "a threshold is estimated, and no hypothesis tested"
-PEOPLE_ALONE = "participants, for these motions"
 
 
 @dataclass(frozen=True)
@@ -45,3 +44,8 @@ class Headline:
     test: str
     generalises_to: str
     note: str = ""
+
+
+def holds_for(participants: int) -> str:
+    """What an interval over so many participants holds for."""
+    return "participants, for these motions" if participants > 1 else "further responses of this participant"

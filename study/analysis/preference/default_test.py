@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study.analysis.headline import holds_for
 from study.analysis.preference.crossed import crossed
 from study.analysis.preference.participants import default_p_values
 
@@ -47,8 +48,10 @@ def default_test(people: ParticipantTests, motions: MotionsAsSample) -> DefaultT
     by_motion, both = motions.by_motion, motions.both
     if both is not None and by_motion is not None and by_motion.motions >= FEWEST_MOTIONS:
         return DefaultTest(both.percent, both.low, both.high, both.p_value, OVER_BOTH, "participants and motions", "")
-    holds = "participants, for these motions" if people.participants > 1 else "these participants and motions"
-    return DefaultTest(people.mean_percent, people.low, people.high, people.p_value, people.test, holds, people.note)
+    return DefaultTest(
+        people.mean_percent, people.low, people.high, people.p_value, people.test, holds_for(people.participants),
+        people.note,
+    )  # fmt: skip
 
 
 def p_values_of_studies(chosen: ArrayLike, shown: ArrayLike) -> NDArray[np.float64]:

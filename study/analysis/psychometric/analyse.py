@@ -13,7 +13,7 @@ import numpy as np
 
 from study.analysis import estimates
 from study.analysis.estimates import Interval, NotFitted
-from study.analysis.headline import NO_TEST, PEOPLE_ALONE, Headline
+from study.analysis.headline import NO_TEST, Headline, holds_for
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
 from study.analysis.psychometric.mixed import TypicalThreshold, psychometric_mixed
 from study.analysis.psychometric.model import Model, make_model
@@ -116,7 +116,6 @@ class PsychometricStudy:
         """Return the threshold to be believed."""
         del alpha
         found = self.believed
-        several = len(self.participants) > 1
         return [
             Headline(
                 study=study,
@@ -127,7 +126,7 @@ class PsychometricStudy:
                 p=None,
                 p_adjusted=None,
                 test=found.note,
-                generalises_to=PEOPLE_ALONE if several else "further answers of this participant",
+                generalises_to=holds_for(len(self.participants)),
                 note=NO_TEST,
             )
         ]

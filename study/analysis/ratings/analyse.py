@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from study.analysis.estimates import Interval
-from study.analysis.headline import PEOPLE_ALONE, Headline
+from study.analysis.headline import Headline, holds_for
 from study.analysis.ratings.answers import of_pairs
 from study.analysis.ratings.comparisons import MethodDifference, Question, rating_anova
 from study.analysis.ratings.pairs import PairQuestion, pair_ratings, pair_sentences
@@ -51,7 +51,7 @@ class Ratings:
                 p=row.p_value,
                 p_adjusted=row.p_value if row.holm_p_value is None else row.holm_p_value,
                 test=row.test,
-                generalises_to=PEOPLE_ALONE,
+                generalises_to=holds_for(row.participants),
                 note=row.note,
             )
             for question in self.questions
@@ -84,7 +84,7 @@ class PairRatings:
                 p=question.participants.p_value,
                 p_adjusted=question.participants.p_value,
                 test="Student's t over participants",
-                generalises_to=PEOPLE_ALONE,
+                generalises_to=holds_for(question.participants.participants),
                 note=question.participants.note,
             )
             for question, sentence in zip(self.questions, pair_sentences(self.questions, alpha), strict=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.headline import NO_TEST, PEOPLE_ALONE, Headline
+from study.analysis.headline import NO_TEST, Headline, holds_for
 from study.analysis.same_different.counts import (
     Counts,
     PercentDifferent,
@@ -113,7 +113,7 @@ class SameDifferent(Thresholds):
         del alpha, confidence
         found, whose = (self.mixed.typical, "median observer") if self.mixed else ({}, "")
         if not found and self.model is not None:
-            found, whose = self.model.jnd, "group"
+            found, whose = self.model.jnd, "group" if self.participants > 1 else "participant"
         return [
             Headline(
                 study=study,
@@ -124,7 +124,7 @@ class SameDifferent(Thresholds):
                 p=None,
                 p_adjusted=None,
                 test=threshold.method,
-                generalises_to=PEOPLE_ALONE,
+                generalises_to=holds_for(self.participants),
                 note="; ".join(filter(None, (threshold.note, NO_TEST))),
             )
             for side, threshold in found.items()
