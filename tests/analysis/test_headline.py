@@ -47,7 +47,11 @@ def test_preferences_have_the_share_over_participants_and_motions_adjusted_over_
 
 def test_a_preference_over_two_motions_holds_for_these_alone(preference_study: Make) -> None:
     answers = preference_study(np.random.default_rng(4), share=0.7)
-    (one,) = told(answers[answers["motion"].isin(["motion 0", "motion 1"])])
+    two = answers[answers["motion"].isin(["motion 0", "motion 1"])]
+    (compared,) = analyse(two, Settings(resamples=20)).of(Preference)["geodesic"].comparisons
+    assert compared.motions_as_sample.both is None
+    assert "fewer than three motions" in compared.motions_as_sample.note
+    (one,) = told(two)
     assert one["generalises_to"] == "participants, for these motions"
     assert "for these motions" in one["statement"]
     assert one["test"] == "Student's t over participants"

@@ -14,14 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from study.analysis.headline import holds_for
 from study.analysis.preference.crossed import crossed
+from study.analysis.preference.motions import FEWEST_MOTIONS
 from study.analysis.preference.participants import default_p_values
 
 if TYPE_CHECKING:
     from study.analysis.preference.motions import MotionsAsSample
     from study.analysis.preference.participants import ParticipantTests
-
-FEWEST_MOTIONS = 3
-"""Two can't say how far motions differ."""
 
 OVER_BOTH = "Student's t over participants and motions"
 
@@ -45,8 +43,7 @@ class DefaultTest:
 
 def default_test(people: ParticipantTests, motions: MotionsAsSample) -> DefaultTest:
     """Choose between the tests that were made."""
-    by_motion, both = motions.by_motion, motions.both
-    if both is not None and by_motion is not None and by_motion.motions >= FEWEST_MOTIONS:
+    if (both := motions.both) is not None:
         return DefaultTest(both.percent, both.low, both.high, both.p_value, OVER_BOTH, "participants and motions", "")
     return DefaultTest(
         people.mean_percent, people.low, people.high, people.p_value, people.test, holds_for(people.participants),

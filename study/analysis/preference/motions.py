@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+FEWEST_MOTIONS = 3
+"""Two can't say how far motions differ."""
+
+
 @dataclass(frozen=True)
 class ByMotion:
     """One share a motion against one half, by Student's t; it takes the participants as they are."""
@@ -70,7 +74,10 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> MotionsAs
         degrees_of_freedom=test.degrees_of_freedom,
         p_value=test.p_value,
     )
-    both, note = _both_vary(part, confidence)
+    if by_motion.motions < FEWEST_MOTIONS:
+        both, note = None, "fewer than three motions: how far motions differ is not known"
+    else:
+        both, note = _both_vary(part, confidence)
     return MotionsAsSample(by_motion, both, note or test.note.replace("participants", "motions"))
 
 
