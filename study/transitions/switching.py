@@ -299,7 +299,8 @@ def _seam(
             f"{counted(blend_frames, 'frame')} after it, but {lacking}. Choose other frames or a shorter blend."
         )
     destination, fps = retarget(destination, source.skeleton), source.fps
-    here, there = _Moment.at(source, start_frame - 1), _Moment.at(destination, first - 1)
+    before = min(start_frame - 1, first - 1, 1)
+    here, there = _Moment.at(source, start_frame - 1, before), _Moment.at(destination, first - 1, before)
     played = picked(destination, np.arange(first - 1, min(first + blend_frames + 1, destination.frames)))
     facings = facing(played)
     turns, strides = steps_of(played, facings)
@@ -350,7 +351,7 @@ def _nearest(vectors: FloatArray, to: FloatArray) -> FloatArray:
 class _Moment:
     """A clip about one frame: poses `(3, joints, 4)` and heights `(3,)` there, one frame before and one after.
 
-    The first is the frame itself where there is none before, and `span_s` from first to last accordingly shorter.
+    At the beginning of a clip the first is the frame itself, and `span_s` from first to last accordingly shorter.
     `step (3,)` is the turn and the step over the floor to the next frame, on average over the steps on either side.
     """
 
@@ -360,18 +361,17 @@ class _Moment:
     step: FloatArray
 
     @staticmethod
-    def at(clip: Clip, frame: int) -> _Moment:
-        """About `frame`, of a clip of at least two frames."""
-        frames = np.clip([frame - 1, frame, frame + 1], 0, clip.frames - 1)
-        part = picked(clip, np.unique(frames))
+    def at(clip: Clip, frame: int, before: int) -> _Moment:
+        """About `frame`, with `before` frames (0 or 1) before it; two clips compared have as many of both."""
+        part = picked(clip, np.arange(frame - before, frame + 2))
         own = facing(part)
         turns, strides = steps_of(part, own)
-        where = np.searchsorted(np.unique(frames), frames)
+        where = np.array([0, before, before + 1])
         step = np.column_stack([turns, strides[:, [0, 2]]]).mean(axis=0)
         return _Moment(
             quat.continuous(_leaning(part, own))[where],
             part.root_positions[where, 1],
-            max(int(frames[2] - frames[0]), 1) / clip.fps,
+            (before + 1) / clip.fps,
             step,
         )
 

@@ -197,3 +197,14 @@ def test_what_the_clips_lack_is_said(
     walk = make_walk(150)
     with pytest.raises(TransitionError, match=found):
         inertialized(walk, walk, start, end, 2 * count, quintic(0.5), placed_frames=count)
+
+
+def test_a_switch_at_the_beginning_of_a_clip_takes_both_velocities_over_the_same_frames(
+    make_walk: Callable[..., Clip],
+) -> None:
+    """A clip that goes on as itself from its second frame has no offset and no rate of one."""
+    walk = make_walk(90)
+    later = make_walk(89, phase=2 * np.pi / 30)  # the same walk from its second frame on
+    result = inertialized(walk, later, 2, 10, 10, quintic(11 / 30))
+    assert result.destination_frames == (1, 11)
+    np.testing.assert_allclose(joint_positions(result.clip), joint_positions(walk)[: result.clip.frames], atol=1e-9)

@@ -233,7 +233,6 @@ def transition(
     if out.suffix.lower() == ".bvh":
         write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
     else:
-        blended = joined.blend_start, joined.blend_stop
         draw_clip(joined.clip, out, size=wanted, style=style, view=view, camera=camera, blended=blended)
     rate = joined.clip.fps
     result = {
