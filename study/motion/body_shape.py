@@ -8,11 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.limbs import Pair, Tree
-
-FloatArray = NDArray[np.float64]
 
 # Cosine of the angle from the legs' direction to the trunk's: -1 where one stands; sitting, crawling people have -0.7.
 _UPRIGHT = -0.55

@@ -10,15 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.rigs import find_roles
 from study.motion.same_rig import shared_joints
 from study.motion.skeleton import Skeleton
-
-FloatArray = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
 # Frames looked at to tell which joint plays which role.
@@ -35,30 +33,6 @@ LOWEST_FPS, HIGHEST_FPS = 1 / 3600, 100_000.0
 class Clip:
     """A motion.
 
-    Parameters
-    ----------
-    skeleton
-        Joints and rest offsets.
-    root_positions : (frames, 3)
-        The root joint in the world, metres.
-    rotations : (frames, joints, 4)
-        Each joint's rotation in its parent's frame (the root's in the world), unit quaternions; stored with
-        signs continuous over the frames and `w >= 0` in the first.
-    fps
-        Frames per second; never rounded.
-    name
-        What the clip is called in libraries, plans and reports.
-    history
-        What was done to it, in order, in words; manifests and reports print it.
-    synthetic
-        Whether a program made the motion up, rather than a person moved.
-    start_s
-        Seconds from the first frame of the file to frame 0, for clips that are a part of their file.
-    file_fps
-        Frames per second of the file, where the clip is at another rate.
-    metres_per_unit
-        Metres in a length unit of the file that the clip was read from; it is written in that unit again.
-
     Raises
     ------
     MotionError
@@ -67,15 +41,26 @@ class Clip:
     """
 
     skeleton: Skeleton
+    """Joints and rest offsets."""
     root_positions: FloatArray
+    """`(frames, 3)`: the root joint in the world, metres."""
     rotations: FloatArray
+    """`(frames, joints, 4)`: each joint's rotation in its parent's frame (the root's in the world), unit quaternions;
+    stored with signs continuous over the frames and `w >= 0` in the first."""
     fps: float
+    """Frames per second; never rounded."""
     name: str = ""
+    """What the clip is called in libraries, plans and reports."""
     history: tuple[str, ...] = field(default=())
+    """What was done to it, in order, in words; manifests and reports print it."""
     synthetic: bool = False
+    """Whether a program made the motion up, rather than a person moved."""
     start_s: float = 0.0
+    """Seconds from the first frame of the file to frame 0, for clips that are a part of their file."""
     file_fps: float | None = None
+    """Frames per second of the file, where the clip is at another rate."""
     metres_per_unit: float = 0.01
+    """Metres in a length unit of the file that the clip was read from; it is written in that unit again."""
 
     def __post_init__(self) -> None:
         positions = np.array(self.root_positions, dtype=np.float64)

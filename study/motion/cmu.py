@@ -27,26 +27,18 @@ Boundary = Literal["gait", "still", ""]
 
 @dataclass(frozen=True)
 class Take:
-    """One trial that shows a motion.
-
-    Parameters
-    ----------
-    trial
-        Subject and number, as in `16_35`.
-    first, last
-        Usable frames, both included, from 0 at the trial's own rate; `last` is None for the trial's last.
-    start, end
-        How the take begins and ends: `"gait"`, `"still"`, or `""` where it can't be continued.
-    mirrored
-        Whether it shows the motion to the other side.
-    """
+    """One trial that shows a motion."""
 
     trial: str
+    """Subject and number, as in `16_35`."""
     first: int = 0
     last: int | None = None
+    """Usable frames, both included, from 0 at the trial's own rate; `last` is None for the trial's last."""
     start: Boundary = ""
     end: Boundary = ""
+    """How the take begins and ends: `"gait"`, `"still"`, or `""` where it can't be continued."""
     mirrored: bool = False
+    """Whether it shows the motion to the other side."""
 
     @property
     def files(self) -> tuple[str, str]:

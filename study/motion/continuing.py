@@ -16,15 +16,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved
 from study.motion.feet import heading, stance
 from study.motion.legs import knee_bend, knee_hinge, lowered, reach
 from study.motion.mirror import mirror
-
-FloatArray = NDArray[np.float64]
 
 # Velocities at the seam are slopes over this time, seconds: longer than the noise of markers, shorter than a movement.
 _SLOPE_S = 0.04
@@ -207,7 +205,7 @@ def _with_planted_feet(base: _Period, within: FloatArray) -> Clip:
     return reach(*lowered(frames, shifts))
 
 
-def _contacts(planted: NDArray[np.bool_], shortest: int) -> list[tuple[int, int]]:
+def _contacts(planted: BoolArray, shortest: int) -> list[tuple[int, int]]:
     """Stretches of planted rows, as slices count them; shorter gaps between them are closed, shorter ones dropped."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], planted.astype(np.int8), [0]])))
     contacts: list[tuple[int, int]] = []

@@ -14,15 +14,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import MotionError
 from study.motion.clip import Clip, joint_positions
 from study.motion.continuing import carry_on, linger
 from study.motion.feet import heading
 
-FloatArray = NDArray[np.float64]
 End = Literal["start", "end"]
 
 # Times of one step (half a cycle), seconds: a sprint has 0.22, a very slow walk 0.9.
@@ -55,31 +54,21 @@ _LIMBS = ("knee", "ankle", "toe", "shoulder", "elbow", "wrist")
 
 @dataclass(frozen=True)
 class Cycle:
-    """What a clip can be continued by.
-
-    Parameters
-    ----------
-    kind
-        `"gait"`: a whole cycle, two steps; `"step"`: one step and its mirror image; `"still"`: standing.
-    at
-        `"start"` or `"end"` of the clip.
-    period_frames
-        Frames of what is repeated: a cycle, a step, or the still part. Not whole in general.
-    unlikeness
-        How much a period differs from the one before, as a share of how much the limbs move; 0 is a perfect cycle,
-        above 1 nothing is alike. 0 for `"still"`.
-    turn
-        Radians that the direction changes in a period, as it is carried on; 0 where it goes straight on.
-    curving
-        Whether the captured period turns although it is carried on straight, as after a turn.
-    """
+    """What a clip can be continued by."""
 
     kind: Literal["gait", "step", "still"]
+    """`"gait"`: a whole cycle, two steps; `"step"`: one step and its mirror image; `"still"`: standing."""
     at: End
+    """`"start"` or `"end"` of the clip."""
     period_frames: float
+    """Frames of what is repeated: a cycle, a step, or the still part. Not whole in general."""
     unlikeness: float
+    """How much a period differs from the one before, as a share of how much the limbs move; 0 is a perfect cycle, above
+    1 nothing is alike. 0 for `"still"`."""
     turn: float = 0.0
+    """Radians that the direction changes in a period, as it is carried on; 0 where it goes straight on."""
     curving: bool = False
+    """Whether the captured period turns although it is carried on straight, as after a turn."""
 
     @property
     def cycle_frames(self) -> float:

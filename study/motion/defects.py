@@ -14,15 +14,12 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.clip import Clip, joint_positions, trim
 from study.motion.jumps import JOINT_JUMP, TRUNK_JUMP, Jumps, clusters, flipping_legs
 from study.motion.tempo import wrong_tempo
 from study.motion.upright import lying_axis
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 Kind = Literal[
     "t-pose",
@@ -44,35 +41,25 @@ _ANKLE_M = 0.09
 
 @dataclass(frozen=True)
 class Defect:
-    """Something wrong with a clip.
-
-    Parameters
-    ----------
-    kind
-        `"t-pose"` (an added pose at the start), `"end-jump"` (frames at an end that don't continue into the motion),
-        `"root-jump"`, `"joint-flip"` (a leg turned to its wrong side), `"joint-jump"`, `"below-floor"`, `"floating"`,
-        `"not-upright"` (a body that lies, or a file with another axis up; not mended), `"frame-time"` (the motion is
-        several times too slow or too quick; not mended).
-    frame_start, frame_stop
-        The frames concerned, as a slice counts them; a jump concerns the frames before and after it.
-    joint
-        The joint's name; empty where the whole body is meant.
-    size, unit
-        How large, in `"rad"` or `"m"`; of a frame time, `"times"` too long.
-    message
-        The same in words.
-    severity
-        `"major"` where a viewer or a cost function would notice, else `"minor"` (hands, fingers, the floor's height).
-    """
+    """Something wrong with a clip."""
 
     kind: Kind
+    """`"t-pose"` (an added pose at the start), `"end-jump"` (frames at an end that don't continue into the motion),
+    `"root-jump"`, `"joint-flip"` (a leg turned to its wrong side), `"joint-jump"`, `"below-floor"`, `"floating"`,
+    `"not-upright"` (a body that lies, or a file with another axis up; not mended), `"frame-time"` (the motion is
+    several times too slow or too quick; not mended)."""
     frame_start: int
     frame_stop: int
+    """The frames concerned, as a slice counts them; a jump concerns the frames before and after it."""
     joint: str
+    """The joint's name; empty where the whole body is meant."""
     size: float
     unit: str
+    """How large, in `"rad"` or `"m"`; of a frame time, `"times"` too long."""
     message: str
+    """The same in words."""
     severity: Literal["major", "minor"]
+    """`"major"` where a viewer or a cost function would notice, else `"minor"` (hands, fingers, the floor's height)."""
 
 
 def find_defects(clip: Clip) -> tuple[Defect, ...]:

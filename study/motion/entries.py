@@ -27,55 +27,39 @@ from study.motion.readers.registry import read_clip
 
 @dataclass(frozen=True)
 class Entry:
-    """What a library knows of a motion without reading it.
-
-    Parameters
-    ----------
-    name
-        What protocols call it.
-    kind
-        walking, running, standing, turning, boxing, dancing, tai-chi, a category of the user's own, or `""` where
-        nobody said.
-    words
-        A few words for lists.
-    start, end
-        How it begins and ends: `"gait"`, `"still"`, or `""` where it can't be continued (or nobody looked).
-    file
-        The file it comes from; None for synthetic motions.
-    first_frame, last_frame
-        Usable frames of the file, both included, counted from 0 at the file's rate; `last_frame` None for the last.
-    mirrored
-        Whether the file is mirrored left to right to give the motion.
-    trial
-        The CMU trial, where the frames are those of the index, which count from behind the T-pose that conversions
-        have in front; else `""`.
-    own
-        Whether the name is the file's own, and not a further one.
-    metres_per_unit, fps, joints
-        What `library.toml` says of the file: its unit and frame rate, where known, and joint names by role.
-    cyclic
-        Whether the motion goes in cycles, where `library.toml` says so or not.
-    beats, genre
-        Times of its beats in seconds from the file's first frame, and what kind of dance it is.
-    """
+    """What a library knows of a motion without reading it."""
 
     name: str
+    """What protocols call it."""
     kind: str = ""
+    """walking, running, standing, turning, boxing, dancing, tai-chi, a category of the user's own, or `""` where nobody
+    said."""
     words: str = ""
+    """A few words for lists."""
     start: Boundary = ""
     end: Boundary = ""
+    """How it begins and ends: `"gait"`, `"still"`, or `""` where it can't be continued (or nobody looked)."""
     file: Path | None = None
+    """The file it comes from; None for synthetic motions."""
     first_frame: int = 0
     last_frame: int | None = None
+    """Usable frames of the file, both included, counted from 0 at the file's rate; `last_frame` None for the last."""
     mirrored: bool = False
+    """Whether the file is mirrored left to right to give the motion."""
     trial: str = ""
+    """The CMU trial, where the frames are those of the index, which count from behind the T-pose that conversions have
+    in front; else `""`."""
     own: bool = False
+    """Whether the name is the file's own, and not a further one."""
     metres_per_unit: float | None = None
     fps: float | None = None
     joints: tuple[tuple[str, str], ...] = ()
+    """What `library.toml` says of the file: its unit and frame rate, where known, and joint names by role."""
     cyclic: bool | None = None
+    """Whether the motion goes in cycles, where `library.toml` says so or not."""
     beats: tuple[float, ...] = ()
     genre: str = ""
+    """Times of its beats in seconds from the file's first frame, and what kind of dance it is."""
 
     @property
     def cyclic_start(self) -> bool:

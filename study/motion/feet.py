@@ -9,12 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray
 from study.motion.clip import Clip, joint_positions, moved
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 # A foot that bears weight moves slower than this (m/s) ...
 _STANCE_SPEED = 0.5

@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray, IntArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.skeleton import Skeleton
-
-FloatArray = NDArray[np.float64]
 
 # A flip turns the hip by at least this (radians) between two frames; those of the CMU database by 1.6 to 3.1.
 FLIP_RAD = 1.3
@@ -28,27 +26,20 @@ _SPREAD_S = 0.1
 
 @dataclass(frozen=True, eq=False)
 class LegFlips:
-    """The flips of one leg.
-
-    Parameters
-    ----------
-    side
-        `"L"` or `"R"`.
-    runs
-        Frames `(start, stop)` that are turned, in order.
-    angles : (frames,)
-        By how much the thigh is turned about the line from hip to ankle, radians; 0 where it is left alone.
-    size
-        The largest turn of the hip between two frames, radians.
-    """
+    """The flips of one leg."""
 
     side: str
+    """`"L"` or `"R"`."""
     runs: tuple[tuple[int, int], ...]
+    """Frames `(start, stop)` that are turned, in order."""
     angles: FloatArray
+    """`(frames,)`: by how much the thigh is turned about the line from hip to ankle, radians; 0 where it is left alone.
+    """
     size: float
+    """The largest turn of the hip between two frames, radians."""
 
 
-def leg_flips(clip: Clip, side: str, jumps: NDArray[np.int64]) -> LegFlips:
+def leg_flips(clip: Clip, side: str, jumps: IntArray) -> LegFlips:
     """Which frames of a leg to turn, given the frames `jumps` before which its hip jumps by `FLIP_RAD` or more.
 
     At each jump the leg either changes from right to wrong or back (the frames between are turned), or a gradual
@@ -135,7 +126,7 @@ def _twist(axis: FloatArray, before: FloatArray, after: FloatArray) -> float:
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def _cheapest_reading(clip: Clip, hip: int, axes: FloatArray, jumps: NDArray[np.int64]) -> list[bool]:
+def _cheapest_reading(clip: Clip, hip: int, axes: FloatArray, jumps: IntArray) -> list[bool]:
     """For each segment between jumps whether it is turned; the first is not. Dynamic programming over segments."""
     half_turn = quat.from_axis_angle(axes, np.pi)
     plain = 2.0 * quat.half_angle_between(clip.rotations[:, hip], quat.IDENTITY)
@@ -168,6 +159,6 @@ def _spread(clip: Clip, hip: int, angles: FloatArray, jump: int, turn: float) ->
         angles[jump:stop] += turn * np.arange(stop - jump, 0, -1) / (stop - jump)
 
 
-def _runs(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
+def _runs(mask: BoolArray) -> tuple[tuple[int, int], ...]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return tuple((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))

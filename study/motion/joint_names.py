@@ -94,24 +94,16 @@ _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[^\W\d_A-Za-z]+")
 
 @dataclass(frozen=True)
 class NamedJoint:
-    """What one name says.
-
-    Parameters
-    ----------
-    side
-        `"L"`, `"R"` or `""`.
-    speaks
-        For roles without their side (`"knee"`), how strongly the name speaks: 3 is sure.
-    beside
-        Whether it names something beside the body's own joints: a twist, a finger, a skirt.
-    animal
-        Whether it names a part that only animals have.
-    """
+    """What one name says."""
 
     side: str
+    """`"L"`, `"R"` or `""`."""
     speaks: Mapping[str, float]
+    """For roles without their side (`"knee"`), how strongly the name speaks: 3 is sure."""
     beside: bool
+    """Whether it names something beside the body's own joints: a twist, a finger, a skirt."""
     animal: bool
+    """Whether it names a part that only animals have."""
 
 
 def read_names(names: Sequence[str]) -> tuple[NamedJoint, ...]:

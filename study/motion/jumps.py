@@ -7,14 +7,11 @@ fast over several frames, a fault of capture is not.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.flips import FLIP_RAD, LegFlips, leg_flips
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Faults show in single frames, so an angle or a length decides at capture rates; at low rates one frame of fast motion
 # is larger, so a speed or an acceleration does. Fast people (boxing, ballet, sprinting in the CMU and Bandai data)

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, global_rotations, joint_positions
-
-FloatArray = NDArray[np.float64]
 
 # A leg may reach this share of its length, or as far as it reached before.
 FULL_REACH = 0.995

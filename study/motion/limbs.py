@@ -12,12 +12,9 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray, IntArray
 from study.motion.joint_names import NamedJoint
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LEG, ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 # Natural logarithm of thigh to shank, upper arm to forearm (Winter 2009, Figure 4.1: 0.245 to 0.246, 0.186 to 0.146).
@@ -44,45 +41,30 @@ _WRONG_NAME, _BESIDE = -2.0, -4.0
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """A skeleton as the search for limbs sees it.
-
-    Parameters
-    ----------
-    parents : (joints,)
-        Each joint's parent, -1 for the root.
-    children
-        Each joint's children, in an order that doesn't depend on that of the file.
-    lengths : (joints,)
-        From each joint to its parent, in the file's unit.
-    reach : (joints,)
-        The longest way down from each joint, end sites included.
-    depths : (joints,)
-        Joints above each joint.
-    named
-        What the names say.
-    bodily : (joints,)
-        Whether a joint, or one below it, is more than a finger, a twist or a skirt, by the names.
-    rest : (points, 3)
-        Joints and then end sites with no rotations.
-    poses : (poses, points, 3)
-        The same in some frames; none where there are no frames.
-    ends
-        The end sites of each joint that has some, as points.
-    weighed
-        What was worked out for a chain: see `_weigh_bones`.
-    """
+    """A skeleton as the search for limbs sees it."""
 
     parents: IntArray
+    """`(joints,)`: each joint's parent, -1 for the root."""
     children: tuple[tuple[int, ...], ...]
+    """Each joint's children, in an order that doesn't depend on that of the file."""
     lengths: FloatArray
+    """`(joints,)`: from each joint to its parent, in the file's unit."""
     reach: FloatArray
+    """`(joints,)`: the longest way down from each joint, end sites included."""
     depths: IntArray
+    """`(joints,)`: joints above each joint."""
     named: tuple[NamedJoint, ...]
-    bodily: NDArray[np.bool_]
+    """What the names say."""
+    bodily: BoolArray
+    """`(joints,)`: whether a joint, or one below it, is more than a finger, a twist or a skirt, by the names."""
     rest: FloatArray
+    """`(points, 3)`: joints and then end sites with no rotations."""
     poses: FloatArray
+    """`(poses, points, 3)`: the same in some frames; none where there are no frames."""
     ends: dict[int, list[int]]
+    """The end sites of each joint that has some, as points."""
     weighed: dict[tuple[int, ...], tuple[IntArray, FloatArray, FloatArray, FloatArray]] = field(default_factory=dict)
+    """What was worked out for a chain: see `_weigh_bones`."""
 
     def length(self, joint: int) -> float:
         """From a joint's parent to the farthest tip below the joint."""
@@ -118,36 +100,25 @@ class Tree:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two chains read as legs or arms.
-
-    Parameters
-    ----------
-    parts
-        `LEG` or `ARM`.
-    at
-        The joint that both branch off.
-    chains
-        The joints of each, from the branch outwards.
-    picks
-        For each chain, which of its joints play the three parts; a third part one beyond the last joint is a mere tip.
-    tips
-        The end site of each chain, as a point; the last joint itself where it has none.
-    score
-        How well they do.
-    spoken
-        How strongly names speak for them, a joint; 3 is sure.
-    lengths : (2, 2)
-        Upper and lower part of each limb.
-    """
+    """Two chains read as legs or arms."""
 
     parts: tuple[str, str, str]
+    """`LEG` or `ARM`."""
     at: int
+    """The joint that both branch off."""
     chains: tuple[tuple[int, ...], tuple[int, ...]]
+    """The joints of each, from the branch outwards."""
     picks: tuple[tuple[int, ...], tuple[int, ...]]
+    """For each chain, which of its joints play the three parts; a third part one beyond the last joint is a mere tip.
+    """
     tips: tuple[int, int]
+    """The end site of each chain, as a point; the last joint itself where it has none."""
     score: float
+    """How well they do."""
     spoken: float
+    """How strongly names speak for them, a joint; 3 is sure."""
     lengths: FloatArray
+    """`(2, 2)`: upper and lower part of each limb."""
 
     def joint(self, limb: int, part: int) -> int:
         """The joint of one limb (0 or 1) that plays a part (0 to 2), or the tip in its place."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import MotionError
 from study.motion import quaternions as quat
@@ -16,8 +16,6 @@ from study.motion.clip import Clip, trim
 from study.motion.defects import Defect, find_defects
 from study.motion.flips import turn_back
 from study.motion.jumps import Jumps, clusters, flipping_legs
-
-FloatArray = NDArray[np.float64]
 
 Policy = Literal["mend", "drop", "refuse", "keep"]
 

@@ -12,16 +12,13 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.joint_names import split_side
 from study.motion.skeleton import Skeleton
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Reflections of a joint's own axes, as signs, in the order of preference. Most rigs have x to the side everywhere; rigs
 # whose axes follow the bones have it elsewhere; the last one is for bones that point along +x left and -x right.
@@ -35,21 +32,14 @@ _QUARTER_TURN = np.pi / 4  # as a half angle
 
 @dataclass(frozen=True, eq=False)
 class MirrorMap:
-    """How a rig maps onto its mirror image.
-
-    Parameters
-    ----------
-    partners : (joints,)
-        Each joint's counterpart on the other side; joints of the trunk are their own.
-    signs : (joints, 3)
-        The reflection of each joint's own axes.
-    skeleton
-        The mirrored body: the same names, the rest offsets of the other side reflected.
-    """
+    """How a rig maps onto its mirror image."""
 
     partners: IntArray
+    """`(joints,)`: each joint's counterpart on the other side; joints of the trunk are their own."""
     signs: FloatArray
+    """`(joints, 3)`: the reflection of each joint's own axes."""
     skeleton: Skeleton
+    """The mirrored body: the same names, the rest offsets of the other side reflected."""
 
 
 def mirror(clip: Clip) -> Clip:

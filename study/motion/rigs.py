@@ -16,15 +16,12 @@ from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.errors import MotionError
 from study.motion.body_shape import NO_TRUNK, SPOKEN, first_is_left, leg_like, trunk_length, why_no_human
 from study.motion.joint_names import ROLES, SIDED_ROLES, read_names
 from study.motion.limbs import ARM, LEG, Pair, Tree, fans_out, find_pairs, read_pair, unlikeness
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Upper arm and forearm together, of thigh and shank together (Winter 2009, Figure 4.1).
 _ARM_TO_LEG = 0.332 / 0.491
@@ -35,24 +32,16 @@ _HEAD_JOINTS = 6
 
 @dataclass(frozen=True, eq=False)
 class Roles:
-    """What was found of a human body in a skeleton.
-
-    Parameters
-    ----------
-    joints
-        Joint index by role, in the order of `ROLES`.
-    missing
-        For each role that no joint plays, why.
-    notes
-        How left and right were told where names don't say it, and what contradicts the names.
-    human
-        Whether the skeleton is that of a human body; without, no role is found.
-    """
+    """What was found of a human body in a skeleton."""
 
     joints: Mapping[str, int]
+    """Joint index by role, in the order of `ROLES`."""
     missing: Mapping[str, str]
+    """For each role that no joint plays, why."""
     notes: tuple[str, ...]
+    """How left and right were told where names don't say it, and what contradicts the names."""
     human: bool
+    """Whether the skeleton is that of a human body; without, no role is found."""
 
     def without_first(self, joints: int) -> Roles:
         """The same where the first joints of the skeleton, which only carry the others, are cut off."""

@@ -7,13 +7,11 @@ in an actor's name before all names, in lengths, and in leaf joints such as fing
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import IntArray
 from study.errors import MotionError
 from study.motion.joint_names import bare_names
 from study.motion.skeleton import Skeleton
-
-IntArray = NDArray[np.int64]
 
 # The body's own joints, which no rig may lack if the other has them.
 _BODY = (

@@ -12,14 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.errors import MotionError
 from study.motion.joint_names import split_side
 from study.motion.rigs import Roles, find_roles
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 MOST_JOINTS = 4000
 """Joints that a skeleton may have: several times those of a body with hands and face."""
@@ -27,30 +24,21 @@ MOST_JOINTS = 4000
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """A tree of joints, parents before children.
-
-    Parameters
-    ----------
-    names
-        Joint names as the file has them, unique.
-    parents : (joints,)
-        Index of each joint's parent; -1 for joint 0, the root, alone.
-    offsets : (joints, 3)
-        Rest position of each joint in its parent's frame, metres; the root's is not used in motion.
-    end_parents : (ends,)
-        The joints that carry an end site (a bone's tip that has no rotation of its own).
-    end_offsets : (ends, 3)
-        Each end site in its joint's frame, metres.
-    known
-        Which joints play which roles, where poses or a mapping by hand told it; found from the rest pose unless given.
-    """
+    """A tree of joints, parents before children."""
 
     names: tuple[str, ...]
+    """Joint names as the file has them, unique."""
     parents: IntArray
+    """`(joints,)`: index of each joint's parent; -1 for joint 0, the root, alone."""
     offsets: FloatArray
+    """`(joints, 3)`: rest position of each joint in its parent's frame, metres; the root's is not used in motion."""
     end_parents: IntArray
+    """`(ends,)`: the joints that carry an end site (a bone's tip that has no rotation of its own)."""
     end_offsets: FloatArray
+    """`(ends, 3)`: each end site in its joint's frame, metres."""
     known: Roles | None = None
+    """Which joints play which roles, where poses or a mapping by hand told it; found from the rest pose unless given.
+    """
 
     def __post_init__(self) -> None:
         joints = len(self.names)

@@ -17,12 +17,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.clip import Clip, joint_positions
 from study.motion.feet import foot_points, heading
-
-FloatArray = NDArray[np.float64]
 
 # Length of a step times its duration, in metres and seconds, of a body with legs so long (metres).
 _STEP_MS, _LEG_M = 0.40, 0.85

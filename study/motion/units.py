@@ -37,24 +37,16 @@ _PLAUSIBLE_BODY_M = (0.7, 3.0)
 
 @dataclass(frozen=True)
 class Scale:
-    """What a unit of a file is taken to be.
-
-    Parameters
-    ----------
-    metres_per_unit
-        Metres in a unit of the file.
-    plausible
-        Whether the body that results has a person's size.
-    by_legs
-        Whether legs were found to judge by; anything else is a guess from the whole rig's size.
-    note
-        What was assumed and why, in words, for the clip's history.
-    """
+    """What a unit of a file is taken to be."""
 
     metres_per_unit: float
+    """Metres in a unit of the file."""
     plausible: bool
+    """Whether the body that results has a person's size."""
     by_legs: bool
+    """Whether legs were found to judge by; anything else is a guess from the whole rig's size."""
     note: str
+    """What was assumed and why, in words, for the clip's history."""
 
 
 def find_scale(skeleton: Skeleton) -> Scale:

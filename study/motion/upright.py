@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions
-
-FloatArray = NDArray[np.float64]
 
 # Between legs that are straight in rest and those of somebody in a fighting stance.
 _WITHIN = np.cos(np.radians(35.0))

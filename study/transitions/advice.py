@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import IntArray
 from study.errors import TransitionError
 from study.motion.clip import Clip, sample
 from study.motion.cycles import find_cycle
@@ -27,8 +27,6 @@ from study.transitions.batch import geodesic_lengths, velocity_lengths
 from study.transitions.blend_length import FIXED_S, LONGEST_S, blend_length, default_frames
 from study.transitions.distances import distance_matrix, frame_distance, on_joints_of
 from study.transitions.weights import joint_weights
-
-IntArray = NDArray[np.int64]
 
 # 2004 section 5.1: differences that are noticed, 7 frames longer or 8 frames shorter, at 30 fps.
 JND_LONGER_S, JND_SHORTER_S = 7.0 / 30.0, 8.0 / 30.0
@@ -46,46 +44,32 @@ _TRIED = 250_000
 
 @dataclass(frozen=True)
 class Advice:
-    """A transition between two clips.
-
-    Parameters
-    ----------
-    source, destination
-        Names of the clips.
-    method
-        `"geodesic"` or `"velocity"`.
-    why
-        What it was chosen for.
-    start_frame, end_frame
-        First blended frame of the source, last blended frame of the destination.
-    blend_frames, blend_s
-        How long to blend.
-    cost, default_cost
-        2004 Eq. 1 for this blend, and for one of the default length at the same points.
-    default_frames
-        The fixed length that is compared with: 0.33 s, 10 frames at 30 fps.
-    difference_frames
-        How much longer the advised blend is; below zero, shorter.
-    jnd
-        That difference in just noticeable differences (2004 section 5.1); from 1 on, people see it.
-    note
-        What a reader should know.
-    """
+    """A transition between two clips."""
 
     source: str
     destination: str
+    """Names of the clips."""
     method: str
+    """`"geodesic"` or `"velocity"`."""
     why: str
+    """What it was chosen for."""
     start_frame: int
     end_frame: int
+    """First blended frame of the source, last blended frame of the destination."""
     blend_frames: int
     blend_s: float
+    """How long to blend."""
     cost: float
     default_cost: float
+    """2004 Eq. 1 for this blend, and for one of the default length at the same points."""
     default_frames: int
+    """The fixed length that is compared with: 0.33 s, 10 frames at 30 fps."""
     difference_frames: int
+    """How much longer the advised blend is; below zero, shorter."""
     jnd: float
+    """That difference in just noticeable differences (2004 section 5.1); from 1 on, people see it."""
     note: str = ""
+    """What a reader should know."""
 
 
 def is_cyclic(clip: Clip) -> bool:

@@ -12,17 +12,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames, joint_speeds
 from study.transitions.distances import distance_matrix, joint_differences, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Costs looked up at once: 64 MB of them.
 _BLOCK = 8_000_000

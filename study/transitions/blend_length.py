@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
@@ -21,9 +21,6 @@ from study.motion.clip import Clip, trim
 from study.transitions.distances import frame_distance, half_angle_squares, joint_differences, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 from study.transitions.windows import check_frames, held, longest_available, shortfall, window
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 METHODS = ("fixed", "geodesic", "velocity")
 
@@ -33,41 +30,28 @@ SHORTEST_S, LONGEST_S, FIXED_S = 1.0 / 30.0, 2.0, 1.0 / 3.0
 
 @dataclass(frozen=True)
 class BlendLength:
-    """A blend length and what it rests on.
-
-    Parameters
-    ----------
-    method
-        `"fixed"`, `"geodesic"` or `"velocity"`.
-    blend_frames, blend_s
-        The length, in frames of the clips and in seconds.
-    cost
-        2004 Eq. 1 at this length; NaN where the clips don't supply the frames to know it.
-    lengths, costs
-        The candidate lengths in frames and the cost of each (Figure 3); None except for the geodesic method.
-    joint
-        The role with the largest joint difference, by which the velocity method goes.
-    differences
-        Half angle between start and end frame for each major joint (2004 Table 1), by role.
-    joint_speed
-        The mean half-angle speed of that joint, radians a second (the `|v|` of Eq. 4).
-    unclipped_s
-        What Eq. 4 gave, before it was held to the shortest and longest length.
-    note
-        What a reader should know: that the length was clipped, or candidates were excluded.
-    """
+    """A blend length and what it rests on."""
 
     method: str
+    """`"fixed"`, `"geodesic"` or `"velocity"`."""
     blend_frames: int
     blend_s: float
+    """The length, in frames of the clips and in seconds."""
     cost: float
+    """2004 Eq. 1 at this length; NaN where the clips don't supply the frames to know it."""
     lengths: IntArray | None = None
     costs: FloatArray | None = None
+    """The candidate lengths in frames and the cost of each (Figure 3); None except for the geodesic method."""
     joint: str | None = None
+    """The role with the largest joint difference, by which the velocity method goes."""
     differences: Mapping[str, float] = field(default_factory=dict)
+    """Half angle between start and end frame for each major joint (2004 Table 1), by role."""
     joint_speed: float | None = None
+    """The mean half-angle speed of that joint, radians a second (the `|v|` of Eq. 4)."""
     unclipped_s: float | None = None
+    """What Eq. 4 gave, before it was held to the shortest and longest length."""
     note: str = ""
+    """What a reader should know: that the length was clipped, or candidates were excluded."""
 
     @property
     def windows(self) -> tuple[int, int]:

@@ -19,8 +19,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
@@ -28,8 +28,6 @@ from study.motion.clip import Clip, joint_positions, moved, retarget
 from study.motion.skeleton import Skeleton
 from study.transitions.distances import on_joints_of
 from study.transitions.windows import check_frames, shortfall, window
-
-FloatArray = NDArray[np.float64]
 
 WEIGHTS = ("linear", "sigmoid")
 
@@ -47,35 +45,25 @@ class Alignment:
 
 @dataclass(frozen=True, eq=False)
 class Transition:
-    """A clip that goes from one motion into another.
-
-    Parameters
-    ----------
-    clip
-        The result, on the source's skeleton. Frames before the blend are the source's own; frames after it are
-        the destination's, moved by `alignment`.
-    blend_start, blend_stop
-        The blended frames of the result, as a slice counts them; equal for a cut.
-    source_frames, destination_frames
-        The stretch of each clip that went into the blend, as a slice counts it. Frame `f < blend_start` of the
-        result is frame `f` of the source; frame `f >= blend_stop` is frame `f - blend_stop + destination_frames[1]`
-        of the destination.
-    blend_frames
-        The blend length, `blend_stop - blend_start`; 0 for a cut.
-    alignment
-        How the destination (on the source's skeleton) was placed.
-    note
-        How it was made, in words.
-    """
+    """A clip that goes from one motion into another."""
 
     clip: Clip
+    """The result, on the source's skeleton. Frames before the blend are the source's own; frames after it are the
+    destination's, moved by `alignment`."""
     blend_start: int
     blend_stop: int
+    """The blended frames of the result, as a slice counts them; equal for a cut."""
     source_frames: tuple[int, int]
     destination_frames: tuple[int, int]
+    """The stretch of each clip that went into the blend, as a slice counts it. Frame `f < blend_start` of the result is
+    frame `f` of the source; frame `f >= blend_stop` is frame `f - blend_stop + destination_frames[1]` of the
+    destination."""
     blend_frames: int
+    """The blend length, `blend_stop - blend_start`; 0 for a cut."""
     alignment: Alignment
+    """How the destination (on the source's skeleton) was placed."""
     note: str = ""
+    """How it was made, in words."""
 
 
 def blend_weights(blend_frames: int, weight: str = "linear") -> FloatArray:
@@ -223,7 +211,7 @@ def _margins(clip: Clip, start: int, blend_frames: int) -> Stretch:
     return Stretch(picked(clip, inside), bool(wanted[0] >= 0), bool(wanted[-1] < clip.frames))
 
 
-def picked(clip: Clip, frames: NDArray[np.int64] | list[int]) -> Clip:
+def picked(clip: Clip, frames: IntArray | list[int]) -> Clip:
     """A clip of these frames alone."""
     return replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import AnyFloat
 from study.errors import TransitionError
 from study.motion.clip import Clip, retarget
 from study.transitions.cost_matrix import WINDOW_S, cost_matrix
@@ -84,13 +84,13 @@ def _shown(clip: Clip, margin_s: float, *, after: bool) -> range:
     return range(1, clip.frames - margin) if after else range(margin, clip.frames - 1)
 
 
-def frame_costs(source: Clip, destination: Clip, metric: str) -> NDArray[np.floating]:
+def frame_costs(source: Clip, destination: Clip, metric: str) -> AnyFloat:
     """What a metric of `METRICS` says of a cut between all frames of two clips, `(frames, frames)`.
 
     Of a clip with itself, frames within 0.4 s of each other have the median: they are no transition. So have frames
     without a whole window around them, for the point cloud.
     """
-    costs: NDArray[np.floating]
+    costs: AnyFloat
     if metric == "pointcloud":
         costs = _centred_windows(source, destination)
     else:
@@ -103,7 +103,7 @@ def frame_costs(source: Clip, destination: Clip, metric: str) -> NDArray[np.floa
     return costs
 
 
-def _centred_windows(source: Clip, destination: Clip) -> NDArray[np.floating]:
+def _centred_windows(source: Clip, destination: Clip) -> AnyFloat:
     """Point cloud distances of the windows around all frames; the median for frames without a whole window."""
     window = min(max(1, round(WINDOW_S * source.fps)), source.frames, destination.frames)
     found = window_distances(point_cloud(source), point_cloud(retarget(destination, source.skeleton)), window)
@@ -113,7 +113,7 @@ def _centred_windows(source: Clip, destination: Clip) -> NDArray[np.floating]:
     return costs
 
 
-def _least_apart(costs: NDArray[np.floating], count: int, apart: int) -> list[tuple[int, int]]:
+def _least_apart(costs: AnyFloat, count: int, apart: int) -> list[tuple[int, int]]:
     """The `count` least entries of which no two are within `apart` rows and columns of each other."""
     left = costs.copy()
     chosen = []

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import AnyFloat, FloatArray, IntArray
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, retarget
@@ -30,8 +30,6 @@ from study.transitions.point_cloud import point_cloud, window_distances
 from study.transitions.threads import cores, one_blas_thread
 from study.transitions.weights import joint_weights
 
-FloatArray = NDArray[np.float64]
-AnyFloat = NDArray[np.floating]
 Block = tuple[range, AnyFloat]
 
 ROOTS = ("matched", "world", "none")
@@ -47,22 +45,14 @@ _BLOCK_ROWS, _TILE_COLUMNS = 256, 512
 
 @dataclass(frozen=True)
 class Extremes:
-    """Where a cost matrix is least and greatest.
-
-    Parameters
-    ----------
-    min, max
-        The least and the greatest cost.
-    argmin
-        Source and destination frame of the least: the global optimum (2003 section 4.2); the first of equals.
-    shape
-        Source frames (or windows) and destination frames.
-    """
+    """Where a cost matrix is least and greatest, and its least and greatest cost."""
 
     min: float
     argmin: tuple[int, int]
+    """Source and destination frame of the least: the global optimum (2003 section 4.2); the first of equals."""
     max: float
     shape: tuple[int, int]
+    """Source frames (or windows) and destination frames."""
 
 
 def cost_matrix(
@@ -185,18 +175,13 @@ def extremes(blocks: Iterable[Block]) -> Extremes:
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """What a clip brings into the cost.
-
-    Parameters
-    ----------
-    rotations : (weighted joints, frames, 4)
-        Those of the root without the facing.
-    vectors : (frames, parts)
-        Positions and velocities, times the root of their weight: squared distances of these are added to the cost.
-    """
+    """What a clip brings into the cost."""
 
     rotations: FloatArray
+    """`(weighted joints, frames, 4)`: those of the root without the facing."""
     vectors: FloatArray
+    """`(frames, parts)`: positions and velocities, times the root of their weight: squared distances of these are added
+    to the cost."""
 
 
 def _terms(clip: Clip, weight: FloatArray, nu: float, root: str) -> _Terms:
@@ -216,7 +201,7 @@ def _terms(clip: Clip, weight: FloatArray, nu: float, root: str) -> _Terms:
     return _Terms(np.ascontiguousarray(rotations.transpose(1, 0, 2)), stacked)
 
 
-def velocities(clip: Clip, joints: NDArray[np.int64]) -> FloatArray:
+def velocities(clip: Clip, joints: IntArray) -> FloatArray:
     """Half-angle velocities of joints, `(frames, joints, 3)`, radians for each 1/30 s, in the joints' own frames."""
     before, after, frames = _around(clip)
     turned = quat.multiply(
@@ -226,7 +211,7 @@ def velocities(clip: Clip, joints: NDArray[np.int64]) -> FloatArray:
     return quat.log(turned) / frames[:, None, None]
 
 
-def _around(clip: Clip) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
+def _around(clip: Clip) -> tuple[IntArray, IntArray, FloatArray]:
     """For each frame, the frames on either side (at the ends, one side) and the time between, in 1/30 s."""
     frames = np.arange(clip.frames)
     before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, clip.frames - 1)

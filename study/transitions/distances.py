@@ -8,13 +8,11 @@ moving either figure on the floor changes nothing as long as the root weighs not
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import AnyFloat, FloatArray
 from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, retarget
-
-FloatArray = NDArray[np.float64]
 
 
 def joint_differences(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -41,7 +39,7 @@ def frame_distance(a: FloatArray, b: FloatArray, weights: FloatArray) -> FloatAr
     return np.asarray((differences**2) @ weights[used])
 
 
-def half_angle_squares(dots: NDArray[np.floating]) -> NDArray[np.floating]:
+def half_angle_squares(dots: AnyFloat) -> AnyFloat:
     """Squared half angles, of any shape, from the dot products of unit quaternions; overwrites what it is given.
 
     Notes

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
@@ -24,79 +24,54 @@ from study.transitions.cost_matrix import cost_matrix, velocities
 from study.transitions.distances import on_joints_of
 from study.transitions.windows import check_frames
 
-FloatArray = NDArray[np.float64]
-
 # Within one clip, frames nearer than this are no transition; seconds.
 _APART_S = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class LabelledCut:
-    """A cut from a frame of one clip to a frame of another, and what people said of it.
-
-    Parameters
-    ----------
-    source, destination
-        Clips of one rig at one frame rate.
-    source_frame, destination_frame
-        The frames that the cut joins.
-    bad
-        1 for a bad transition, 0 for a good one: what the cost should be (Eq. 3). Anything between will do, too.
-    """
+    """A cut from a frame of one clip to a frame of another, and what people said of it."""
 
     source: Clip
     destination: Clip
+    """Clips of one rig at one frame rate."""
     source_frame: int
     destination_frame: int
+    """The frames that the cut joins."""
     bad: float
+    """1 for a bad transition, 0 for a good one: what the cost should be (Eq. 3). Anything between will do, too."""
 
 
 @dataclass(frozen=True)
 class FittedWeights:
-    """What the least squares gave.
-
-    Parameters
-    ----------
-    weights
-        By role, both sides of a pair the same, the largest one; zeros included.
-    scale
-        What the largest weight was before it was scaled to one: times this, bad transitions cost about 1.
-    residual
-        Root mean square of what is left of the labels.
-    good, bad
-        How many cuts of each there were.
-    """
+    """What the least squares gave."""
 
     weights: Mapping[str, float]
+    """By role, both sides of a pair the same, the largest one; zeros included."""
     scale: float
+    """What the largest weight was before it was scaled to one: times this, bad transitions cost about 1."""
     residual: float
+    """Root mean square of what is left of the labels."""
     good: int
     bad: int
+    """How many cuts of each there were."""
 
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """How far the best transitions move in leave-one-out cross-validation (2003 section 4.1).
-
-    Parameters
-    ----------
-    deviations
-        For each cut: frames between the best transition of its two clips by all labels, and by all labels but its own
-        (the larger of the distances in source and destination).
-    mean_frames, median_frames
-        Of these.
-    transfer
-        The same for each cut that is held out and a pair of clips that no label is about; empty where there is no such
-        pair.
-    transfer_same
-        How many of those agree exactly.
-    """
+    """How far the best transitions move in leave-one-out cross-validation (2003 section 4.1)."""
 
     deviations: tuple[int, ...]
+    """For each cut: frames between the best transition of its two clips by all labels, and by all labels but its own
+    (the larger of the distances in source and destination)."""
     mean_frames: float
     median_frames: float
+    """Of these."""
     transfer: tuple[int, ...] = ()
+    """The same for each cut that is held out and a pair of clips that no label is about; empty where there is no such
+    pair."""
     transfer_same: int = 0
+    """How many of those agree exactly."""
 
 
 def weight_groups(skeleton: Skeleton) -> tuple[tuple[str, ...], ...]:

@@ -13,14 +13,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, retarget
 from study.motion.feet import foot_points
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 _BAND_M = 0.03
 """A point of a foot is down within this height over its own lowest."""
@@ -41,57 +38,42 @@ Shares of single blends are coarse (a blend of ten frames counts in tenths), so 
 
 @dataclass(frozen=True)
 class FootFlaws:
-    """One foot in a transition, each figure beside that of the motions.
-
-    Parameters
-    ----------
-    skating_share, own_skating_share
-        Share of the blended frames (of all frames of the motions) in which the foot is at floor height, yet no point of
-        it that is down stands. A foot that swings low over the floor counts too, in the motions as well.
-    sink_m
-        How far its lowest point in and shortly after the blend is under its lowest in the motions; below 0 where over
-        it.
-    toe_acceleration_m_per_s2, own_toe_acceleration_m_per_s2
-        Largest acceleration of the toe (without a toe, the ankle) in and shortly after the blend; the motions' largest,
-        of either foot.
-    """
+    """One foot in a transition, each figure beside that of the motions."""
 
     skating_share: float
     own_skating_share: float
+    """Share of the blended frames (of all frames of the motions) in which the foot is at floor height, yet no point of
+    it that is down stands. A foot that swings low over the floor counts too, in the motions as well."""
     sink_m: float
+    """How far its lowest point in and shortly after the blend is under its lowest in the motions; below 0 where over
+    it."""
     toe_acceleration_m_per_s2: float
     own_toe_acceleration_m_per_s2: float
+    """Largest acceleration of the toe (without a toe, the ankle) in and shortly after the blend; the motions' largest,
+    of either foot."""
 
 
 @dataclass(frozen=True)
 class Flaws:
-    """Flaws of a transition, each figure beside that of the motions that it was made from.
-
-    Parameters
-    ----------
-    left, right
-        The feet.
-    unsupported_share, own_unsupported_share
-        Share of the blended frames (of all frames of the motions) in which no foot stands though one is at floor
-        height.
-    airborne_share, own_airborne_share
-        The same for frames in which no foot is at floor height.
-    joint_velocity_change_rad_per_s, own_joint_velocity_change_rad_per_s
-        Largest change of any joint's velocity from one frame to the next, in and shortly after the blend; the motions'.
-    root_velocity_change_m_per_s, own_root_velocity_change_m_per_s
-        The same of the root in the world.
-    """
+    """Flaws of a transition, each figure beside that of the motions that it was made from."""
 
     left: FootFlaws
     right: FootFlaws
+    """The feet."""
     unsupported_share: float
     own_unsupported_share: float
+    """Share of the blended frames (of all frames of the motions) in which no foot stands though one is at floor height.
+    """
     airborne_share: float
     own_airborne_share: float
+    """The same for frames in which no foot is at floor height."""
     joint_velocity_change_rad_per_s: float
     own_joint_velocity_change_rad_per_s: float
+    """Largest change of any joint's velocity from one frame to the next, in and shortly after the blend; the motions'.
+    """
     root_velocity_change_m_per_s: float
     own_root_velocity_change_m_per_s: float
+    """The same of the root in the world."""
 
     @property
     def toe_acceleration_times(self) -> float:

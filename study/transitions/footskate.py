@@ -13,16 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions, retarget, trim
 from study.motion.legs import reach
 from study.transitions.blending import Transition
 from study.transitions.support import Support, find_support, footwork, toes
-
-FloatArray = NDArray[np.float64]
 
 RELEASE_S = 0.2
 """A correction may end so long after the blend."""
@@ -256,7 +254,7 @@ def _lift(support: Support, way: FloatArray, feet: FloatArray, foot: int) -> Flo
     return lift
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(flags: BoolArray) -> list[tuple[int, int]]:
     """Stretches of true, as slices count them."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

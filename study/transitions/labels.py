@@ -19,32 +19,22 @@ LABELS = ("good", "bad", "skip")
 
 @dataclass(frozen=True)
 class Label:
-    """What a person said of a cut.
-
-    Parameters
-    ----------
-    source, destination
-        Names of the motions.
-    source_frame, destination_frame
-        The frames that the cut joins, at `fps`.
-    label
-        `"good"`, `"bad"`, or `"skip"` where the person would not say.
-    fps
-        Frame rate that the frames count at.
-    library
-        Where the motions come from; empty where that was not kept.
-    found
-        How the candidate was found, such as `best lee2002`; empty for those that a person chose.
-    """
+    """What a person said of a cut."""
 
     source: str
     destination: str
+    """Names of the motions."""
     source_frame: int
     destination_frame: int
+    """The frames that the cut joins, at `fps`."""
     label: str
+    """`"good"`, `"bad"`, or `"skip"` where the person would not say."""
     fps: float = 30.0
+    """Frame rate that the frames count at."""
     library: str = ""
+    """Where the motions come from; empty where that was not kept."""
     found: str = ""
+    """How the candidate was found, such as `best lee2002`; empty for those that a person chose."""
 
     @property
     def cut(self) -> tuple[str, str, int, int]:

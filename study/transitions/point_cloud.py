@@ -21,14 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from study.arrays import AnyFloat, CountArray, FloatArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-AnyFloat = NDArray[np.floating]
-IntArray = NDArray[np.int32]
 
 # A cost as a whole number: so many 2^-24 square metres (0.06 square millimetres). Sums of them are exact.
 COUNTS_PER_SQUARE_METRE = 2.0**24
@@ -40,27 +38,19 @@ _TILE_ROWS, _TILE_COLUMNS = 256, 320
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """A clip's joints as a point cloud, in the parts that `window_distances` multiplies.
-
-    Parameters
-    ----------
-    name
-        The clip's name, for messages.
-    centres : (frames,) complex
-        The weighted mean of the points on the floor, `z + ix`, metres: turning by `yaw` multiplies by `exp(i yaw)`.
-    floor : (frames, points) complex
-        Each point on the floor, from that mean, times the root of its weight.
-    heights : (frames, points)
-        Each point's height, metres.
-    weights : (points,)
-        They sum to 1.
-    """
+    """A clip's joints as a point cloud, in the parts that `window_distances` multiplies."""
 
     name: str
+    """The clip's name, for messages."""
     centres: ComplexArray
+    """`(frames,) complex`: the weighted mean of the points on the floor, `z + ix`, metres: turning by `yaw` multiplies
+    by `exp(i yaw)`."""
     floor: ComplexArray
+    """`(frames, points) complex`: each point on the floor, from that mean, times the root of its weight."""
     heights: FloatArray
+    """`(frames, points)`: each point's height, metres."""
     weights: FloatArray
+    """`(points,)`: they sum to 1."""
 
     @property
     def frames(self) -> int:
@@ -147,7 +137,7 @@ def window_distances(
 
 def window_counts(
     a: PointCloud, b: PointCloud, window: int, *, rows: range | None = None, columns: range | None = None
-) -> IntArray:
+) -> CountArray:
     """`window_distances` in single precision as whole numbers of 2^-24 square metres, rounded to the nearest.
 
     Returns

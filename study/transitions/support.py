@@ -14,15 +14,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, sample, trim
 from study.motion.feet import foot_points
 from study.transitions.blending import Transition, facing
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # A point of a foot bears all its weight up to the first speed (m/s) and height over its lowest (m), none from the
 # second.
@@ -35,31 +32,22 @@ _BORNE = (0.25, 0.5)
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """What holds a transition to the floor, over `frames` frames from `first` on (the blend and some frames after it).
-
-    Parameters
-    ----------
-    first, blend_frames
-        The first blended frame of the transition, and how many there are.
-    held : (frames + 1, 2)
-        How firmly each foot is held, from 0 to 1, in the step into each frame and in the one after the last.
-    excess : (frames + 1, 2, 3)
-        How much too far each foot moves in these steps if it is held, metres.
-    apart : (frames + 1, 2)
-        How differently the two clips use the foot, from 0 (both hold it, or both move it) to 1.
-    over : (frames, 2)
-        How far each foot lies over the height at which it would stand, metres.
-    room : (frames, 2)
-        How far its lowest point is above the floor, metres; below 0 where it sinks.
-    """
+    """What holds a transition to the floor, over the blend and some frames after it: `frames` from `first` on."""
 
     first: int
     blend_frames: int
+    """The first blended frame of the transition, and how many there are."""
     held: FloatArray
+    """`(frames + 1, 2)`: how firmly each foot is held, from 0 to 1, in the step into each frame and in the one after
+    the last."""
     excess: FloatArray
+    """`(frames + 1, 2, 3)`: how much too far each foot moves in these steps if it is held, metres."""
     apart: FloatArray
+    """`(frames + 1, 2)`: how differently the two clips use the foot, from 0 (both hold it, or both move it) to 1."""
     over: FloatArray
+    """`(frames, 2)`: how far each foot lies over the height at which it would stand, metres."""
     room: FloatArray
+    """`(frames, 2)`: how far its lowest point is above the floor, metres; below 0 where it sinks."""
 
     @property
     def frames(self) -> int:

@@ -18,8 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
@@ -36,8 +36,6 @@ from study.transitions.blending import (
 )
 from study.transitions.distances import on_joints_of
 from study.transitions.windows import Window, check_frames, shortfall, window
-
-FloatArray = NDArray[np.float64]
 
 Decay = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """What is left of offsets `(..., n)` with rates `(..., n)` a second after times `(t,)`, seconds: `(t, ..., n)`."""

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, retarget, sample
@@ -27,41 +27,29 @@ from study.transitions.distances import half_angle_squares, on_joints_of
 from study.transitions.weights import joint_weights
 from study.transitions.windows import check_frames, held
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
 STEEPEST = 2.0
 """The slope of a warp lies between one over this and this."""
 
 
 @dataclass(frozen=True)
 class WarpLength:
-    """The cheapest pair of blend lengths.
-
-    Parameters
-    ----------
-    source_frames, destination_frames
-        Frames of each clip in the blend (2004: b_from and b_to).
-    blend_frames, blend_s
-        Blend length: the longer of the two, in frames and in seconds.
-    cost
-        Its cost.
-    costs : (lengths, lengths)
-        The cost of each pair, by source length, then destination length; infinite where the slope is too steep.
-    shortest
-        The length of the first row and column, frames.
-    note
-        What a reader should know: that candidates were excluded.
-    """
+    """The cheapest pair of blend lengths."""
 
     source_frames: int
     destination_frames: int
+    """Frames of each clip in the blend (2004: b_from and b_to)."""
     blend_frames: int
     blend_s: float
+    """Blend length: the longer of the two, in frames and in seconds."""
     cost: float
+    """Its cost."""
     costs: FloatArray
+    """`(lengths, lengths)`: the cost of each pair, by source length, then destination length; infinite where the slope
+    is too steep."""
     shortest: int
+    """The length of the first row and column, frames."""
     note: str = ""
+    """What a reader should know: that candidates were excluded."""
 
     @property
     def windows(self) -> tuple[int, int]:

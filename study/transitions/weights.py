@@ -11,13 +11,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.errors import MotionError, TransitionError
 from study.motion.joint_names import ROLES
 from study.motion.skeleton import Skeleton
-
-FloatArray = NDArray[np.float64]
 
 # Wang & Bodenheimer 2004, section 3.1.2: the major joints, in the order of its Table 1.
 MAJOR_ROLES = tuple(f"{part}.{side}" for side in "RL" for part in ("hip", "knee", "shoulder", "elbow"))

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study.arrays import CountArray
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.motion.skeleton import Skeleton
 from study.transitions.one_hop import build, jobs
 from study.transitions.one_hop.problem import (
     Alignment,
-    IntArray,
     PointCloudDistance,
     Problem,
     Settings,
@@ -89,7 +89,11 @@ def random_problem(seed: int) -> tuple[Problem, dict[tuple[int, int], np.ndarray
 
 
 def exhaustive_search(
-    problem: Problem, switch: Switch, trigger: int, first_legs: dict[int, IntArray], second_legs: dict[int, IntArray]
+    problem: Problem,
+    switch: Switch,
+    trigger: int,
+    first_legs: dict[int, CountArray],
+    second_legs: dict[int, CountArray],
 ) -> tuple[int, int, int, int, int] | None:
     """The best transition for one triggered frame, by trying everything: Koyama & Goto 2019, Eqs. 1 to 4.
 

@@ -12,8 +12,9 @@ from study.apps.cli.console import emit, json_option, progress, say
 from study.counting import counted
 
 if TYPE_CHECKING:
+    from study.arrays import IntArray
     from study.motion.clip import Clip
-    from study.transitions.one_hop.problem import OffsetArray, Settings, Switch
+    from study.transitions.one_hop.problem import Settings, Switch
     from study.transitions.one_hop.table import OneHopTable
 
 TABLE = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -191,7 +192,7 @@ def built(clips: tuple[Clip, ...], out: Path, options: dict[str, Any]) -> OneHop
         )
 
 
-def known_beats(specs: tuple[str, ...], library: str | None, clips: tuple[Clip, ...]) -> list[OffsetArray]:
+def known_beats(specs: tuple[str, ...], library: str | None, clips: tuple[Clip, ...]) -> list[IntArray]:
     """The frames of each clip's beats as `library.toml` says them; empty where it says none."""
     from study.transitions.one_hop.beats import beats_at
 
@@ -201,7 +202,7 @@ def known_beats(specs: tuple[str, ...], library: str | None, clips: tuple[Clip, 
 
 def beat_offsets(
     clips: tuple[Clip, ...], switches: tuple[Switch, ...], options: dict[str, Any]
-) -> dict[tuple[int, int], OffsetArray]:
+) -> dict[tuple[int, int], IntArray]:
     """The offsets of a beat-aware search; none where it is not asked for."""
     from study.transitions.one_hop.beats import all_beat_offsets, find_beats, read_beats
 

@@ -14,19 +14,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import MotionFileError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, refuse_large, with_roles
 from study.motion.readers.asf import LINE, ROOT, Body, Bone, fixed_axes, read_asf
-from study.motion.readers.numbers import ByteArray, IntArray, are_usable, parse_words, split_words
+from study.motion.readers.numbers import ByteArray, are_usable, parse_words, split_words
 from study.motion.readers.source import Source, number, read_source, shown, whole_number
 from study.motion.skeleton import Skeleton
 from study.motion.units import INCH, find_scale
-
-FloatArray = NDArray[np.float64]
 
 CMU_FPS = 120.0
 

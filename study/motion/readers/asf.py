@@ -8,14 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.motion import quaternions as quat
 from study.motion.readers.source import Source, number, shown
 from study.motion.skeleton import MOST_JOINTS
-
-FloatArray = NDArray[np.float64]
 
 LINE = re.compile(rb"[^\r\n]+")
 _WORD = re.compile(rb"[^\s()]+")
@@ -44,7 +42,7 @@ class Body:
 
     path: Path
     bones: tuple[Bone, ...]
-    parents: NDArray[np.int64]
+    parents: IntArray
     root_position: FloatArray
     length_unit: float
     degrees: bool
@@ -176,7 +174,7 @@ def _read_bone(source: Source, lines: list[_Words], degrees: bool) -> Bone:
 
 def _read_hierarchy(
     source: Source, start: int, lines: list[_Words], bones: dict[str, Bone]
-) -> tuple[list[str], NDArray[np.int64]]:
+) -> tuple[list[str], IntArray]:
     """Bone names depth first, and the index of each one's parent."""
     children: dict[str, list[str]] = {}
     seen = {ROOT}

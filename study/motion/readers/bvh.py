@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, refuse_large, with_roles
@@ -23,8 +23,6 @@ from study.motion.readers.numbers import parse_table
 from study.motion.readers.source import Source, read_source
 from study.motion.skeleton import Skeleton
 from study.motion.units import find_scale
-
-FloatArray = NDArray[np.float64]
 
 # The number of joints with a repeated name that are named one by one.
 _NAMED = 3
@@ -166,9 +164,7 @@ def _path(joint: Joint, values: FloatArray) -> FloatArray:
     return path
 
 
-def _rides(
-    root: int, parents: NDArray[np.int64], ends: set[int], paths: dict[int, FloatArray], metres_per_unit: float
-) -> bool:
+def _rides(root: int, parents: IntArray, ends: set[int], paths: dict[int, FloatArray], metres_per_unit: float) -> bool:
     """Whether the root only carries one joint, which moves in it: then that one is the body's root."""
     children = np.flatnonzero(parents == root)
     if len(children) != 1 or root in ends or root + 1 not in paths:

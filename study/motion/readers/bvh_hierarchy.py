@@ -7,12 +7,10 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.readers.source import Source, number, shown, whole_number
 from study.motion.skeleton import MOST_JOINTS
-
-FloatArray = NDArray[np.float64]
 
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 _CANONICAL = {name.lower(): name for name in _CHANNELS}

@@ -5,16 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.errors import MotionFileError
 from study.files import write_whole
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.readers.source import LARGEST
 from study.motion.skeleton import Skeleton
-
-FloatArray = NDArray[np.float64]
 
 
 def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float | None = None) -> None:

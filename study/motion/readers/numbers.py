@@ -14,14 +14,12 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray, IntArray
 from study.counting import counted
 from study.motion.readers.source import LARGEST, NUMBER, Source, number
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
 WordArray = NDArray[np.uint64]
-BoolArray = NDArray[np.bool_]
 
 _LINE = re.compile(rb"[^\r\n]+")
 _WORD = re.compile(rb"\S+")

@@ -24,18 +24,12 @@ LARGEST = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A text file in memory.
-
-    Parameters
-    ----------
-    path
-        Where it came from, for messages.
-    raw
-        Its bytes, UTF-8 or another superset of ASCII.
-    """
+    """A text file in memory."""
 
     path: Path
+    """Where it came from, for messages."""
     raw: bytes
+    """Its bytes, UTF-8 or another superset of ASCII."""
 
     def error(self, offset: int, message: str) -> MotionFileError:
         """The refusal of what is at a byte offset; to be raised by the caller."""

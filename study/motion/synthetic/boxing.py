@@ -8,14 +8,12 @@ Lenetsky et al. 2013; Dinu & Louis 2020).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.synthetic.curves import running_integral, slow_noise
 from study.motion.synthetic.locomotion import grid
 from study.motion.synthetic.score import Score, perform
 from study.motion.synthetic.targets import LEFT, RIGHT, Targets
-
-FloatArray = NDArray[np.float64]
 
 _STYLE = {
     "off_pitch": 0.45,

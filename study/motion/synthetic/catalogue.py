@@ -26,29 +26,21 @@ _LONGEST_S = 3600.0
 
 @dataclass(frozen=True)
 class Description:
-    """What a synthetic motion is.
-
-    Parameters
-    ----------
-    name, kind
-        Its name and its category (`walking`, `running`, `standing`, `turning`, `idle`, `boxing`, `dancing`, `tai-chi`).
-    cyclic_start, cyclic_end
-        Whether it starts, or ends, in steady walking or running, so that whole gait cycles could be added there.
-    seconds
-        Its length where none is asked for.
-    line
-        What is to be seen, in a line.
-    parameters
-        Further parameters than length, frame rate and seed, with their defaults.
-    """
+    """What a synthetic motion is."""
 
     name: str
     kind: str
+    """Its name and its category (`walking`, `running`, `standing`, `turning`, `idle`, `boxing`, `dancing`, `tai-chi`).
+    """
     cyclic_start: bool
     cyclic_end: bool
+    """Whether it starts, or ends, in steady walking or running, so that whole gait cycles could be added there."""
     seconds: float
+    """Its length where none is asked for."""
     line: str
+    """What is to be seen, in a line."""
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    """Further parameters than length, frame rate and seed, with their defaults."""
 
 
 @dataclass(frozen=True)

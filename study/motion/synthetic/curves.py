@@ -11,9 +11,9 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
 
 GRID_STEP = 0.005
 """Seconds between the points on which a motion is planned, whatever its frame rate."""

@@ -7,11 +7,10 @@ stand beside the curves, and `docs/synthetic.md` lists them in full.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from study.arrays import FloatArray
 from study.motion.synthetic.curves import shape_preserving, smooth_step
-
-FloatArray = NDArray[np.float64]
 
 SPEEDS = (0.0, 0.8, 1.3, 1.8, 2.4, 3.3, 4.5)
 """m/s, the knots of the tables below: three of walking, then three of running."""

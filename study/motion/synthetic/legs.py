@@ -13,13 +13,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.synthetic import body
 from study.motion.synthetic.curves import GRID_STEP, blur, clamped_spline, hermite, smooth_step
 from study.motion.synthetic.targets import bend_for, bent_length, hip_positions
-
-FloatArray = NDArray[np.float64]
 
 FOREVER = 1e6
 _STRAIGHTEST_STANCE = np.radians(7.0)

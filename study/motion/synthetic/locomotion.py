@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.synthetic import body, gait
 from study.motion.synthetic.curves import (
     GRID_STEP,
@@ -23,8 +23,6 @@ from study.motion.synthetic.curves import (
 )
 from study.motion.synthetic.legs import FOREVER, Contact, hip_height, on_grid, solve_legs, under_limit
 from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets
-
-FloatArray = NDArray[np.float64]
 
 GRAVITY = 9.81
 _AHEAD_S = 0.30

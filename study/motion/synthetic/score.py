@@ -13,15 +13,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from study.arrays import FloatArray
 from study.motion import quaternions as quat
 from study.motion.synthetic import body
 from study.motion.synthetic.curves import blur, slow_noise, smooth_step
 from study.motion.synthetic.legs import FOREVER, Contact, hip_height, on_grid, solve_legs, under_limit
 from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets, girdle_shift, orientation
-
-FloatArray = NDArray[np.float64]
 
 _ARM = body.UPPER_ARM + body.FOREARM
 _SHOULDER = np.array([body.SHOULDER_HALF_WIDTH, 0.125, 0.004])

@@ -7,14 +7,12 @@ seconds in people who stand at ease), breath at a quarter of a hertz.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion.synthetic.curves import blur, bump, slow_noise, smooth_step
 from study.motion.synthetic.legs import FOREVER, Contact, hip_height, on_grid, solve_legs, under_limit
 from study.motion.synthetic.locomotion import Person, grid
 from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets
-
-FloatArray = NDArray[np.float64]
 
 
 def stand(seconds: float, rng: np.random.Generator) -> Targets:

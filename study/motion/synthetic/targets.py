@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.synthetic import body
-
-FloatArray = NDArray[np.float64]
 
 LEFT, RIGHT = 0, 1
 SIDE_NAMES = ("Left", "Right")

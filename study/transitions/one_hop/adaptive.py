@@ -23,9 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from study.arrays import CountArray
 from study.motion.clip import Clip
 from study.transitions.advice import own_time
-from study.transitions.one_hop.problem import FORBIDDEN, Distance, IntArray, Problem
+from study.transitions.one_hop.problem import FORBIDDEN, Distance, Problem
 from study.transitions.point_cloud import LARGEST_COUNT
 
 # Lengths a third of a just noticeable difference apart (2004 section 5.1: 7 frames at 30 fps), up to 1 s.
@@ -34,21 +35,14 @@ STEP_S, LONGEST_S = 2.0 / 30.0, 1.0
 
 @dataclass(frozen=True, eq=False)
 class StrainDistance:
-    """A distance over at least the usual frames, with what the blend adds to the velocities; a `Distance`.
-
-    Parameters
-    ----------
-    distance
-        How far poses are apart over the frames of a blend: a mean, whatever their number.
-    own_time
-        The time in which the clips go through their own variation, frames.
-    usual
-        The blend length whose cost stays as it is, frames; over no fewer frames are motions compared.
-    """
+    """A distance over at least the usual frames, with what the blend adds to the velocities; a `Distance`."""
 
     distance: Distance
+    """How far poses are apart over the frames of a blend: a mean, whatever their number."""
     own_time: float
+    """The time in which the clips go through their own variation, frames."""
     usual: int
+    """The blend length whose cost stays as it is, frames; over no fewer frames are motions compared."""
 
     @property
     def unit(self) -> float:
@@ -74,7 +68,7 @@ class StrainDistance:
 
     def counts(
         self, a: tuple[Any, int], b: tuple[Any, int], blend_frames: int, rows: range, columns: range
-    ) -> IntArray:
+    ) -> CountArray:
         """The distance's counts, scaled for the length of the blend; `FORBIDDEN` where the clips end before."""
         window = max(blend_frames, self.usual)
         counts = np.full((len(rows), len(columns)), FORBIDDEN, dtype=np.int32)

@@ -10,19 +10,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import IntArray
 from study.errors import TransitionError
 from study.files import read_text
 from study.motion.clip import Clip, joint_positions
-from study.transitions.one_hop.problem import Distance, OffsetArray
+from study.transitions.one_hop.problem import Distance
 
 BEATS_PER_MINUTE = (70.0, 180.0)
 
-FloatArray = NDArray[np.float64]
 
-
-def read_beats(path: Path, clip: Clip) -> OffsetArray:
+def read_beats(path: Path, clip: Clip) -> IntArray:
     """The beats of a clip from a text file with a time in seconds first on each line, as frames of the clip.
 
     Further columns (the number of the beat in its bar) are not used, empty lines and lines with `#` are ignored, and
@@ -40,13 +38,13 @@ def read_beats(path: Path, clip: Clip) -> OffsetArray:
     return beats_at(times, clip)
 
 
-def beats_at(times_s: Sequence[float], clip: Clip) -> OffsetArray:
+def beats_at(times_s: Sequence[float], clip: Clip) -> IntArray:
     """Times in seconds from a clip's frame 0 as frames of the clip; those outside of it are ignored."""
     frames = np.unique(np.round(np.array(times_s) * clip.fps).astype(np.int64))
     return frames[(frames >= 0) & (frames < clip.frames)]
 
 
-def regular_beats(clip: Clip, beats_per_minute: float, first_s: float = 0.0) -> OffsetArray:
+def regular_beats(clip: Clip, beats_per_minute: float, first_s: float = 0.0) -> IntArray:
     """The frames nearest to the beats of a steady tempo, from a first beat on."""
     if not (np.isfinite(beats_per_minute) and beats_per_minute > 0):
         raise TransitionError(f"Expected a tempo above 0 beats a minute, got {beats_per_minute}.")
@@ -56,7 +54,7 @@ def regular_beats(clip: Clip, beats_per_minute: float, first_s: float = 0.0) -> 
     return frames[frames < clip.frames]
 
 
-def find_beats(clip: Clip, beats_per_minute: tuple[float, float] = BEATS_PER_MINUTE) -> OffsetArray:
+def find_beats(clip: Clip, beats_per_minute: tuple[float, float] = BEATS_PER_MINUTE) -> IntArray:
     """The beats that a dance keeps to: the steady tempo and phase at which the body most comes to rest.
 
     Parameters
@@ -99,7 +97,7 @@ def find_beats(clip: Clip, beats_per_minute: tuple[float, float] = BEATS_PER_MIN
     return regular_beats(clip, float(tempi[best]), float(first))
 
 
-def beat_offsets(source_beats: OffsetArray, hop_beats: OffsetArray, tolerance: int = 1) -> OffsetArray:
+def beat_offsets(source_beats: IntArray, hop_beats: IntArray, tolerance: int = 1) -> IntArray:
     """The offsets at which a hop's beats fall on the source's, ascending (section 4.4).
 
     Parameters
@@ -132,8 +130,8 @@ def beat_offsets(source_beats: OffsetArray, hop_beats: OffsetArray, tolerance: i
 
 
 def all_beat_offsets(
-    beats: Mapping[int, OffsetArray], sources: Sequence[int], hops: Sequence[int], tolerance: int = 1
-) -> dict[tuple[int, int], OffsetArray]:
+    beats: Mapping[int, IntArray], sources: Sequence[int], hops: Sequence[int], tolerance: int = 1
+) -> dict[tuple[int, int], IntArray]:
     """`Problem.offsets` for a beat-aware search, from the beats of each clip by its number.
 
     A clip without beats can't be a hop; a source without beats takes any.

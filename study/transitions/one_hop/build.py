@@ -19,9 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from study.arrays import CountArray
 from study.files import whole_file
 from study.transitions.one_hop.jobs import Found, Job, make_jobs, run_job
-from study.transitions.one_hop.problem import FORBIDDEN, IntArray, Problem
+from study.transitions.one_hop.problem import FORBIDDEN, Problem
 from study.transitions.one_hop.search import Best
 from study.transitions.one_hop.table import OneHopTable, table_of
 from study.transitions.threads import cores, one_blas_thread
@@ -105,7 +106,7 @@ class _State:
         self.done = np.zeros(len(jobs), dtype=bool)
         lengths = [len(problem.triggers(switch)) for switch in problem.switches]
         self.best = {number: Best.none(length) for number, length in enumerate(lengths)}
-        self.direct: dict[int, IntArray] = {
+        self.direct: dict[int, CountArray] = {
             number: np.full(length, FORBIDDEN, dtype=np.int32) for number, length in enumerate(lengths)
         }
 

@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from study.arrays import CountArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.transitions.one_hop.build import MEMORY_BYTES
 from study.transitions.one_hop.play import Step
-from study.transitions.one_hop.problem import FORBIDDEN, IntArray, Problem, Switch
+from study.transitions.one_hop.problem import FORBIDDEN, Problem, Switch
 from study.transitions.one_hop.search import Table, second_leg
 from study.transitions.threads import one_blas_thread
 
@@ -27,18 +28,12 @@ _ROWS = 64
 
 @dataclass(frozen=True)
 class Chain:
-    """A transition by several hops.
-
-    Parameters
-    ----------
-    cost
-        The distances of all blends, plus the weight times all stays, in the distance's cost.
-    steps
-        The hops, and the destination last; `play.play_steps` plays them.
-    """
+    """A transition by several hops."""
 
     cost: float
+    """The distances of all blends, plus the weight times all stays, in the distance's cost."""
     steps: tuple[Step, ...]
+    """The hops, and the destination last; `play.play_steps` plays them."""
 
 
 def find_chains(
@@ -117,11 +112,11 @@ class _Search:
         for _ in range(hops - 1):
             self.to_go.append({hop: self._one_more(hop) for hop in self.used})
 
-    def _counts(self, prepared: dict[int, Any], a: int, b: int) -> IntArray:
+    def _counts(self, prepared: dict[int, Any], a: int, b: int) -> CountArray:
         rows, columns = range(self.windows[a]), range(self.windows[b])
         return self.problem.distance.counts(prepared[a], prepared[b], self.blend, rows, columns)
 
-    def _last_leg(self, into: IntArray, hop: int) -> Table:
+    def _last_leg(self, into: CountArray, hop: int) -> Table:
         settings, frames = self.problem.settings, self.problem.clips[hop].frames
         table = second_leg(
             Table(into, 0, 0), self.times, range(frames + 1), settings.longest_stay_hop, self.problem.weight
@@ -131,7 +126,7 @@ class _Search:
             table.counts[own - self.times.start, own] = 0
         return table
 
-    def _onward(self, to_go: dict[int, Table], time: int) -> IntArray:
+    def _onward(self, to_go: dict[int, Table], time: int) -> CountArray:
         """What it costs to go on after a blend into any hop frame that starts at a time: all hops side by side."""
         at = time + self.blend - self.times.start
         parts = [

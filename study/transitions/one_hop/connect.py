@@ -17,21 +17,14 @@ from study.transitions.one_hop.table import Entry
 
 @dataclass(frozen=True)
 class Connection:
-    """How a hop joins two clips.
-
-    Parameters
-    ----------
-    entry
-        The hop, its offset on the source's timeline, no stay in the source, and the stay in the hop.
-    alignment
-        Where the destination then stands: its frame 0 at the start of the second blend.
-    cost
-        Eq. 2, in the distance's cost.
-    """
+    """How a hop joins two clips."""
 
     entry: Entry
+    """The hop, its offset on the source's timeline, no stay in the source, and the stay in the hop."""
     alignment: Alignment
+    """Where the destination then stands: its frame 0 at the start of the second blend."""
     cost: float
+    """Eq. 2, in the distance's cost."""
 
 
 def connect(problem: Problem, source: int, destination: int) -> Connection:

@@ -21,22 +21,15 @@ CONDITIONS = 100
 
 @dataclass(frozen=True)
 class DefaultWeight:
-    """A weight and what it rests on.
-
-    Parameters
-    ----------
-    weight
-        `w` of Eq. 5, cost a frame of stay.
-    without_stays, with_stays
-        The mean smoothness cost of the best transitions with no stays, and with free stays.
-    conditions
-        The transitions drawn: clips, alignment and triggered frame.
-    """
+    """A weight and what it rests on."""
 
     weight: float
+    """`w` of Eq. 5, cost a frame of stay."""
     without_stays: float
     with_stays: float
+    """The mean smoothness cost of the best transitions with no stays, and with free stays."""
     conditions: tuple[Switch, ...]
+    """The transitions drawn: clips, alignment and triggered frame."""
 
 
 def default_weight(

@@ -14,10 +14,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import CountArray, IntArray
 from study.transitions.one_hop import search
-from study.transitions.one_hop.problem import FORBIDDEN, Alignment, IntArray, OffsetArray, Problem, Switch
+from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem, Switch
 from study.transitions.one_hop.search import Best, Table
 
 
@@ -32,25 +32,17 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a job found for one switch with one length of the first blend.
-
-    Parameters
-    ----------
-    switch
-        Its number.
-    where : (n,)
-        Triggers, counted from the switch's first.
-    best
-        An entry for each of them.
-    direct_where, direct : (m,)
-        The cost in counts of the direct transition, where this job knows it.
-    """
+    """What a job found for one switch with one length of the first blend."""
 
     switch: int
-    where: NDArray[np.int64]
+    """Its number."""
+    where: IntArray
+    """`(n,)`: triggers, counted from the switch's first."""
     best: Best
-    direct_where: NDArray[np.int64]
-    direct: IntArray
+    """An entry for each of them."""
+    direct_where: IntArray
+    direct: CountArray
+    """`(m,)`: the cost in counts of the direct transition, where this job knows it."""
 
 
 def make_jobs(problem: Problem, memory_bytes: int) -> tuple[Job, ...]:
@@ -128,7 +120,7 @@ class _ToHop:
     costs: Table
     lengths: Table | int
 
-    def lengths_at(self, times: OffsetArray, frames: OffsetArray) -> IntArray:
+    def lengths_at(self, times: IntArray, frames: IntArray) -> CountArray:
         """The lengths of single blends."""
         if isinstance(self.lengths, int):
             return np.full(len(times), self.lengths, dtype=np.int32)
@@ -222,7 +214,7 @@ class _SecondLegs:
         spans = [_times(problem, switch, settings.blend_frames) for switch in switches]
         self.times = range(min(span.start for span in spans), max(span.stop for span in spans))
         self.by_time: Table | None = None
-        self.by_stay: IntArray | None = None
+        self.by_stay: CountArray | None = None
         if self.alignment.destination_frame is not None:
             times = self.alignment.destination_frame + settings.blend_frames + self.stays
             free = bool((self.bounds == settings.longest_stay_hop).all())
@@ -236,7 +228,7 @@ class _SecondLegs:
         self._mend(table.counts, np.arange(self.times.start, self.times.stop))
         return table
 
-    def of(self, times: OffsetArray, stays: IntArray) -> IntArray:
+    def of(self, times: IntArray, stays: CountArray) -> CountArray:
         """Single rows: `(n, hop frames)` for n destination frames and stays in the source that go with them."""
         if self.by_stay is not None:
             return self.by_stay[stays]
@@ -244,13 +236,13 @@ class _SecondLegs:
             return self.by_time.counts[times - self.by_time.first_row]
         return self._rows(times, self.bounds[stays])
 
-    def _rows(self, times: OffsetArray, longest: OffsetArray) -> IntArray:
+    def _rows(self, times: IntArray, longest: IntArray) -> CountArray:
         rows = search.second_rows(self.to_hop.costs, times, self.ends, longest, self.problem.weight)
         self._mend(rows, times)
         rows[longest < 0] = FORBIDDEN
         return rows
 
-    def _mend(self, rows: IntArray, times: OffsetArray) -> None:
+    def _mend(self, rows: CountArray, times: IntArray) -> None:
         """What a second leg has beyond its costs: the destination as its own hop, and offsets kept near to its own.
 
         Where the hop is the destination at its own place, nothing is left to blend: the second leg costs nothing and
@@ -296,7 +288,7 @@ def _search(problem: Problem, job: Job, number: int, leg: Table, second: _Second
     return Found(number, where, best, direct_where, direct)
 
 
-def _offsets(switch: Switch, triggers: OffsetArray) -> OffsetArray:
+def _offsets(switch: Switch, triggers: IntArray) -> IntArray:
     """The destination's offset for each triggered frame."""
     if switch.alignment.offset is not None:
         return np.full(len(triggers), switch.alignment.offset, dtype=np.int64)
@@ -316,7 +308,7 @@ def _allowed(problem: Problem, job: Job, switch: Switch, leg: Table) -> Table:
     return Table(np.where(mask, leg.counts, np.int32(FORBIDDEN)), leg.first_row, leg.first_column)
 
 
-def _sums_with_fixed_alignment(problem: Problem, switch: Switch, first: Table, second: _SecondLegs) -> IntArray:
+def _sums_with_fixed_alignment(problem: Problem, switch: Switch, first: Table, second: _SecondLegs) -> CountArray:
     """The least sum of both legs by trigger and stay in the source, `(triggers, stays)`, stays not yet paid for.
 
     It depends on the source's frame alone: trigger plus stay. Only a bound on both stays makes a difference by stay.
@@ -340,9 +332,9 @@ def _entries(
     switch: Switch,
     first: Table,
     second: _SecondLegs,
-    where: OffsetArray,
-    cost: IntArray,
-    stay: IntArray,
+    where: IntArray,
+    cost: CountArray,
+    stay: CountArray,
 ) -> Best:
     """Whole entries for the triggers in `where`, from the least cost and the stay in the source that has it."""
     blend = problem.settings.blend_frames

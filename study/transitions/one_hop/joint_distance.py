@@ -11,26 +11,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.arrays import CountArray
 from study.motion.clip import Clip
 from study.transitions.cost_matrix import cost_matrix
-from study.transitions.one_hop.problem import IntArray
 from study.transitions.point_cloud import LARGEST_COUNT
 
 
 @dataclass(frozen=True)
 class JointDistance:
-    """The mean joint cost over the frames of a blend; a `Distance`.
-
-    Parameters
-    ----------
-    weights
-        As `joint_weights` takes them.
-    nu
-        How much velocities weigh beside poses (2003: one).
-    """
+    """The mean joint cost over the frames of a blend; a `Distance`."""
 
     weights: str | Mapping[str, float] = "wang2003"
+    """As `joint_weights` takes them."""
     nu: float = 1.0
+    """How much velocities weigh beside poses (2003: one)."""
     unit: float = 2.0**-20
     words: str = "mean joint cost, squared half angles and metres (Wang & Bodenheimer 2003)"
 
@@ -39,7 +33,7 @@ class JointDistance:
         del blend_frames
         return clip
 
-    def counts(self, a: Clip, b: Clip, blend_frames: int, rows: range, columns: range) -> IntArray:
+    def counts(self, a: Clip, b: Clip, blend_frames: int, rows: range, columns: range) -> CountArray:
         """Means of the frames' costs along diagonals; all frames of both clips are compared, then cut to size."""
         frames = cost_matrix(a, b, weights=self.weights, nu=self.nu, precision="single") / np.float32(self.unit)
         sums = np.zeros((len(rows), len(columns)))

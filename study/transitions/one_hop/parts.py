@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import BoolArray, FloatArray
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.motion.skeleton import Skeleton
@@ -19,7 +19,7 @@ from study.motion.skeleton import Skeleton
 PARTS = ("lower", "upper")
 
 
-def part_joints(skeleton: Skeleton, part: str) -> NDArray[np.bool_]:
+def part_joints(skeleton: Skeleton, part: str) -> BoolArray:
     """Which joints belong to a part, `(joints,)`: `"upper"` is the spine and all above it, `"lower"` the rest."""
     if part not in PARTS:
         raise TransitionError(f"Expected a part of the body, {' or '.join(PARTS)}, got {part!r}.")
@@ -31,7 +31,7 @@ def part_joints(skeleton: Skeleton, part: str) -> NDArray[np.bool_]:
     return upper if part == "upper" else ~upper
 
 
-def part_weights(skeleton: Skeleton, part: str) -> NDArray[np.float64]:
+def part_weights(skeleton: Skeleton, part: str) -> FloatArray:
     """Weights of a `PointCloudDistance` that sees one part only."""
     return part_joints(skeleton, part).astype(np.float64)
 

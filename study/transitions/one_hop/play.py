@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.counting import counted
 from study.errors import TransitionError
@@ -23,87 +22,56 @@ from study.transitions.point_cloud import alignment as align
 
 METHODS = ("one-hop", "direct")
 
-FloatArray = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Trigger:
-    """The wish to be in another state.
-
-    Parameters
-    ----------
-    frame
-        The frame of the output at which it comes.
-    destination
-        The number of the clip to go to.
-    """
+    """The wish to be in another state."""
 
     frame: int
+    """The frame of the output at which it comes."""
     destination: int
+    """The number of the clip to go to."""
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of the output.
-
-    Parameters
-    ----------
-    kind
-        `"state"`, `"hop"`, or `"blend"`.
-    clip
-        The clip that plays, in a blend the one that is blended into.
-    start, stop
-        Frames of the output, as a slice counts them.
-    clip_start
-        The clip's frame at `start`.
-    """
+    """A stretch of the output."""
 
     kind: str
+    """`"state"`, `"hop"`, or `"blend"`."""
     clip: int
+    """The clip that plays, in a blend the one that is blended into."""
     start: int
     stop: int
+    """Frames of the output, as a slice counts them."""
     clip_start: int
+    """The clip's frame at `start`."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One leg of a transition: a stay in the clip that plays, then a blend into another clip.
-
-    Parameters
-    ----------
-    stay
-        Frames to stay first.
-    clip
-        The number of the clip to blend into.
-    offset
-        The frame of the transition's source that coincides with that clip's frame 0.
-    blend_frames
-        Frames of the blend.
-    """
+    """One leg of a transition: a stay in the clip that plays, then a blend into another clip."""
 
     stay: int
+    """Frames to stay first."""
     clip: int
+    """The number of the clip to blend into."""
     offset: int
+    """The frame of the transition's source that coincides with that clip's frame 0."""
     blend_frames: int
+    """Frames of the blend."""
 
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What the state machine showed.
-
-    Parameters
-    ----------
-    clip
-        The motion.
-    segments
-        What it is made of, in order.
-    entries
-        The table's entry for each trigger; None for a direct transition.
-    """
+    """What the state machine showed."""
 
     clip: Clip
+    """The motion."""
     segments: tuple[Segment, ...]
+    """What it is made of, in order."""
     entries: tuple[Entry | None, ...] = ()
+    """The table's entry for each trigger; None for a direct transition."""
 
 
 @dataclass(eq=False)

@@ -15,14 +15,11 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import CountArray, FloatArray, IntArray
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.transitions import point_cloud as clouds
-
-IntArray = NDArray[np.int32]
-OffsetArray = NDArray[np.int64]
 
 # The count of what can't be. Two distances, the penalties of two stays and of two blends, and a hop's cost, each at
 # most `LARGEST_COUNT` = 2^26, stay below it; twice FORBIDDEN and three of them still fit an int32.
@@ -47,21 +44,16 @@ class Distance(Protocol):
     def prepare(self, clip: Clip, blend_frames: int) -> Any:
         """What `counts` needs of a clip, computed once."""
 
-    def counts(self, a: Any, b: Any, blend_frames: int, rows: range, columns: range) -> IntArray:
+    def counts(self, a: Any, b: Any, blend_frames: int, rows: range, columns: range) -> CountArray:
         """Costs of blends that start at the frames `rows` of one clip and `columns` of another, in counts."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointCloudDistance:
-    """The distance of Kovar et al. 2002 over the frames of the blend: mean squared metres; see `point_cloud`.
+    """The distance of Kovar et al. 2002 over the frames of the blend: mean squared metres; see `point_cloud`."""
 
-    Parameters
-    ----------
-    weights : (joints,), optional
-        How much each joint counts; all the same unless given.
-    """
-
-    weights: NDArray[np.float64] | None = None
+    weights: FloatArray | None = None
+    """`(joints,)`: how much each joint counts; all the same unless given."""
     unit: float = 1.0 / clouds.COUNTS_PER_SQUARE_METRE
     words: str = "mean squared distance after alignment on the floor, square metres (Kovar et al. 2002)"
 
@@ -72,35 +64,27 @@ class PointCloudDistance:
 
     def counts(
         self, a: clouds.PointCloud, b: clouds.PointCloud, blend_frames: int, rows: range, columns: range
-    ) -> IntArray:
+    ) -> CountArray:
         """`window_counts`."""
         return clouds.window_counts(a, b, blend_frames, rows=rows, columns=columns)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a search may choose from.
-
-    Parameters
-    ----------
-    blend_frames
-        Frames in each of the two blends (2019: 30, half a second at 60 fps).
-    longest_stay_source, longest_stay_hop
-        The most frames to wait in the source after the trigger, and in the hop after the first blend (2019: 60).
-    longest_stay_both
-        The most frames for both stays together, where that is less: a bound on the duration of the transition,
-        which is both stays and both blends (2019, section 5, Higher responsiveness).
-    lengths
-        The frames that each blend may take, ascending, where its length is searched for as well (2019, section 5,
-        Blending duration). Every frame beyond the shortest then costs as much as one of a stay. `build_table` alone
-        takes them.
-    """
+    """What a search may choose from."""
 
     blend_frames: int = 30
+    """Frames in each of the two blends (2019: 30, half a second at 60 fps)."""
     longest_stay_source: int = 60
     longest_stay_hop: int = 60
+    """The most frames to wait in the source after the trigger, and in the hop after the first blend (2019: 60)."""
     longest_stay_both: int | None = None
+    """The most frames for both stays together, where that is less: a bound on the duration of the transition, which is
+    both stays and both blends (2019, section 5, Higher responsiveness)."""
     lengths: tuple[int, ...] = ()
+    """The frames that each blend may take, ascending, where its length is searched for as well (2019, section 5,
+    Blending duration). Every frame beyond the shortest then costs as much as one of a stay. `build_table` alone takes
+    them."""
 
     def __post_init__(self) -> None:
         stays = (self.longest_stay_source, self.longest_stay_hop, self.longest_stay_both or 0)
@@ -159,62 +143,42 @@ class Alignment:
 
 @dataclass(frozen=True)
 class Switch:
-    """One transition of a state machine, for a stretch of triggered frames.
-
-    Parameters
-    ----------
-    source, destination
-        Which clips, by number.
-    alignment
-        Where the destination stands.
-    first_trigger, last_trigger
-        The triggered frames, both included; all frames of the source unless given.
-    """
+    """One transition of a state machine, for a stretch of triggered frames."""
 
     source: int
     destination: int
+    """Which clips, by number."""
     alignment: Alignment = Alignment(offset=0)
+    """Where the destination stands."""
     first_trigger: int = 0
     last_trigger: int | None = None
+    """The triggered frames, both included; all frames of the source unless given."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Clips, the transitions between them, the hops to choose from, and what counts as good.
-
-    Parameters
-    ----------
-    clips
-        All clips that are in memory at runtime, of one rig at one frame rate.
-    switches
-        The transitions to find.
-    settings
-        Blend length and stays.
-    weight
-        `w` of Eq. 2, in counts a frame; see `weight_in_counts`.
-    distance
-        `D` of Eq. 3.
-    hops
-        Which clips may be hops; all of them unless given. One-hop costs no more than direct only where the
-        destination is among them.
-    hop_costs
-        A cost in counts to add wherever a clip is the hop, by clip (Eq. 6); nothing unless given.
-    offsets
-        By (source, hop), the only offsets that the hop may have, ascending (section 4.4); any unless given.
-    nearest_to_direct
-        Where given, the hop must be the destination itself, and its offset lie within this many frames of the
-        destination's (section 5, Higher responsiveness).
-    """
+    """Clips, the transitions between them, the hops to choose from, and what counts as good."""
 
     clips: tuple[Clip, ...]
+    """All clips that are in memory at runtime, of one rig at one frame rate."""
     switches: tuple[Switch, ...]
+    """The transitions to find."""
     settings: Settings = Settings()
+    """Blend length and stays."""
     weight: int = 0
+    """`w` of Eq. 2, in counts a frame; see `weight_in_counts`."""
     distance: Distance = field(default_factory=PointCloudDistance)
+    """`D` of Eq. 3."""
     hops: tuple[int, ...] | None = None
+    """Which clips may be hops; all of them unless given. One-hop costs no more than direct only where the destination
+    is among them."""
     hop_costs: Mapping[int, int] = field(default_factory=dict)
-    offsets: Mapping[tuple[int, int], OffsetArray] = field(default_factory=dict)
+    """A cost in counts to add wherever a clip is the hop, by clip (Eq. 6); nothing unless given."""
+    offsets: Mapping[tuple[int, int], IntArray] = field(default_factory=dict)
+    """By (source, hop), the only offsets that the hop may have, ascending (section 4.4); any unless given."""
     nearest_to_direct: int | None = None
+    """Where given, the hop must be the destination itself, and its offset lie within this many frames of the
+    destination's (section 5, Higher responsiveness)."""
 
     def __post_init__(self) -> None:
         check_clips(self.clips)

@@ -19,9 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from study.transitions.one_hop.problem import FORBIDDEN, IntArray
+from study.arrays import BoolArray, CountArray, IntArray
+from study.transitions.one_hop.problem import FORBIDDEN
 
 _ROWS = 128
 _SEGMENT = 64
@@ -30,22 +30,17 @@ _PAIRS = 8192
 
 @dataclass(eq=False)
 class Best:
-    """The best transition found so far for each of a range of triggered frames; `offer` improves it in place.
+    """The best transition found so far for each of a range of triggered frames; `offer` improves it in place."""
 
-    Parameters
-    ----------
-    cost, hop, frame, stay_source, stay_hop, blend_first, blend_second : (triggers,)
-        Cost in counts (`FORBIDDEN` or more where there is none), hop clip (-1 where there is none), the hop's frame at
-        the start of the first blend, both stays, and the frames of both blends.
-    """
-
-    cost: IntArray
-    hop: IntArray
-    frame: IntArray
-    stay_source: IntArray
-    stay_hop: IntArray
-    blend_first: IntArray
-    blend_second: IntArray
+    cost: CountArray
+    hop: CountArray
+    frame: CountArray
+    stay_source: CountArray
+    stay_hop: CountArray
+    blend_first: CountArray
+    blend_second: CountArray
+    """`(triggers,)`: cost in counts (`FORBIDDEN` or more where there is none), hop clip (-1 where there is none), the
+    hop's frame at the start of the first blend, both stays, and the frames of both blends."""
 
     @staticmethod
     def none(triggers: int) -> Best:
@@ -55,13 +50,13 @@ class Best:
             cost, np.full(triggers, -1, dtype=np.int32), *(np.zeros(triggers, dtype=np.int32) for _ in range(5))
         )
 
-    def beaten_by(self, cost: IntArray, stay_source: IntArray, hop: int) -> NDArray[np.bool_]:
+    def beaten_by(self, cost: CountArray, stay_source: CountArray, hop: int) -> BoolArray:
         """Where a cost, with its stay in the source, is better by the rule for ties, or may be by the hop's frame."""
         same = (cost == self.cost) & (self.hop >= 0)
         sooner = (stay_source < self.stay_source) | ((stay_source == self.stay_source) & (hop <= self.hop))
         return np.asarray((cost < self.cost) | (same & sooner))
 
-    def offer(self, where: NDArray[np.int64], other: Best) -> None:
+    def offer(self, where: IntArray, other: Best) -> None:
         """Take over `other`'s entries (one for each trigger in `where`) wherever they are better."""
         ours, theirs = self._keys(where), other._keys(slice(None))
         better, tied = np.zeros(len(where), dtype=bool), np.ones(len(where), dtype=bool)
@@ -72,7 +67,7 @@ class Best:
         for each in fields(self):
             getattr(self, each.name)[chosen] = getattr(other, each.name)[better]
 
-    def _keys(self, where: NDArray[np.int64] | slice) -> tuple[IntArray, ...]:
+    def _keys(self, where: IntArray | slice) -> tuple[CountArray, ...]:
         stays = (self.cost, self.stay_source, self.hop, self.frame, self.stay_hop)
         return tuple(values[where] for values in (*stays, self.blend_first, self.blend_second))
 
@@ -81,11 +76,11 @@ class Best:
 class Table:
     """A block of a cost matrix with its place: entry `[r, c]` is for row `first_row + r`, column `first_column + c`."""
 
-    counts: IntArray
+    counts: CountArray
     first_row: int
     first_column: int
 
-    def block(self, rows: range, columns: range) -> IntArray:
+    def block(self, rows: range, columns: range) -> CountArray:
         """A copy of any stretch of rows and columns, `FORBIDDEN` outside of what is known."""
         out = np.full((len(rows), len(columns)), FORBIDDEN, dtype=np.int32)
         top, bottom = max(rows.start, self.first_row), min(rows.stop, self.first_row + self.counts.shape[0])
@@ -97,7 +92,7 @@ class Table:
             out[top - rows.start : bottom - rows.start, left - columns.start : right - columns.start] = known
         return out
 
-    def at(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> IntArray:
+    def at(self, rows: IntArray, columns: IntArray) -> CountArray:
         """Single entries, `FORBIDDEN` outside of what is known."""
         r, c = rows - self.first_row, columns - self.first_column
         known = (r >= 0) & (c >= 0) & (r < self.counts.shape[0]) & (c < self.counts.shape[1])
@@ -146,9 +141,7 @@ def second_leg(to_hop: Table, times: range, frames: range, longest_stay: int, we
     return Table(out, times.start, frames.start)
 
 
-def second_rows(
-    to_hop: Table, times: NDArray[np.int64], frames: range, longest: NDArray[np.int64], weight: int
-) -> IntArray:
+def second_rows(to_hop: Table, times: IntArray, frames: range, longest: IntArray, weight: int) -> CountArray:
     """Single rows of `second_leg`, each with its own longest stay: `(len(times), len(frames))`."""
     out = np.full((len(times), len(frames)), FORBIDDEN, dtype=np.int32)
     counts = to_hop.counts
@@ -165,9 +158,7 @@ def second_rows(
     return out
 
 
-def stays_in_hop(
-    to_hop: Table, times: NDArray[np.int64], frames: NDArray[np.int64], longest: NDArray[np.int64], weight: int
-) -> IntArray:
+def stays_in_hop(to_hop: Table, times: IntArray, frames: IntArray, longest: IntArray, weight: int) -> CountArray:
     """The shortest stay in the hop of least cost, for single pairs, each with its own longest stay."""
     least = np.full(len(times), FORBIDDEN, dtype=np.int32)
     stays = np.zeros(len(times), dtype=np.int32)
@@ -178,7 +169,7 @@ def stays_in_hop(
     return stays
 
 
-def row_minima(first: IntArray, second: IntArray) -> IntArray:
+def row_minima(first: CountArray, second: CountArray) -> CountArray:
     """`min(first + second)` along the rows, in blocks that stay in cache; `second` may be a single row."""
     out = np.empty(len(first), dtype=np.int32)
     work = np.empty((min(_ROWS, len(first)), first.shape[1]), dtype=np.int32)
@@ -189,7 +180,7 @@ def row_minima(first: IntArray, second: IntArray) -> IntArray:
     return out
 
 
-def minima_with_fixed_alignment(first: Table, second: Table, frames: range, shift: int) -> IntArray:
+def minima_with_fixed_alignment(first: Table, second: Table, frames: range, shift: int) -> CountArray:
     """For each source frame the least sum of both legs over the hop's frames.
 
     Parameters
@@ -217,7 +208,7 @@ def minima_with_fixed_alignment(first: Table, second: Table, frames: range, shif
     return out
 
 
-def minima_by_stay(first: Table, second: IntArray, triggers: range, weight: int, limit: IntArray) -> IntArray:
+def minima_by_stay(first: Table, second: CountArray, triggers: range, weight: int, limit: CountArray) -> CountArray:
     """For each triggered frame and stay in the source the least sum of both legs, where it may matter.
 
     Parameters

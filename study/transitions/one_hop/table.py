@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import CountArray, FloatArray
 from study.errors import TransitionError
 from study.files import whole_file, write_whole
-from study.transitions.one_hop.problem import FORBIDDEN, Alignment, IntArray, Problem
+from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem
 from study.transitions.one_hop.search import Best
 
 FORMAT, VERSION = "segue one-hop table", 1
@@ -33,86 +33,58 @@ BLEND_COLUMNS = ("blend_first", "blend_second")
 
 @dataclass(frozen=True)
 class Entry:
-    """One transition (2019, Eq. 1); frames.
-
-    Parameters
-    ----------
-    hop
-        The hop clip's number.
-    offset
-        The source's frame that coincides with the hop's frame 0.
-    stay_source, stay_hop
-        Frames to wait before the first and before the second blend.
-    blend_first, blend_second
-        Frames of both blends, where the table has them for each entry; None where it has one length for all.
-    """
+    """One transition (2019, Eq. 1); frames."""
 
     hop: int
+    """The hop clip's number."""
     offset: int
+    """The source's frame that coincides with the hop's frame 0."""
     stay_source: int
     stay_hop: int
+    """Frames to wait before the first and before the second blend."""
     blend_first: int | None = None
     blend_second: int | None = None
+    """Frames of both blends, where the table has them for each entry; None where it has one length for all."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One transition of the state machine in the table.
-
-    Parameters
-    ----------
-    source, destination
-        Clip numbers.
-    alignment
-        Where the destination stands on the source's timeline.
-    first_trigger, triggers
-        The first triggered frame, and how many there are.
-    first_entry
-        Where its entries start.
-    """
+    """One transition of the state machine in the table."""
 
     source: int
     destination: int
+    """Clip numbers."""
     alignment: Alignment
+    """Where the destination stands on the source's timeline."""
     first_trigger: int
     triggers: int
+    """The first triggered frame, and how many there are."""
     first_entry: int
+    """Where its entries start."""
 
 
 @dataclass(frozen=True, eq=False)
 class OneHopTable:
-    """Optimal one-hop transitions.
-
-    Parameters
-    ----------
-    clips, frames
-        Name and number of frames of each clip, in the order of their numbers.
-    fps
-        Frame rate of all clips.
-    blend_frames
-        Frames of each blend; where entries have their own, those of a direct transition.
-    rows
-        The transitions.
-    entries : (n, 4) or (n, 6) int32
-        All entries, row after row; see `COLUMNS` and `BLEND_COLUMNS`.
-    costs, direct_costs : (n,)
-        Eq. 2 for each entry, and the distance of the direct transition; infinite where there is none.
-    weight
-        `w` of Eq. 2, cost a frame of stay.
-    words
-        What the cost is, with its unit.
-    """
+    """Optimal one-hop transitions."""
 
     clips: tuple[str, ...]
     frames: tuple[int, ...]
+    """Name and number of frames of each clip, in the order of their numbers."""
     fps: float
+    """Frame rate of all clips."""
     blend_frames: int
+    """Frames of each blend; where entries have their own, those of a direct transition."""
     rows: tuple[Row, ...]
-    entries: IntArray
-    costs: NDArray[np.float64]
-    direct_costs: NDArray[np.float64]
+    """The transitions."""
+    entries: CountArray
+    """`(n, 4) or (n, 6) int32`: all entries, row after row; see `COLUMNS` and `BLEND_COLUMNS`."""
+    costs: FloatArray
+    direct_costs: FloatArray
+    """`(n,)`: eq. 2 for each entry, and the distance of the direct transition; infinite where there is none."""
     weight: float
+    """`w` of Eq. 2, cost a frame of stay."""
     words: str
+    """What the cost is, with its unit."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -155,7 +127,7 @@ class OneHopTable:
         return self.clips[number] if 0 <= number < len(self.clips) else f"clip {number}"
 
 
-def table_of(problem: Problem, best: Mapping[int, Best], direct: Mapping[int, IntArray]) -> OneHopTable:
+def table_of(problem: Problem, best: Mapping[int, Best], direct: Mapping[int, CountArray]) -> OneHopTable:
     """The table of what a search found, by the switches' numbers."""
     rows, entries, costs, directs = [], [], [], []
     first_entry = 0
@@ -188,7 +160,7 @@ def table_of(problem: Problem, best: Mapping[int, Best], direct: Mapping[int, In
     )
 
 
-def _in_units(counts: IntArray, unit: float) -> NDArray[np.float64]:
+def _in_units(counts: CountArray, unit: float) -> FloatArray:
     return np.where(counts >= FORBIDDEN, np.inf, counts * unit)
 
 
@@ -274,10 +246,10 @@ def _read_table(path: Path) -> OneHopTable:
 
 def _table(
     said: Mapping[str, Any],
-    entries: IntArray,
+    entries: CountArray,
     path: Path,
-    costs: NDArray[np.float64] | None = None,
-    direct_costs: NDArray[np.float64] | None = None,
+    costs: FloatArray | None = None,
+    direct_costs: FloatArray | None = None,
 ) -> OneHopTable:
     known = (COLUMNS, (*COLUMNS, *BLEND_COLUMNS))
     if said.get("format") != FORMAT or said.get("version") != VERSION or tuple(said["columns"]) not in known:
