@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-import gc
 import socket
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,6 +9,7 @@ from pathlib import Path
 import uvicorn
 from starlette.types import ASGIApp
 
+from study.apps.server import memory
 from study.apps.server.connections import Connection
 from study.apps.server.hosting import Host
 from study.apps.server.names import Named, own_names
@@ -22,9 +20,6 @@ from study.experiment.protocol.whole import Protocol
 from study.experiment.stimuli.manifest import read_manifest
 from study.experiment.store.databases import try_to_write
 from study.experiment.store.responses import open_responses
-
-_M_ARENA_MAX = -8
-"""The number of the option in glibc's malloc.h."""
 
 MOST_CONNECTIONS = 4000
 """Beyond it requests get status 503, and pages ask again. A browser opens up to six while films load."""
@@ -77,11 +72,7 @@ def run(
 def serve(app: ASGIApp, listening: socket.socket, *, behind_proxy: bool = False, root_path: str = "") -> None:
     """Serve an application in this process until it is told to end."""
     _allow_files(MOST_CONNECTIONS + 100)
-    _share_heap()
-    # Two hundred answers at one instant are so many new objects that the collector would look through all sessions
-    # several times, a quarter of all work; what is there now stays, and the rest can wait a while.
-    gc.freeze()
-    gc.set_threshold(100_000, 10, 10)
+    memory.set_up()
     uvicorn.Server(configuration(app, behind_proxy=behind_proxy, root_path=root_path)).run(sockets=[listening])
 
 
@@ -113,15 +104,6 @@ def _allow_files(wanted: int) -> None:
         wanted = min(wanted, most)
     if now != resource.RLIM_INFINITY and now < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
-
-
-def _share_heap() -> None:
-    """Let all threads take memory from one heap: glibc gives each its own, and what one frees no other can use.
-
-    The server's memory would grow for half an hour without need. Threads of Python wait for each other anyway.
-    """
-    with contextlib.suppress(AttributeError, OSError, TypeError):  # other systems have no such choice
-        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, 1)
 
 
 def listen(host: str, port: int) -> socket.socket:

@@ -23,6 +23,7 @@ from starlette.routing import Route
 from study.apps.server.hosting import Host
 from study.apps.server.inbox import DATABASE_AWAY, Inbox, RefusedError, cookie
 from study.apps.server.limits import Limits
+from study.apps.server.memory import hand_back
 from study.apps.server.researcher import researcher_routes
 from study.errors import SegueError
 from study.experiment.protocol.stimuli import StimulusSettings
@@ -94,6 +95,7 @@ def _lifespan(host: Host) -> Callable[[Starlette], contextlib.AbstractAsyncConte
                 await host.note_who_is_here()
             except Exception:
                 log.exception("Recording who is active failed; next attempt in %g s.", HERE_EVERY_SECONDS)
+            hand_back()
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
