@@ -8,7 +8,7 @@ import gc
 
 # Numbers of options in glibc's malloc.h.
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8
-_LARGE = 2**17
+_LARGE = 2**19
 
 
 def set_up() -> None:
