@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-Kind = Literal["different", "guess_corrected", "criterion_free"]
-KINDS: tuple[Kind, ...] = ("different", "guess_corrected", "criterion_free")
+Kind = Literal["different", "criterion_free"]
 
 ROOT_TWO = float(np.sqrt(2.0))
 WIDEST_DELTA = 60.0
@@ -85,20 +84,16 @@ def best_correct(different: FloatArray, same: FloatArray) -> float:
 def threshold_delta(criterion: FloatArray, lapse: FloatArray, kind: Kind, level: float = 0.75) -> FloatArray:
     """Return the d-prime at threshold, shape (fits,).
 
-    `different`: this share of the answers is "different". `guess_corrected`: it is so after Abbott's correction,
-    (p - f) / (1 - f), for the share f of "different" at no difference. `criterion_free`: `criterion_free_delta`.
+    `different`: this share of the answers is "different". `criterion_free`: `criterion_free_delta`.
     0 where the pairs with no difference are above it already, infinite where the lapses keep the curve below it.
     """
-    if kind == "criterion_free" and level <= 0.5:
-        return np.zeros(len(criterion))  # guessing gets as many right
-    if kind == "criterion_free":
-        return np.full(len(criterion), criterion_free_delta(level))
+    if kind == "criterion_free":  # up to one half is right by guessing
+        return np.full(len(criterion), criterion_free_delta(level) if level > 0.5 else 0.0)
     alarms = lapse / 2 + (1 - lapse) * detected(np.zeros(1), criterion)
-    target = np.full(len(criterion), level) if kind == "different" else alarms + level * (1 - alarms)
-    reached = (alarms < target) & (target < 1 - lapse / 2)
+    reached = (alarms < level) & (level < 1 - lapse / 2)
     found = np.zeros(len(criterion))
-    found[reached] = _delta_detected(((target - lapse / 2) / (1 - lapse))[reached], criterion[reached])
-    return np.asarray(np.where(target >= 1 - lapse / 2, np.inf, found), dtype=np.float64)
+    found[reached] = _delta_detected(((level - lapse / 2) / (1 - lapse))[reached], criterion[reached])
+    return np.asarray(np.where(level >= 1 - lapse / 2, np.inf, found), dtype=np.float64)
 
 
 def _delta_detected(share: FloatArray, criterion: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from study.analysis.same_different import fits
-from study.analysis.same_different.d_prime import d_prime
+from study.analysis.same_different.d_prime import d_prime, independent_d_prime
 from study.models.differencing import criterion_free_delta
 
 FRAMES = np.array([[0.0], [1.0]])
@@ -69,10 +69,18 @@ def test_the_interval_is_where_the_likelihood_has_fallen_by_1_92() -> None:
 def test_one_sensitivity_under_two_rules() -> None:
     pairs = 1e8
     differenced = d_prime(0.642 * pairs, pairs, 0.3 * pairs, pairs).d_prime
-    best = norm.cdf((norm.ppf(0.75) - norm.ppf(0.3)) / 2)
-    independent = 2 * norm.ppf(0.5 * (1 + math.sqrt(2 * best - 1)))
+    independent = d_prime(0.75 * pairs, pairs, 0.3 * pairs, pairs).d_prime_independent
     assert differenced == pytest.approx(independent, abs=0.01)
     assert differenced == pytest.approx(1.95, abs=0.005)
+
+
+def test_independent_observations_are_right_as_often_as_two_single_judgements_agree_with_the_pair() -> None:
+    """psyphy gives 2.2655 for 80% hits and 25% false alarms; backwards by the unbiased observer's share of right."""
+    found = independent_d_prime(0.8, 0.25)
+    assert found == pytest.approx(2.2655, abs=5e-5)
+    one = norm.cdf(found / 2)
+    assert one**2 + (1 - one) ** 2 == pytest.approx(norm.cdf((norm.ppf(0.8) - norm.ppf(0.25)) / 2), abs=1e-9)
+    assert independent_d_prime(0.2, 0.25) == 0.0
 
 
 def test_ceiling_of_the_tables() -> None:

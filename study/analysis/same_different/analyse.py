@@ -25,13 +25,11 @@ from study.analysis.same_different.counts import (
     same_different_answers,
 )
 from study.analysis.same_different.d_prime import LevelDPrime, d_prime_table
-from study.analysis.same_different.independent import Rules, compare_rules, fit_independent
 from study.analysis.same_different.interpolation import crossings
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.analysis.same_different.motions import AcrossMotions, across_motions
 from study.analysis.same_different.order import OrderShare, OrderTest, order_test, shares_by_order
-from study.analysis.same_different.profiles import profile_intervals
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
 
@@ -75,10 +73,6 @@ class SameDifferent(Thresholds):
         careful about, or why there is none.
     clustering
         How alike the answers of a participant are, at the pairs with a difference.
-    rules
-        Differencing against independent observations.
-    profile
-        Intervals of the model's thresholds by profile likelihood, by side.
     answer
         The thresholds in sentences.
     staircases
@@ -98,8 +92,6 @@ class SameDifferent(Thresholds):
     across_motions: AcrossMotions
     order: tuple[OrderShare, ...]
     order_test: OrderTest
-    rules: Rules
-    profile: dict[Side, estimates.Interval]
     answer: str
     staircases: Staircases | None = None
 
@@ -159,7 +151,6 @@ def analyse_jnd(
     moved = counts.differences != 0
     given = same_different_answers(answers)
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
-    likelihood = found.model.log_likelihood if found.model else None
     return SameDifferent(
         **vars(found),
         participants=len(counts.participants),
@@ -173,8 +164,6 @@ def analyse_jnd(
         across_motions=across_motions(given),
         order=shares_by_order(given),
         order_test=order_test(given),
-        rules=compare_rules(fit_independent(counts, level), likelihood),
-        profile=profile_intervals(counts, level, confidence),
         answer=in_words(found, mixed, level),
     )
 

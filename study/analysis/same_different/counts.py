@@ -77,6 +77,34 @@ class Threshold:
     note: str = ""
 
 
+def log_threshold(
+    side: Side, found: float, error: float | None, times: float, largest: float, method: str, confidence: float
+) -> Threshold:
+    """Return a threshold with Student's interval of its logarithm, none where it lies beyond the levels shown.
+
+    Parameters
+    ----------
+    found
+        Frames.
+    error, times
+        Standard error of the logarithm, None where it can't be determined; and how many of them the interval reaches.
+    largest
+        The largest difference shown on this side, frames.
+    """
+    interval = estimates.Interval(None, None, confidence)
+    if error is not None:
+        low, high = found * math.exp(-times * error), found * math.exp(min(times * error, 50.0))
+        interval = estimates.Interval(min(low, largest), high if high <= largest else None, confidence)
+    if found > largest:
+        note = f"not reached within the levels shown (largest {largest:g} frames)"
+        return Threshold(side, None, None, interval, "not reached", method, note)
+    if error is None:
+        note = "hangs on single participants: no interval"
+        return Threshold(side, found, None, interval, "reached", method, note)
+    note = "" if interval.high is not None else f"the interval reaches beyond the levels shown ({largest:g} frames)"
+    return Threshold(side, found, found * error, interval, "reached", method, note)
+
+
 @dataclass(frozen=True)
 class PercentDifferent:
     """How often a difference was seen (a point of 2004 Figure 6).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,11 @@ from study.models.differencing import ROOT_TWO, detected
 
 @dataclass(frozen=True)
 class DPrime:
-    """Sensitivity under the differencing rule, answers taken as independent; None where there are no pairs of a kind.
+    """Sensitivity, answers taken as independent; None where there are no pairs of a kind.
 
-    `d_prime` is 0 where hits do not exceed false alarms. Its error is by the delta method, `low` and `high` are by
-    profile likelihood; `high` is None where the answers set no upper end.
+    `d_prime` is by the differencing rule, and 0 where hits do not exceed false alarms. Its error is by the delta
+    method, `low` and `high` are by profile likelihood; `high` is None where the answers set no upper end.
+    `d_prime_independent` is that of the same rates under the rule of independent observations.
     """
 
     d_prime: float | None
@@ -26,6 +28,7 @@ class DPrime:
     standard_error: float | None
     low: float | None
     high: float | None
+    d_prime_independent: float | None
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: floa
                 f"expected counts with 0 <= different <= pairs, found {yes} of {counted(pairs, 'pair')}; count again"
             )
     if different_pairs == 0 or same_pairs == 0:
-        return DPrime(None, None, None, None, None)
+        return DPrime(None, None, None, None, None, None)
     hit, alarm = (hits + 0.5) / (different_pairs + 1), (alarms + 0.5) / (same_pairs + 1)
 
     def solve(hit: float, alarm: float) -> float:
@@ -86,7 +89,25 @@ def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: floa
         error = float(np.sqrt(variance))
     low, high = d_prime_interval(hits, different_pairs, alarms, same_pairs, confidence)
     criterion = float(-ROOT_TWO * ndtri(alarm / 2))
-    return DPrime(value, criterion, error, low, high)
+    return DPrime(value, criterion, error, low, high, independent_d_prime(hit, alarm))
+
+
+def independent_d_prime(hit: float, alarm: float) -> float:
+    """Return d-prime under the rule of independent observations; 0 where hits do not exceed false alarms.
+
+    Each of the two stimuli is judged by itself, and the answer is "different" where the judgements are. An unbiased
+    observer is then right in a share p = Phi(d' / 2)^2 + Phi(-d' / 2)^2 of the pairs, and an observer with these rates
+    would be in Phi((z(hit) - z(alarm)) / 2) of them without bias (Macmillan & Creelman 2005, chapter 9).
+
+    Parameters
+    ----------
+    hit, alarm
+        Shares of "different" at a difference and at none, above 0 and below 1.
+    """
+    from scipy.special import ndtr, ndtri
+
+    correct = max(float(ndtr((ndtri(hit) - ndtri(alarm)) / 2)), 0.5)
+    return float(2 * ndtri((1 + math.sqrt(2 * correct - 1)) / 2))
 
 
 OPEN = "no more “different” than without a difference, or no upper end: the rest cannot be estimated"

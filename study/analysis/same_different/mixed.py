@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.same_different import fits
-from study.analysis.same_different.counts import SIDES, Counts, Side, Threshold, frames_by_side
+from study.analysis.same_different.counts import SIDES, Counts, Side, Threshold, frames_by_side, log_threshold
 from study.analysis.same_different.model import why_no_fit
 from study.counting import counted
 from study.models.differencing import ROOT_TWO, density, detected
@@ -91,9 +91,7 @@ class _Doubt:
     participants: int
 
 
-def fit_mixed_thresholds(
-    counts: Counts, *, level: float = 0.75, confidence: float = 0.95, largest_lapse: float = fits.LARGEST_LAPSE
-) -> MixedThresholds | str:
+def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) -> MixedThresholds | str:
     """Fit the differencing model with a sensitivity and a criterion for each participant.
 
     Parameters
@@ -104,8 +102,6 @@ def fit_mixed_thresholds(
         Share of "different" at threshold.
     confidence
         Of the intervals.
-    largest_lapse
-        Upper bound of the lapse rate, which is the same for all.
 
     Returns
     -------
@@ -128,18 +124,16 @@ def fit_mixed_thresholds(
     if reason:
         return reason
     people = _people(counts, answered)
-    start = fits.fit(
-        people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None], largest_lapse=largest_lapse
-    )
+    start = fits.fit(people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None])
     if start.held[0, 2:].any() or start.held[0, 0]:
         return "the group's sensitivity or criterion is at its bound: individual differences cannot be estimated"
     slopes = np.log(start.slopes[0])
     begin = np.concatenate([np.log(start.criterion), start.lapse, slopes, [0.2, 0.2]])
-    bounds = [(math.log(1e-3), math.log(9.0)), (0.0, largest_lapse), *((slope - 3, slope + 3) for slope in slopes)]
+    bounds = [(math.log(1e-3), math.log(9.0)), (0.0, fits.LARGEST_LAPSE), *((slope - 3, slope + 3) for slope in slopes)]
     point, value, settled = _maximise(people, begin, [*bounds, *[(0.0, LARGEST_SPREAD)] * 2], 0.0)
     near = np.concatenate([point[:-2], np.maximum(point[-2:-1], 0.1), point[-1:]])
     wary, _, _ = _maximise(people, near, [*bounds, (2 * ALIKE, LARGEST_SPREAD), (0.0, LARGEST_SPREAD)], AVOIDANCE)
-    doubt = _Doubt(_covariance(wary, people, largest_lapse), wary, len(people.shown))
+    doubt = _Doubt(_covariance(wary, people), wary, len(people.shown))
     sides = [SIDES[index] for index in frames_by_side(counts.differences[counts.shown.sum(axis=0) > 0])[1]]
     nobody_else = replace(people, sensitivity=np.zeros(1), criterion=np.zeros(1), log_mass=np.zeros(1))
     alike = float(start.log_likelihood[0])
@@ -231,7 +225,7 @@ def _maximise(
     return np.asarray(found.x, dtype=np.float64), -float(found.fun), bool(found.success)
 
 
-def _covariance(point: FloatArray, people: _People, largest_lapse: float) -> FloatArray:
+def _covariance(point: FloatArray, people: _People) -> FloatArray:
     """Inverse of the curvature, avoidance included; parameters at a bound are held there."""
     step, size = 1e-4, len(point)
     curvature = np.empty((size, size))
@@ -243,7 +237,7 @@ def _covariance(point: FloatArray, people: _People, largest_lapse: float) -> Flo
     curvature = (curvature + curvature.T) / 2
     curvature[-2, -2] += AVOIDANCE / point[-2] ** 2
     held = np.zeros(size, dtype=bool)
-    held[1] = point[1] <= 2 * step or point[1] >= largest_lapse - 1e-9
+    held[1] = point[1] <= 2 * step or point[1] >= fits.LARGEST_LAPSE - 1e-9
     held[-2:] = (point[-2:] <= ALIKE) | (point[-2:] >= LARGEST_SPREAD - 1e-9)
     free = np.flatnonzero(~held)
     result = np.zeros((size, size))
@@ -292,20 +286,10 @@ def _thresholds(
             note = f"{100 * level:g}% is not crossed: false alarms lie above it, or lapses keep the curve below it"
             result[side] = Threshold(side, None, None, nothing, "not estimable", METHOD, note)
             continue
-        found, (variance, freedom) = math.exp(log_found), _variance(doubt, gradient)
-        if not variance > 0:
-            note = "its uncertainty cannot be estimated"
-            result[side] = Threshold(side, found, None, nothing, "reached", METHOD, note)
-            continue
-        error, times = math.sqrt(variance), estimates.t_quantile(confidence, freedom)
-        low, high = found * math.exp(-times * error), found * math.exp(min(times * error, 50.0))
-        interval = estimates.Interval(min(low, largest), high if high <= largest else None, confidence)
-        if found > largest:
-            note = f"not reached within the levels shown (largest {largest:g} frames)"
-            result[side] = Threshold(side, None, None, interval, "not reached", METHOD, note)
-            continue
-        note = "" if interval.high is not None else f"the interval reaches beyond the levels shown ({largest:g} frames)"
-        result[side] = Threshold(side, found, found * error, interval, "reached", METHOD, note)
+        variance, freedom = _variance(doubt, gradient)
+        error = math.sqrt(variance) if variance > 0 else None
+        times = estimates.t_quantile(confidence, freedom)
+        result[side] = log_threshold(side, math.exp(log_found), error, times, largest, METHOD, confidence)
     return result
 
 

@@ -7,7 +7,6 @@ and tests go out (2004 section 5.1, corrected). What the model says stands in `f
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,28 +22,11 @@ from study.analysis.same_different.counts import (
     Threshold,
     both_sides,
     frames_by_side,
+    log_threshold,
 )
-from study.models.differencing import KINDS, Kind, probability_different
+from study.models.differencing import Kind, probability_different
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class EqualSlopes:
-    """Tests that shorter and longer blends are told apart equally well; `note` says why there is no t.
-
-    The likelihood ratio is against one slope for both sides; t is of the logarithm of the ratio of the slopes, over
-    participants (jackknife), and None where they do not spread.
-    """
-
-    likelihood_ratio: float
-    degrees_of_freedom: int
-    p_value_answers_independent: float
-    slope_ratio_longer_to_shorter: float
-    t: float | None
-    t_degrees_of_freedom: int | None
-    p_value_participants_independent: float | None
-    note: str
 
 
 @dataclass(frozen=True)
@@ -66,12 +48,6 @@ class ModelFit:
     corrected
         The difference at which an observer with the best criterion is right in that share of the pairs, by side: what
         the sensitivity allows, whatever the criterion.
-    guess_corrected
-        That share after Abbott's correction for the false alarms, by side.
-    equal_slopes
-        Tests of one slope for both sides: likelihood ratio (answers as independent), t (participants as independent).
-    fit_deviance, fit_degrees_of_freedom, fit_p_value
-        Against free percentages at each level; a small p-value says that the curve does not follow the data.
     curve
         Points (difference in frames, percent) for drawing.
     log_likelihood
@@ -88,23 +64,12 @@ class ModelFit:
     level: float
     jnd: dict[Side, Threshold]
     corrected: dict[Side, Threshold]
-    guess_corrected: dict[Side, Threshold]
-    equal_slopes: EqualSlopes | None
-    fit_deviance: float
-    fit_degrees_of_freedom: int
-    fit_p_value: float | None
     curve: tuple[tuple[float, float], ...]
     log_likelihood: float
     note: str = ""
 
 
-def fit_model(
-    counts: Counts,
-    *,
-    level: float = 0.75,
-    confidence: float = 0.95,
-    largest_lapse: float = fits.LARGEST_LAPSE,
-) -> ModelFit | str:
+def fit_model(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) -> ModelFit | str:
     """Fit the differencing model; a sentence that says why where it can't be fitted.
 
     Parameters
@@ -115,8 +80,6 @@ def fit_model(
         Share of "different", or of right answers, at threshold; above one half.
     confidence
         Of the intervals.
-    largest_lapse
-        Upper bound of the lapse rate.
 
     Notes
     -----
@@ -131,12 +94,16 @@ def fit_model(
     present = np.flatnonzero(counts.shown.sum(axis=0) > 0)
     differences, different, shown = counts.differences[present], counts.different[:, present], counts.shown[:, present]
     frames, sides = frames_by_side(differences)
-    total = (different.sum(axis=0)[None], shown.sum(axis=0)[None])
-    best = fits.fit(frames, *total, largest_lapse=largest_lapse)
-    spread = _spread_of(level, best, frames, different, shown, largest_lapse)
-    thresholds = {kind: _thresholds(best, spread, frames, sides, kind, confidence) for kind in KINDS}
-    deviance = max(2 * (_saturated_log_likelihood(*total) - float(best.log_likelihood[0])), 0.0)
-    freedom = len(differences) - 2 - len(sides)
+    best = fits.fit(frames, different.sum(axis=0)[None], shown.sum(axis=0)[None])
+    spread = _spread_of(level, best, frames, different, shown)
+
+    def thresholds(kind: Kind) -> dict[Side, Threshold]:
+        largest = frames.max(axis=0)
+        return {
+            SIDES[side]: _threshold(best, spread, float(largest[place]), place, SIDES[side], kind, confidence)
+            for place, side in enumerate(sides)
+        }
+
     line = np.linspace(differences.min(), differences.max(), 201)
     curve = probability_different(both_sides(line)[:, sides], best.criterion, best.lapse, best.slopes)[0]
     alarms = probability_different(np.zeros((1, len(sides))), best.criterion, best.lapse, best.slopes)
@@ -147,23 +114,12 @@ def fit_model(
         false_alarms=float(alarms[0, 0]),
         slopes={SIDES[side]: float(best.slopes[0, place]) for place, side in enumerate(sides)},
         level=level,
-        jnd=thresholds["different"],
-        corrected=thresholds["criterion_free"],
-        guess_corrected=thresholds["guess_corrected"],
-        equal_slopes=_equal_slopes(best, spread, frames, total, largest_lapse) if len(sides) == 2 else None,
-        fit_deviance=deviance,
-        fit_degrees_of_freedom=freedom,
-        fit_p_value=estimates.chi_square_probability(deviance, freedom) if freedom > 0 else None,
+        jnd=thresholds("different"),
+        corrected=thresholds("criterion_free"),
         curve=tuple((float(x), 100 * float(y)) for x, y in zip(line, curve, strict=True)),
         log_likelihood=float(best.log_likelihood[0]),
-        note="; ".join(
-            filter(None, (_caution(best), NO_TEST if freedom <= 0 else "", ONE_SIDE if len(sides) < 2 else ""))
-        ),
+        note=_caution(best),
     )
-
-
-NO_TEST = "as many parameters as levels: how well the model fits can't be tested"
-ONE_SIDE = "differences on one side only: its slope can't be compared with another"
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,16 +146,14 @@ class _Spread:
         return float(best.criterion[0]) * math.sqrt(max(float(self.covariance[0, 0]), 0.0))
 
 
-def _spread_of(
-    level: float, best: fits.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, largest_lapse: float
-) -> _Spread:
+def _spread_of(level: float, best: fits.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray) -> _Spread:
     answered = shown.sum(axis=1) > 0
     different, shown = different[answered], shown[answered]
     count = len(shown)
     if count < FEWEST_FOR_INTERVAL:
         return _Spread(count, level, None, fits.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
     others = (different.sum(axis=0) - different, shown.sum(axis=0) - shown)
-    return _Spread(count, level, fits.fit(frames, *others, largest_lapse=largest_lapse), np.zeros((0, 0)))
+    return _Spread(count, level, fits.fit(frames, *others), np.zeros((0, 0)))
 
 
 def why_no_fit(counts: Counts) -> str:
@@ -228,28 +182,11 @@ def _caution(best: fits.Fits) -> str:
     return "; ".join(notes)
 
 
-def _saturated_log_likelihood(different: FloatArray, shown: FloatArray) -> float:
-    from scipy.special import xlogy
-
-    share = different / shown
-    return float((xlogy(different, share) + xlogy(shown - different, 1 - share)).sum())
-
-
-def _thresholds(
-    best: fits.Fits, spread: _Spread, frames: FloatArray, sides: Sequence[int], kind: Kind, confidence: float
-) -> dict[Side, Threshold]:
-    """Thresholds of one kind on every side shown."""
-    result: dict[Side, Threshold] = {}
-    for place, index in enumerate(sides):
-        result[SIDES[index]] = _threshold(best, spread, float(frames[:, place].max()), place, index, kind, confidence)
-    return result
-
-
 def _threshold(
-    best: fits.Fits, spread: _Spread, largest: float, place: int, index: int, kind: Kind, confidence: float
+    best: fits.Fits, spread: _Spread, largest: float, place: int, side: Side, kind: Kind, confidence: float
 ) -> Threshold:
     """One threshold, with Student's interval of its logarithm."""
-    side, clustered = SIDES[index], spread.left_out is not None
+    clustered = spread.left_out is not None
     who = "jackknife over participants" if clustered else "one participant, answers treated as independent"
     method = f"differencing model; Student interval of the logarithm, {who}"
     found = float(fits.threshold_frames(best, kind, spread.level)[0, place])
@@ -261,47 +198,6 @@ def _threshold(
         note = f"above {100 * spread.level:g}% even without a difference"
         return Threshold(side, None, None, interval, "above", method, note)
     error = spread.log_threshold_error(best, kind, place) if math.isfinite(found) else None
-    if error is not None:
-        times = (
-            estimates.t_quantile(confidence, spread.participants - 1)
-            if clustered
-            else estimates.normal_quantile(confidence)
-        )
-        low, high = found * math.exp(-times * error), found * math.exp(min(times * error, 50.0))
-        interval = estimates.Interval(min(low, largest), high if high <= largest else None, confidence)
-    if found > largest:
-        note = f"not reached within the levels shown (largest {largest:g} frames)"
-        return Threshold(side, None, None, interval, "not reached", method, note)
-    note = "" if interval.high is not None else f"the interval reaches beyond the levels shown ({largest:g} frames)"
-    if error is None:
-        note = "hangs on single participants: no interval"
-    return Threshold(side, found, None if error is None else found * error, interval, "reached", method, note)
-
-
-def _equal_slopes(
-    best: fits.Fits,
-    spread: _Spread,
-    frames: FloatArray,
-    total: tuple[FloatArray, FloatArray],
-    largest_lapse: float,
-) -> EqualSlopes:
-    """Tests that shorter and longer blends are told apart equally well."""
-    one = fits.fit(frames.sum(axis=1, keepdims=True), *total, largest_lapse=largest_lapse)
-    ratio = max(2 * float(best.log_likelihood[0] - one.log_likelihood[0]), 0.0)
-    difference = float(np.log(best.slopes[0, 1] / best.slopes[0, 0]))
-    error = None
-    if spread.left_out is not None:
-        error = estimates.jackknife_error(np.log(spread.left_out.slopes[:, 1] / spread.left_out.slopes[:, 0]))
-    statistic = difference / error if error is not None and error > 1e-9 else None
-    freedom = spread.participants - 1
-    told = statistic is not None
-    return EqualSlopes(
-        likelihood_ratio=ratio,
-        degrees_of_freedom=1,
-        p_value_answers_independent=estimates.chi_square_probability(ratio, 1),
-        slope_ratio_longer_to_shorter=math.exp(difference),
-        t=statistic,
-        t_degrees_of_freedom=freedom if told else None,
-        p_value_participants_independent=estimates.t_probability(statistic, freedom) if statistic is not None else None,
-        note="" if told else "participants' slopes vary too little for a test",
-    )
+    student = estimates.t_quantile(confidence, spread.participants - 1) if clustered else None
+    times = estimates.normal_quantile(confidence) if student is None else student
+    return log_threshold(side, found, error, times, largest, method, confidence)

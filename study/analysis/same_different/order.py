@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,7 +27,7 @@ class OrderTest:
     """Test that a pair is answered alike in both orders; `note` says why something can't be given.
 
     `difference_percent`, with interval and t over participants, is the share "different" where the reference came first
-    less where second, mean over levels; the chi-square is a likelihood ratio over levels, answers as independent.
+    less where second, mean over levels.
     """
 
     difference_percent: float | None = None
@@ -36,9 +36,6 @@ class OrderTest:
     t: float | None = None
     degrees_of_freedom: int | None = None
     p_value: float | None = None
-    chi_square: float | None = None
-    chi_square_degrees_of_freedom: int | None = None
-    chi_square_p_value: float | None = None
     note: str = ""
 
 
@@ -58,7 +55,7 @@ def shares_by_order(given: pd.DataFrame) -> tuple[OrderShare, ...]:
 
 
 def order_test(given: pd.DataFrame) -> OrderTest:
-    """Test that a pair is answered alike in both orders, as both rules have it.
+    """Test that a pair is answered alike in both orders, as differencing has it.
 
     Parameters
     ----------
@@ -77,7 +74,7 @@ def order_test(given: pd.DataFrame) -> OrderTest:
     shares = different.groupby(keys).mean().unstack().dropna()
     gaps = (shares[True] - shares[False]).groupby(level=0).mean().to_numpy(dtype=np.float64)
     test = estimates.in_percent(estimates.mean_test(gaps, 0.0))
-    found = OrderTest(
+    return OrderTest(
         difference_percent=test.mean,
         low=test.low,
         high=test.high,
@@ -85,30 +82,4 @@ def order_test(given: pd.DataFrame) -> OrderTest:
         degrees_of_freedom=test.degrees_of_freedom,
         p_value=test.p_value,
         note=test.note,
-    )
-    return _with_ratio(found, different, known["difference_frames"], first)
-
-
-def _with_ratio(
-    found: OrderTest, different: pd.Series[float], levels: pd.Series[float], first: pd.Series[bool]
-) -> OrderTest:
-    """The test with the likelihood ratio of a share a level and order against one a level."""
-
-    def log_likelihood(keys: list[pd.Series[Any]]) -> tuple[float, int]:
-        from scipy.special import xlogy
-
-        sums = different.groupby(keys).agg(["sum", "count"])
-        yes, shown = sums["sum"].to_numpy(dtype=np.float64), sums["count"].to_numpy(dtype=np.float64)
-        return float((xlogy(yes, yes / shown) + xlogy(shown - yes, 1 - yes / shown)).sum()), len(yes)
-
-    (free, cells), (held, fewer) = log_likelihood([levels, first]), log_likelihood([levels])
-    freedom = cells - fewer
-    if freedom < 1:
-        return found
-    ratio = max(2 * (free - held), 0.0)
-    return replace(
-        found,
-        chi_square=ratio,
-        chi_square_degrees_of_freedom=freedom,
-        chi_square_p_value=estimates.chi_square_probability(ratio, freedom),
     )

@@ -66,7 +66,7 @@ def test_the_answer_and_the_report_say_which_threshold_is_which(found: SameDiffe
     assert section is not None
     tables = {table.name: table for table in (*section.tables, *section.folded)}
     estimates = [row["estimate"] for row in tables["jnd_thresholds"].rows]
-    assert estimates.count("staircases, mean of the last 10 reversals (70.7%)") == 2
+    assert estimates.count("staircases, mean of the last 10 reversals (70.7%)") == 1
     assert [row["estimate"] for row in tables["jnd_recovery"].rows].count("staircases") == 2
     assert len(tables["jnd_staircases"].rows) == 48
     tracks = next(drawing for drawing in section.drawings if drawing.name == "jnd_tracks")

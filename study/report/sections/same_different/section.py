@@ -13,7 +13,7 @@ from study.analysis.analyse import Analysis
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import Side, Threshold
 from study.analysis.same_different.mixed import MixedThresholds
-from study.analysis.same_different.model import EqualSlopes, ModelFit
+from study.analysis.same_different.model import ModelFit
 from study.analysis.same_different.motions import AcrossMotions
 from study.analysis.same_different.staircases import Staircases
 from study.counting import counted
@@ -206,13 +206,11 @@ def _notes(result: SameDifferent) -> list[str]:
         notes.append(_mixed_note(result.mixed))
     elif result.mixed_note:
         notes.append(f"No mixed model was fitted: {result.mixed_note}.")
-    if result.rules.independent:
-        notes.append(result.rules.answer)
     order = result.order_test
     if order.p_value is not None and order.difference_percent is not None:
         notes.append(
             f"By order: {words.signed(order.difference_percent)} percentage points more “different” if the "
-            f"reference came first, {words.p(order.p_value)} over participants; both rules predict no effect of order."
+            f"reference came first, {words.p(order.p_value)} over participants; differencing predicts none."
         )
     notes += _across_motions(result.across_motions)
     effect, likeness = result.clustering.design_effect, result.clustering.intraclass_correlation
@@ -231,15 +229,6 @@ def _model_notes(model: ModelFit) -> list[str]:
         f"criterion is {model.criterion:.2f} standard deviations of an impression, the lapse rate "
         f"{100 * model.lapse:.1f}%."
     ]
-    fit = model.fit_p_value
-    if fit is not None:
-        says = "the curve fits" if fit >= 0.05 else "the curve does not fit closely"
-        notes.append(
-            f"Deviance from free percentages {model.fit_deviance:.1f} on "
-            f"{counted(model.fit_degrees_of_freedom, 'degree')} of freedom, {words.p(fit)}: {says}."
-        )
-    if model.equal_slopes:
-        notes.append(_equal_slopes(model.equal_slopes))
     if model.note:
         notes.append(f"Caution: {model.note}.")
     return notes
@@ -253,16 +242,6 @@ def _mixed_note(mixed: MixedThresholds) -> str:
         f"{words.p(mixed.alike_p_value)} (likelihood ratio)."
     )
     return f"{text} Caution: {mixed.note}." if mixed.note else text
-
-
-def _equal_slopes(test: EqualSlopes) -> str:
-    people = test.p_value_participants_independent
-    text = (
-        f"One frame longer is seen {test.slope_ratio_longer_to_shorter:.2f} times as well as one frame shorter; "
-        f"likelihood ratio {test.likelihood_ratio:.2f} on 1 degree of freedom, "
-        f"{words.p(test.p_value_answers_independent)}"
-    )
-    return text + (f"; over participants {words.p(people)}." if people is not None else ".")
 
 
 def _across_motions(test: AcrossMotions) -> list[str]:
@@ -302,7 +281,8 @@ def _methods(found: Collection[SameDifferent], analysis: Analysis) -> str:
         "participants, and on a differencing model of the same-different task (Macmillan & Creelman 2005: one "
         "criterion, a slope each for shorter and longer blends, a lapse rate of at most 10%), fitted by maximum "
         "likelihood to all answers, with intervals by Student’s t of the logarithm from a jackknife over "
-        "participants; profile-likelihood intervals are given beside them."
+        "participants. The median observer’s thresholds are those of a mixed model in which participants have "
+        "log-normal sensitivities and criteria."
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
@@ -15,75 +14,53 @@ SIDES: tuple[tuple[Side, str], ...] = (("longer", "+"), ("shorter", "−"))
 
 
 def _threshold_rows(entry: SameDifferent | MotionThresholds, fps: float) -> list[dict[str, Any]]:
-    """Every reading of the thresholds of all motions together, or of one."""
-    kinds = [("linear interpolation (as published)", entry.published)]
+    """One row an estimate of the thresholds, of all motions together or of one: both sides beside each other."""
+    kinds: list[tuple[str, Mapping[Side, Threshold]]] = []
+    if isinstance(entry, SameDifferent) and (mixed := entry.mixed):
+        kinds += [("median observer", mixed.typical), ("all observers’ mean", mixed.population)]
     if model := entry.model:
-        kinds += [("model", model.jnd), ("model", _profiled(entry))]
-        kinds += [("model, best criterion", model.corrected), ("model, Abbott’s correction", model.guess_corrected)]
+        kinds += [("group’s curve", model.jnd), ("best criterion", model.corrected)]
+    kinds.append(("linear interpolation (as published)", entry.published))
     if isinstance(entry, SameDifferent) and (staircases := entry.staircases):
         share = f"{100 * staircases.target:.1f}%"
         kinds.append((f"staircases, mean of the last {staircases.averaged} reversals ({share})", staircases.thresholds))
-    if isinstance(entry, SameDifferent) and (mixed := entry.mixed):
-        kinds += [("mixed model, median observer", mixed.typical), ("mixed model, group", mixed.population)]
-    return [
-        vars(found)
-        | {"estimate": label, "interval": _interval_by(found), "remark": found.note}
-        | {"seconds": found.frames / fps if found.frames is not None else None}
-        | {"low": found.interval.low, "high": found.interval.high}
-        for label, thresholds in kinds
-        for side, _ in SIDES
-        if (found := thresholds.get(side))
-    ]
+    rows = []
+    for label, thresholds in kinds:
+        row: dict[str, Any] = {"estimate": label, "remark": _remarks(thresholds)}
+        for side, found in thresholds.items():
+            row |= {side: found.frames, f"{side}_low": found.interval.low, f"{side}_high": found.interval.high}
+            row[f"{side}_seconds"] = found.frames / fps if found.frames is not None else None
+            row[f"{side}_standard_error"] = found.standard_error
+        rows.append(row)
+    return rows
 
 
-def _interval_by(threshold: Threshold) -> str:
-    """What made the interval, as far as the method names it."""
-    names = {
-        "Fieller": "Fieller",
-        "jackknife": "jackknife",
-        "one participant": "one participant",
-        "profile": "profile likelihood",
-        "reversals": "Student’s t",
-    }
-    return next((name for part, name in names.items() if part in threshold.method), "curvature")
+def _remarks(thresholds: Mapping[Side, Threshold]) -> str:
+    return "; ".join(f"{side}: {found.note}" for side, found in thresholds.items() if found.note)
 
 
-def _profiled(entry: SameDifferent | MotionThresholds) -> dict[Side, Threshold]:
-    """The model's thresholds with intervals by profile likelihood; none for single motions."""
-    if not isinstance(entry, SameDifferent) or entry.model is None:
-        return {}
-    jnd = entry.model.jnd
-    return {
-        side: replace(jnd[side], interval=found, standard_error=None, note="", method="profile")
-        for side, found in entry.profile.items()
-        if side in jnd
-    }
-
-
-_THRESHOLDS = "estimate side frames seconds standard_error low high interval remark"
+_SHORTER, _LONGER = (
+    f"{side} {side}_seconds {side}_standard_error {side}_low {side}_high" for side in ("shorter", "longer")
+)
+_THRESHOLDS = f"estimate {_SHORTER} {_LONGER} remark"
+_FILES_ONLY = "shorter_seconds shorter_standard_error longer_seconds longer_standard_error"
 
 
 def threshold_table(name: str, result: SameDifferent, fps: float) -> Table:
-    """Return the thresholds as published and corrected."""
+    """Return the thresholds, one row an estimate."""
     percent = f"{100 * result.level:.0f}%"
     rows = _threshold_rows(result, fps)
     return make(
         f"{name}_thresholds",
-        f"The just noticeable difference, as published and corrected. Linear interpolation: where {percent} of the "
-        "answers "
-        "are “different”, interpolated between the levels; this depends on the false-alarm rate and is biased for a "
-        f"curved function. Model: the same {percent} on the fitted curve. Best criterion: the difference at which an "
-        f"observer with the best criterion would be right in {percent} of same and different pairs, whatever "
-        "criterion the participants used"
-        ". Abbott: corrected for false alarms as guesses. Mixed model: participants with individual sensitivities and "
-        "criteria: the median one, and the mean of all. Fieller’s and the "
-        "jackknife’s intervals are over participants, the curvature’s rest on the mixed model; profile likelihood "
-        "treats all answers as independent and is too narrow if participants differ"
-        ". A dash: the interval reaches beyond the levels shown.",
+        f"The just noticeable difference in frames, with 95% intervals. Where {percent} of the answers are "
+        "“different”: of the median observer and over all observers, by a mixed model of participants with individual "
+        "sensitivities and criteria; on one curve fitted to all answers (jackknife over participants); and by linear "
+        "interpolation between the levels (Fieller), which depends on the levels and is biased for a curved function. "
+        f"Best criterion: the difference at which an observer with the best criterion would be right in {percent} of "
+        "same and different pairs; it alone does not move with the false-alarm rate. A dash: beyond the levels shown.",
         _THRESHOLDS,
         rows,
-        headings={"interval": "interval by"},
-        files_only="" if any(row["remark"] for row in rows) else "remark",
+        files_only=_FILES_ONLY + ("" if any(row["remark"] for row in rows) else " remark"),
     )
 
 
@@ -99,8 +76,7 @@ def motion_table(name: str, result: SameDifferent, fps: float) -> Table:
         "Thresholds for every motion by itself, in frames.",
         f"motion answers {_THRESHOLDS}",
         rows,
-        headings={"interval": "interval by"},
-        files_only="answers seconds remark",
+        files_only=f"answers {_FILES_ONLY} remark",
     )
 
 
@@ -120,8 +96,9 @@ def d_prime_table(name: str, result: SameDifferent) -> Table:
     return make(
         f"{name}_d_prime",
         "Sensitivity at every level. Under the differencing rule, against the pairs without a difference; answers "
-        "pooled, treated as independent; one half added to each count.",
-        "difference_frames d_prime standard_error low high criterion",
+        "pooled, treated as independent; one half added to each count. Beside it what the same answers mean under the "
+        "rule of independent observations.",
+        "difference_frames d_prime standard_error low high criterion d_prime_independent",
         [vars(row) for row in result.d_prime],
     )
 
