@@ -17,14 +17,6 @@ HOLM_1979 = (
     "Holm, S. (1979). A simple sequentially rejective multiple test procedure. Scandinavian Journal of Statistics, 6, "
     "65–70."
 )
-LIANG_1986 = (
-    "Liang, K.-Y., & Zeger, S. L. (1986). Longitudinal data analysis using generalized linear models. Biometrika, 73, "
-    "13–22."
-)
-MANCL_2001 = (
-    "Mancl, L. A., & DeRouen, T. A. (2001). A covariance estimator for GEE with improved small-sample properties. "
-    "Biometrics, 57, 126–134."
-)
 SCHUIRMANN_1987 = (
     "Schuirmann, D. J. (1987). A comparison of the two one-sided tests procedure and the power approach. Journal of "
     "Pharmacokinetics and Biopharmaceutics, 15, 657–680."

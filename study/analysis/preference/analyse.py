@@ -19,7 +19,7 @@ from study.analysis.headline import Headline
 from study.analysis.preference.answers import preference_answers
 from study.analysis.preference.bradley_terry import BradleyTerry, fit_bradley_terry
 from study.analysis.preference.default_test import DefaultTest, default_test
-from study.analysis.preference.models import PreferenceModels, preference_models
+from study.analysis.preference.mixed import MixedPreference, mixed_preference
 from study.analysis.preference.motions import MotionsAsSample, motions_as_sample
 from study.analysis.preference.no_effect import MARGIN, NoEffect, no_preference
 from study.analysis.preference.order import ONE_ORDER, OrderEffect, order_effect
@@ -38,7 +38,6 @@ class Comparison:
 
     `published` leaves `ties` out, the other tests take them as half an answer; `default` is the test that the sentence
     in `answer` rests on.
-    `models` is None where they were not asked for.
     """
 
     method_a: str
@@ -53,7 +52,7 @@ class Comparison:
     no_preference: NoEffect
     default: DefaultTest
     answer: str
-    models: PreferenceModels | None
+    mixed: MixedPreference
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,6 @@ def compare(
     confidence: float = 0.95,
     alpha: float = 0.05,
     *,
-    models: bool = True,
     margin: float = MARGIN,
 ) -> tuple[Comparison, ...]:
     """Analyse every pair of methods that was compared, in the order of first appearance.
@@ -109,8 +107,6 @@ def compare(
         Of the intervals.
     alpha
         Level of significance that the sentence in `answer` speaks of.
-    models
-        Whether to fit mixed models and estimating equations too, which takes longer.
     margin
         Of the equivalence test: the difference from an even split that still counts as none (0.1 is 40 to 60%).
     """
@@ -138,7 +134,7 @@ def compare(
                 no_preference=no_preference(chosen[shown > 0] / shown[shown > 0], margin),
                 default=default,
                 answer=_order_in_words(*names, order, alpha) or _in_words(*names, published, default, order, alpha),
-                models=preference_models(part, confidence) if models else None,
+                mixed=mixed_preference(part, confidence),
             )
         )
     return tuple(results)

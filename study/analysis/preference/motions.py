@@ -19,19 +19,6 @@ FEWEST_MOTIONS = 3
 
 
 @dataclass(frozen=True)
-class ByMotion:
-    """One share a motion against one half, by Student's t; it takes the participants as they are."""
-
-    motions: int
-    mean_percent: float
-    low: float | None
-    high: float | None
-    t: float | None
-    degrees_of_freedom: int | None
-    p_value: float | None
-
-
-@dataclass(frozen=True)
 class BothVary:
     """The share with an error that lets participants and motions vary, by Student's t; see `crossed`."""
 
@@ -46,9 +33,8 @@ class BothVary:
 
 @dataclass(frozen=True)
 class MotionsAsSample:
-    """Tests that take the motions for a sample; `note` says why something can't be given."""
+    """The test that takes participants and motions for samples; `note` says why it can't be given."""
 
-    by_motion: ByMotion | None
     both: BothVary | None
     note: str
 
@@ -62,23 +48,10 @@ def motions_as_sample(part: pd.DataFrame, confidence: float = 0.95) -> MotionsAs
         Columns `participant`, `motion`, `chose_a` (0, 1, or one half for a tie).
     """
     if "motion" not in part.columns or part["motion"].nunique() < 2:
-        return MotionsAsSample(None, None, "fewer than two motions: they can't represent other motions")
-    shares = part.groupby(part["motion"].astype(str))["chose_a"].mean().to_numpy(dtype=np.float64)
-    test = estimates.in_percent(estimates.mean_test(shares, 0.5, confidence))
-    by_motion = ByMotion(
-        motions=test.participants,
-        mean_percent=100 * float(shares.mean()),
-        low=None if test.low is None else max(test.low, 0.0),
-        high=None if test.high is None else min(test.high, 100.0),
-        t=test.t,
-        degrees_of_freedom=test.degrees_of_freedom,
-        p_value=test.p_value,
-    )
-    if by_motion.motions < FEWEST_MOTIONS:
-        both, note = None, "fewer than three motions: how far motions differ is not known"
-    else:
-        both, note = _both_vary(part, confidence)
-    return MotionsAsSample(by_motion, both, note or test.note.replace("participants", "motions"))
+        return MotionsAsSample(None, "fewer than two motions: they can't represent other motions")
+    if part["motion"].astype(str).nunique() < FEWEST_MOTIONS:
+        return MotionsAsSample(None, "fewer than three motions: how far motions differ is not known")
+    return MotionsAsSample(*_both_vary(part, confidence))
 
 
 def _both_vary(part: pd.DataFrame, confidence: float) -> tuple[BothVary | None, str]:

@@ -19,8 +19,7 @@ STUDENT, SIGN = "Student's t over participants", "exact sign test"
 class ParticipantTests:
     """The preference with one number a participant; `note` says why something can't be given.
 
-    `test` and `p_value` are those of `default_p_values`; the robust chi-square is the pooled difference over its
-    variance between participants, referred to F(1, participants - 1).
+    `test` and `p_value` are those of `default_p_values`.
     """
 
     participants: int
@@ -33,8 +32,6 @@ class ParticipantTests:
     p_value: float | None
     test: str
     wilcoxon_p_value: float | None
-    robust_chi_square: float | None
-    robust_p_value: float | None
     for_a: int
     for_b: int
     undecided: int
@@ -79,7 +76,7 @@ def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0
     share = yes[total > 0] / total[total > 0]
     test = estimates.in_percent(estimates.mean_test(share, 0.5, confidence))
     p_value = float(default_p_values(yes, total)) if test.participants > 1 else None
-    robust, by_ranks = _robust_chi_square(yes, total), signed_rank(share - 0.5)
+    by_ranks = signed_rank(share - 0.5)
     return ParticipantTests(
         participants=test.participants,
         mean_percent=test.mean,
@@ -91,22 +88,8 @@ def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0
         p_value=p_value,
         test="none" if p_value is None else SIGN if test.p_value is None else STUDENT,
         wilcoxon_p_value=by_ranks,
-        robust_chi_square=robust,
-        robust_p_value=None if robust is None else estimates.f_probability(robust, 1, test.participants - 1),
         for_a=int((share > 0.5).sum()),
         for_b=int((share < 0.5).sum()),
         undecided=int((share == 0.5).sum()),
         note="; ".join(filter(None, (test.note, NO_RANKS if by_ranks is None else ""))),
     )
-
-
-def _robust_chi_square(chosen: FloatArray, shown: FloatArray) -> float | None:
-    """Squared pooled difference from an even split over its variance between participants."""
-    count = int((shown > 0).sum())
-    if count < 2:
-        return None
-    pooled = chosen.sum() / shown.sum()
-    variance = float(((chosen - shown * pooled) ** 2).sum()) * count / (count - 1)
-    if variance <= 1e-12:
-        return None
-    return float((chosen.sum() - shown.sum() / 2) ** 2) / variance

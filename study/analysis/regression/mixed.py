@@ -292,19 +292,3 @@ def _correlation(root: FloatArray, spread: FloatArray) -> float | None:
     if len(root) < 2 or (spread < NO_SPREAD).any():
         return None
     return float(root[0] @ root[1] / (spread[0] * spread[1]))
-
-
-def marginal_share(fit: MixedFit, row: ArrayLike, random_row: ArrayLike = (1.0,), nodes: int = 41) -> float:
-    """Return the share of "yes" over all participants, for one row of the design.
-
-    A typical participant's share is further from one half than this one: participants who differ flatten the mean.
-    """
-    design, own = np.asarray(row, float), np.asarray(random_row, float)
-    variance = float((own[0] * fit.spread[0]) ** 2)
-    if len(own) > 1:
-        both = (fit.correlation or 0.0) * fit.spread[0] * fit.spread[1]
-        variance += float((own[1] * fit.spread[1]) ** 2 + 2 * own[0] * own[1] * both)
-    points, weights = np.polynomial.hermite_e.hermegauss(nodes)
-    eta = float(design @ np.array([effect.value for effect in fit.effects])) + math.sqrt(variance) * points
-    shares = fit.guess + (1 - fit.guess - fit.lapse) * LINKS[fit.link].curve(eta)
-    return float((weights * shares).sum() / weights.sum())

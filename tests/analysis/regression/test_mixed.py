@@ -11,9 +11,9 @@ from scipy.integrate import quad
 from scipy.special import expit
 from scipy.stats import norm
 
-from study.analysis.preference.models import preference_models
+from study.analysis.preference.mixed import mixed_preference
 from study.analysis.psychometric.mixed import psychometric_mixed
-from study.analysis.regression.mixed import MixedFit, fit_mixed, marginal_share
+from study.analysis.regression.mixed import MixedFit, fit_mixed
 from study.errors import AnalysisError
 
 
@@ -67,36 +67,11 @@ def test_a_typical_participant_is_further_from_one_half_than_the_population() ->
     first = np.tile([True, False], people * 4)
     who = np.repeat(np.arange(people), 8)
     chosen = rng.random(people * 8) < expit(np.log(chance / (1 - chance))[who] + np.where(first, 0.4, -0.4))
-    found = preference_models(pd.DataFrame({"participant": who, "chose_a": chosen.astype(float), "a_first": first}))
-    mixed, gee = found.mixed, found.gee
+    mixed = mixed_preference(pd.DataFrame({"participant": who, "chose_a": chosen.astype(float), "a_first": first}))
     assert mixed.percent == pytest.approx(100 * expit(1.2), abs=6)
     assert mixed.participants_spread == pytest.approx(1.5, abs=0.4)
     assert mixed.order_logit == pytest.approx(0.8, abs=0.4)
-    assert gee.percent < mixed.percent - 2
-    assert gee.percent == pytest.approx(100 * chance.mean(), abs=4)
-    assert mixed.population_percent == pytest.approx(gee.percent, abs=2)
-    assert "nearer to one half" in found.differ
-
-
-def test_gee_standard_error_is_that_of_the_participants() -> None:
-    """With equal numbers of answers the estimating equations' mean is the mean of the participants' shares."""
-    rng = np.random.default_rng(4)
-    chosen = rng.random((30, 8)) < rng.beta(3, 2, size=(30, 1))
-    data = pd.DataFrame({"participant": np.repeat(np.arange(30), 8), "chose_a": chosen.ravel().astype(float)})
-    found = preference_models(data).gee
-    shares = chosen.mean(axis=1)
-    assert found.percent == pytest.approx(100 * shares.mean(), abs=1e-4)
-    error = shares.std(ddof=1) / np.sqrt(30)
-    half = (found.high - found.low) / 200
-    assert half == pytest.approx(2.045 * error, rel=0.06)
-
-
-def test_marginal_share_is_an_average_over_participants() -> None:
-    yes = group(np.random.default_rng(5), 50, 30, 1.0, 1.2)
-    fit = fit_mixed(np.ones((50, 1)), np.ones((50, 1)), yes, np.full(50, 30.0), range(50))
-    assert isinstance(fit, MixedFit)
-    drawn = expit(fit.effects[0].value + fit.spread[0] * np.random.default_rng(0).normal(size=400_000)).mean()
-    assert marginal_share(fit, [1.0]) == pytest.approx(float(drawn), abs=2e-3)
+    assert 100 * chosen.mean() < mixed.percent - 2
 
 
 @pytest.mark.parametrize(
@@ -116,12 +91,10 @@ def test_missing_cells_and_empty_data() -> None:
     everyone_the_same = fit_mixed(np.ones((6, 1)), np.ones((6, 1)), [4] * 6, [8] * 6, range(6))
     assert isinstance(everyone_the_same, MixedFit)
     assert "spread" in everyone_the_same.note
-    three = pd.DataFrame({"participant": list("aabbcc"), "chose_a": [1.0, 0, 1, 1, 0, 1]})
-    assert "too few" in preference_models(three).gee.note
     alike = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": 1.0})
-    assert preference_models(alike).mixed.percent is None
+    assert mixed_preference(alike).percent is None
     separated = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": [1.0, 0] * 5, "a_first": [True, False] * 5})
-    assert preference_models(separated).mixed.note
+    assert mixed_preference(separated).note
 
 
 def test_refusals() -> None:

@@ -22,8 +22,6 @@ from study.report.references import (
     BRADLEY_1952,
     CLARK_1973,
     HOLM_1979,
-    LIANG_1986,
-    MANCL_2001,
     ROUDER_2009,
     SATTERTHWAITE_1946,
     SCHUIRMANN_1987,
@@ -147,7 +145,6 @@ def _notes(comparison: Comparison) -> list[str]:
         test = f", {words.p(order.p_value)} over participants" if order.p_value is not None else ""
         notes.append(f"The transition shown first was favoured in {order.first_percent:.1f}% of the answers{test}.")
     notes += _no_preference(comparison.no_preference)
-    notes += [comparison.models.differ] if comparison.models and comparison.models.differ else []
     return notes
 
 
@@ -181,18 +178,12 @@ def preference_table(name: str, comparison: Comparison) -> Table:
         f"{name}_preference",
         f"Percent favouring {first} over {second}. As published: all answers as independent (Wilson’s interval), "
         "which a participant’s "
-        "answers are not. Corrected: each participant’s percentage, by Student’s t and by ranks; and the "
-        "pooled percentage with its variance over participants. Orders balanced: the mean of the percentages with the "
-        "first method shown first and second. A typical participant and the population: models with a term for the "
-        "order, which differ where participants do. Other motions: tests that take the motions for a sample too. The "
+        "answers are not. Corrected: each participant’s percentage, by Student’s t and by ranks. Orders balanced: the "
+        "mean of the percentages with the first method shown first and second. A typical participant: a model with a "
+        "term for the order. Other participants and motions: the test that takes both for samples. The "
         f"default test is {comparison.default.test}.",
         "reading percent low:one high:one test statistic p_value",
-        [
-            *_published_rows(comparison),
-            *_corrected_rows(comparison),
-            *_model_rows(comparison),
-            *_sample_rows(comparison),
-        ],
+        [*_published_rows(comparison), *_corrected_rows(comparison), *_model_rows(comparison)],
     )
 
 
@@ -214,40 +205,20 @@ def _corrected_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return [
         {"reading": "corrected", "percent": people.mean_percent, **ends, "test": test, "statistic": people.t},
         {"reading": "corrected, by ranks", "test": "Wilcoxon", "p_value": people.wilcoxon_p_value},
-        {
-            "reading": "corrected, pooled",
-            "test": f"F(1, {people.participants - 1})" if people.robust_chi_square is not None else "none",
-            "statistic": people.robust_chi_square,
-            "p_value": people.robust_p_value,
-        },
         {"reading": "orders balanced", "percent": comparison.order.balanced_percent, "test": ""},
     ]
 
 
 def _model_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """The mixed model and the estimating equations, where they could be fitted."""
-    if comparison.models is None:
-        return []
-    mixed, gee = comparison.models.mixed, comparison.models.gee
-    names = ((mixed, "a typical participant", "logistic mixed model"), (gee, "the population", "GEE"))
-    return [
-        vars(model) | {"reading": reading, "test": test} for model, reading, test in names if model.percent is not None
-    ]
-
-
-def _sample_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Tests that hold for other motions, where several were shown."""
-    one, both = comparison.motions_as_sample.by_motion, comparison.motions_as_sample.both
-    rows: list[dict[str, Any]] = []
-    if one is not None:
-        rows.append(vars(one) | {"reading": "other motions", "percent": one.mean_percent})
+    """The mixed model, and the test that holds for other participants and motions, where they could be had."""
+    typical, both = comparison.mixed, comparison.motions_as_sample.both
+    rows = []
+    if typical.percent is not None:
+        rows.append(vars(typical) | {"reading": "a typical participant", "test": "logistic mixed model"})
     if both is not None:
-        rows.append(vars(both) | {"reading": "other participants and motions"})
-    tested = ((row, row["t"]) for row in rows)
-    return [
-        row | {"test": "none" if t is None else f"t({row['degrees_of_freedom']:.3g})", "statistic": t}
-        for row, t in tested
-    ]
+        test = {"test": f"t({both.degrees_of_freedom:.3g})", "statistic": both.t}
+        rows.append(vars(both) | {"reading": "other participants and motions"} | test)
+    return rows
 
 
 def motion_table(name: str, comparison: Comparison) -> Table:
@@ -270,16 +241,13 @@ def order_table(name: str, comparison: Comparison) -> Table:
         {"reading": f"{second} shown first: favouring {first}", "percent": order.percent_a_second},
         {"reading": "favouring the one shown first", "percent": order.first_percent, "p_value": order.p_value},
     ]
-    if models := comparison.models:
-        rows += [
-            {"reading": f"order in the {kind}", "order_logit": model.order_logit, "p_value": model.order_p_value}
-            for kind, model in (("mixed model", models.mixed), ("estimating equations", models.gee))
-            if model.order_logit is not None
-        ]
+    if (logit := comparison.mixed.order_logit) is not None:
+        rows.append({"reading": "order in the mixed model", "order_logit": logit})
+        rows[-1]["p_value"] = comparison.mixed.order_p_value
     return tables.make(
         f"{name}_order",
         "How far the order of presentation decided. Percentages of answers, with Student’s t over participants; and "
-        "what being shown first adds in the models, in logits.",
+        "what being shown first adds in the mixed model, in logits.",
         "reading percent order_logit p_value",
         rows,
     )
@@ -368,16 +336,15 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
     return (
         f"Preferences were tested by {test}.{family} Chi-square and exact binomial tests of all responses are given as "
         "published, with Wilson’s intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite "
-        "quadrature) and generalised estimating equations (Liang & Zeger 1986, covariance of Mancl & DeRouen 2001) "
-        "account for the order of presentation. Evidence for no preference is an equivalence test (Schuirmann 1987) "
-        "and a Bayes factor (Rouder et al. 2009)."
+        "quadrature) accounts for the order of presentation. Evidence for no preference is an equivalence test "
+        "(Schuirmann 1987) and a Bayes factor (Rouder et al. 2009)."
     )
 
 
 def _references(found: Collection[Preference]) -> set[str]:
     several = {BRADLEY_1952} if any(result.strengths for result in found) else set()
     several |= {CLARK_1973, SATTERTHWAITE_1946}
-    return {WILSON_1927, HOLM_1979, LIANG_1986, MANCL_2001, SCHUIRMANN_1987, ROUDER_2009} | several
+    return {WILSON_1927, HOLM_1979, SCHUIRMANN_1987, ROUDER_2009} | several
 
 
 KIND = SectionKind(
