@@ -1,7 +1,7 @@
 """How far tests of groups can be trusted: simulated studies, with and without an effect, through the real analysis.
 
 Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of preference, motions,
-crossed, models, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code that
+crossed, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code that
 the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
 """
 
@@ -15,7 +15,6 @@ import pandas as pd
 from scipy.special import expit, ndtr
 
 from study.analysis.preference.crossed import crossed
-from study.analysis.preference.models import preference_models
 from study.analysis.preference.motions import motions_as_sample
 from study.analysis.preference.no_effect import no_preference
 from study.analysis.preference.participants import participant_tests
@@ -43,7 +42,7 @@ def rate(p_values, alpha=0.05):
 def preference(studies, seed):
     """Type I error at nominal .05: the default test and those beside it; equivalence at the margin's edge."""
     print("preference: type I error at .05 (35 people, 8 answers); equivalence: error where the share is 60%")
-    print(f"{'correlation':>11} {'default':>8} {'Wilcoxon':>8} {'robust':>7} {'published':>9} {'equivalence':>11}")
+    print(f"{'correlation':>11} {'default':>8} {'Wilcoxon':>8} {'published':>9} {'equivalence':>11}")
     for correlation in CORRELATIONS:
         rng = np.random.default_rng([seed, 1, int(100 * correlation)])
         rows, edge = [], []
@@ -51,13 +50,11 @@ def preference(studies, seed):
             chosen = rng.binomial(8, shares(rng, 35, correlation)).astype(float)
             tests = participant_tests(chosen, np.full(35, 8.0))
             pooled = published_test(int(chosen.sum()), 280).p_value
-            rows.append((tests.p_value, tests.wilcoxon_p_value, tests.robust_p_value, pooled))
+            rows.append((tests.p_value, tests.wilcoxon_p_value, pooled))
             far = rng.binomial(8, shares(rng, 35, correlation, 0.6)) / 8
             edge.append(no_preference(far, 0.1).equivalence_p_value)
         rates = [rate(column) for column in zip(*rows, strict=True)]
-        print(
-            f"{correlation:11} " + "{:8.3f} {:8.3f} {:7.3f} {:9.3f}".format(*rates) + f" {rate(edge):11.3f}", flush=True
-        )
+        print(f"{correlation:11} " + "{:8.3f} {:8.3f} {:9.3f}".format(*rates) + f" {rate(edge):11.3f}", flush=True)
 
 
 def answers_of(chosen, first=None):
@@ -74,9 +71,9 @@ def answers_of(chosen, first=None):
 
 
 def motions(studies, seed):
-    """Type I error where motions differ too: over participants, over motions, over both. 3% of answers are missed."""
+    """Type I error where motions differ too: over participants, and over both. 3% of answers are missed."""
     print("motions: type I error at .05 where participants and motions differ (standard deviations in logits)")
-    print(f"{'people':>6} {'motions':>7} {'sd people':>9} {'sd motions':>10} {'people':>7} {'motions':>8} {'both':>6}")
+    print(f"{'people':>6} {'motions':>7} {'sd people':>9} {'sd motions':>10} {'people':>7} {'both':>6}")
     for people, count, own, other in (
         (35, 8, 0.0, 0.0), (35, 8, 0.7, 0.0), (35, 8, 0.0, 0.5), (35, 8, 0.7, 0.5), (35, 8, 1.2, 1.0), (12, 4, 0.7, 0.5)
     ):  # fmt: skip
@@ -88,9 +85,9 @@ def motions(studies, seed):
             by = part.groupby("participant")["chose_a"].agg(["sum", "count"]).to_numpy(dtype=float).T
             found = motions_as_sample(part)
             both = found.both.p_value if found.both else None
-            rows.append((participant_tests(*by).p_value, found.by_motion.p_value, both))
+            rows.append((participant_tests(*by).p_value, both))
         rates = [rate(column) for column in zip(*rows, strict=True)]
-        print(f"{people:6} {count:7} {own:9} {other:10} " + "{:7.3f} {:8.3f} {:6.3f}".format(*rates), flush=True)
+        print(f"{people:6} {count:7} {own:9} {other:10} " + "{:7.3f} {:6.3f}".format(*rates), flush=True)
 
 
 def crossed_test(studies, seed):
@@ -113,28 +110,6 @@ def crossed_test(studies, seed):
             print(f"{count:7} {other:10} {np.mean(found):6.3f} {min(found):7.3f} {max(found):8.3f}", flush=True)
 
 
-def models(studies, seed):
-    """Type I error and coverage of mixed model and estimating equations, with an order effect of 0.3 logits."""
-    print("models: type I error at .05, and coverage of 95% intervals where 65% is true of the population")
-    print(f"{'correlation':>11} {'mixed':>6} {'GEE':>6} {'GEE covers':>10} {'ms a study':>10}")
-    for correlation in CORRELATIONS:
-        rng, wrong, inside, spent = np.random.default_rng([seed, 3, int(100 * correlation)]), [], [], 0.0
-        for _ in range(studies):
-            first = rng.permuted(np.tile([True, False], (35, 4)), axis=1)
-            for mean, kept in ((0.5, wrong), (0.65, inside)):
-                own = np.clip(shares(rng, 35, correlation, mean), 1e-9, 1 - 1e-9)[:, None]
-                chance = expit(np.log(own / (1 - own)) + np.where(first, 0.15, -0.15))
-                started = time.process_time()
-                found = preference_models(answers_of(rng.random((35, 8)) < chance, first))
-                spent += time.process_time() - started
-                kept.append(found)
-        gee = [found.gee for found in inside if found.gee.percent is not None]
-        covers = np.mean([one.low <= 65 <= one.high for one in gee])
-        rates = [rate([getattr(found, name).p_value for found in wrong]) for name in ("mixed", "gee")]
-        print(f"{correlation:11} {rates[0]:6.3f} {rates[1]:6.3f} {covers:10.3f} {1000 * spent / studies / 2:10.1f}",
-              flush=True)  # fmt: skip
-
-
 def rating_answers(rng, people, better, own, place):
     """2003's study, one question of five points: two groups by order, two films each."""
     lenient = own * rng.normal(size=people)
@@ -150,7 +125,7 @@ def rating_answers(rng, people, better, own, place):
 def ratings(studies, seed):
     """Type I error and power of every test of the methods, by how alike one person's ratings are."""
     print("ratings: how often the methods are found to differ at .05 (26 people, two ratings each)")
-    names = ("published F", "t", "mixed design", "Wilcoxon", "rank F", "ordinal", "likelihood")
+    names = ("published F", "t", "mixed design", "Wilcoxon", "ordinal", "likelihood")
     print(f"{'people sd':>9} {'effect':>6}  " + "  ".join(names))
     for own, better in ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.7)):
         rng, rows, spent = np.random.default_rng([seed, 4, int(10 * own), int(10 * better)]), [], 0.0
@@ -168,7 +143,6 @@ def ratings(studies, seed):
 def _p_values(question):
     """The p-values of the methods, test by test."""
     within = {row.source: row for row in question.mixed_design.effects}
-    between = {row.source: row for row in question.ranks.between}
     ordinal = question.ordinal
     people = question.ranks.participants
     return (
@@ -176,7 +150,6 @@ def _p_values(question):
         question.difference.p_value,
         within["method"].p_value if within else None,
         people.p_value if people else None,
-        between["method"].p_value if between else None,
         ordinal.effects[0].p_value if ordinal.effects else None,
         ordinal.p_value,
     )
@@ -225,7 +198,6 @@ PARTS = {
     "preference": preference,
     "motions": motions,
     "crossed": crossed_test,
-    "models": models,
     "ratings": ratings,
     "mixed": mixed,
     "power": power,

@@ -1,14 +1,12 @@
 """Tests that use the order of values alone, ties included: values in, statistics and p-values out.
 
 For one difference a participant: Wilcoxon's signed ranks, exact. For several values a participant: Friedman's test in
-the form of Iman & Davenport 1980. For groups, one or two factors: the ANOVA-type statistic of Brunner, Dette & Munk
-1997, which needs no common variance and no normal distribution, so that it suits points on a scale.
+the form of Iman & Davenport 1980.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,17 +31,6 @@ class Friedman:
     f: float | None
     degrees_of_freedom: int
     error_degrees_of_freedom: int
-    p_value: float
-
-
-@dataclass(frozen=True)
-class RankEffect:
-    """An effect between groups, tested on ranks."""
-
-    source: str
-    f: float
-    degrees_of_freedom: float
-    error_degrees_of_freedom: float
     p_value: float
 
 
@@ -115,42 +102,3 @@ def friedman(values: ArrayLike) -> Friedman | None:
     f = math.inf if alike else (people - 1) * chi_square / left
     p_value = math.factorial(levels) ** (1 - people) if alike else estimates.f_probability(f, *degrees)
     return Friedman(chi_square, None if alike else f, *degrees, float(p_value))
-
-
-def anova_type(
-    values: ArrayLike, cells: ArrayLike, contrasts: Mapping[str, FloatArray]
-) -> tuple[RankEffect, ...] | str:
-    """Test contrasts between groups on ranks; a sentence that says why where that can't be.
-
-    Parameters
-    ----------
-    values : array_like, shape (answers,)
-        All independent of each other.
-    cells : array_like of int, shape (answers,)
-        Group of each, 0 to groups - 1.
-    contrasts
-        For each effect a matrix, shape (rows, groups), whose rows sum to zero.
-    """
-    y, group = np.asarray(values, dtype=np.float64), np.asarray(cells, dtype=np.intp)
-    sizes = np.bincount(group)
-    if (sizes < 2).any():
-        return "a group with fewer than two answers: ranks can't be compared"
-    ranks = mid_ranks(y)
-    means = np.bincount(group, ranks) / sizes
-    spread = np.bincount(group, (ranks - means[group]) ** 2) / (sizes - 1) / sizes
-    if spread.sum() <= 1e-12:
-        return "the answers of each group are all alike: there is no spread to judge by"
-    return tuple(_one_contrast(name, matrix, means, spread, sizes) for name, matrix in contrasts.items())
-
-
-def _one_contrast(
-    name: str, matrix: FloatArray, means: FloatArray, spread: FloatArray, sizes: NDArray[np.int64]
-) -> RankEffect:
-    projection = matrix.T @ np.linalg.pinv(matrix @ matrix.T) @ matrix
-    weighted = projection * spread
-    scale = float(np.trace(weighted))
-    own = np.diag(projection) * spread
-    degrees = scale**2 / float(np.trace(weighted @ weighted))
-    error_degrees = float(own.sum()) ** 2 / float((own**2 / (sizes - 1)).sum())
-    f = float(means @ projection @ means) / scale
-    return RankEffect(name, f, degrees, error_degrees, estimates.f_probability(f, degrees, error_degrees))

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from study.analysis.rank_tests import anova_type, friedman, signed_rank
-
-TWO_GROUPS = {"group": np.array([[1.0, -1.0]])}
+from study.analysis.rank_tests import friedman, signed_rank
 
 
 def test_signed_ranks_against_scipy() -> None:
@@ -43,38 +41,3 @@ def test_friedman_where_all_rank_alike_or_not_at_all() -> None:
     assert alike.p_value == pytest.approx(6.0**-4)
     assert friedman(np.ones((5, 3))) is None
     assert friedman(np.array([[1.0, 2.0]])) is None
-
-
-def test_two_groups_are_compared_as_welch_compares_ranks() -> None:
-    rng = np.random.default_rng(4)
-    values = np.concatenate([rng.integers(0, 5, 15), rng.integers(1, 5, 22)]).astype(float)
-    cells = np.repeat([0, 1], [15, 22])
-    found = anova_type(values, cells, TWO_GROUPS)
-    assert not isinstance(found, str)
-    ranks = stats.rankdata(values)
-    expected = stats.ttest_ind(ranks[:15], ranks[15:], equal_var=False)
-    assert found[0].f == pytest.approx(expected.statistic**2)
-    assert found[0].error_degrees_of_freedom == pytest.approx(expected.df)
-    assert found[0].p_value == pytest.approx(expected.pvalue)
-
-
-def test_a_two_by_two_design_keeps_its_level_with_unequal_spread() -> None:
-    """Points on a scale, more scattered in one cell, with fewer people in it."""
-    rng = np.random.default_rng(5)
-    a, b = np.array([-1.0, -1, 1, 1]), np.array([-1.0, 1, -1, 1])
-    contrasts = {"a": a[None], "b": b[None], "a x b": (a * b)[None]}
-    sizes, spreads = (8, 14, 14, 16), (1.6, 0.8, 0.8, 0.8)
-    wrong = np.zeros(3)
-    for _ in range(1500):
-        parts = [
-            np.clip(np.round(2 + spread * rng.normal(size=n)), 0, 4) for n, spread in zip(sizes, spreads, strict=True)
-        ]
-        found = anova_type(np.concatenate(parts), np.repeat(np.arange(4), sizes), contrasts)
-        assert not isinstance(found, str)
-        wrong += [row.p_value < 0.05 for row in found]
-    assert wrong / 1500 == pytest.approx(np.full(3, 0.05), abs=0.022)
-
-
-def test_groups_without_spread_or_with_one_answer_are_said() -> None:
-    assert "all alike" in anova_type([1.0, 1, 2, 2], [0, 0, 1, 1], TWO_GROUPS)
-    assert "fewer than two" in anova_type([1.0, 2, 3], [0, 1, 1], TWO_GROUPS)

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.rank_tests import NO_RANKS, Friedman, RankEffect, anova_type, friedman, signed_rank
+from study.analysis.rank_tests import NO_RANKS, Friedman, friedman, signed_rank
 from study.analysis.ratings.answers import first_seen, rated
 from study.analysis.regression.ordinal import OrdinalFit, fit_ordinal
-from study.analysis.variance.repeated_measures import Likeness, WithinEffect, likeness, mixed_design
+from study.analysis.variance.repeated_measures import WithinEffect, mixed_design
 from study.analysis.variance.two_way import TwoWay, two_way
 from study.errors import AnalysisError
 
@@ -42,7 +42,7 @@ class MethodDifference(estimates.MeanTest):
 
 
 @dataclass(frozen=True)
-class MixedDesign(Likeness):
+class MixedDesign:
     """Participants as random; those who did not rate every combination of `factors` are excluded."""
 
     effects: tuple[WithinEffect, ...]
@@ -67,9 +67,8 @@ class FriedmanTest(RankTest, Friedman):
 
 @dataclass(frozen=True)
 class Ranks:
-    """The published design on ranks, and the methods over participants; `note` says what can't be had."""
+    """The methods over participants on ranks; `note` says why they can't be compared."""
 
-    between: tuple[RankEffect, ...]
     participants: RankTest | None
     note: str
 
@@ -104,8 +103,8 @@ class Ordinal:
 class Question:
     """Methods compared in one question.
 
-    `anova` is as published, by type III sums of squares, and `type_ii` the same where the combinations have not as many
-    answers; `difference` is the only one of `differences` where there are two methods. `note` says what can't be had.
+    `anova` is as published, by type III sums of squares; `difference` is the only one of `differences` where there are
+    two methods. `note` says what can't be had.
     """
 
     item: str
@@ -113,16 +112,15 @@ class Question:
     answers: int
     anova: TwoWay | tuple[()]
     balanced: bool
-    type_ii: TwoWay | None
     differences: tuple[MethodDifference, ...]
     difference: MethodDifference | None
     mixed_design: MixedDesign
     ranks: Ranks
-    ordinal: Ordinal | None
+    ordinal: Ordinal
     note: str
 
 
-def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: bool = True) -> tuple[Question, ...]:
+def rating_anova(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[Question, ...]:
     """Analyse each question of a rating study by method and by order of presentation.
 
     Parameters
@@ -132,8 +130,6 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: boo
         questions. The order is the method that a participant saw first.
     confidence
         Of intervals; of effect sizes they are of 1 - 2 alpha (see `effect_sizes`).
-    models
-        Whether to fit the ordinal model too, which takes longer.
 
     Raises
     ------
@@ -145,38 +141,34 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95, *, models: boo
         return ()
     part["participant"], part["method_a"] = part["participant"].astype(str), part["method_a"].astype(str)
     part["order"] = part["participant"].map(first_seen(answers)) + " first"
-    return tuple(_question(str(name), group, confidence, models) for name, group in part.groupby("item", sort=False))
+    return tuple(_question(str(name), group, confidence) for name, group in part.groupby("item", sort=False))
 
 
-def _question(name: str, part: pd.DataFrame, confidence: float, models: bool) -> Question:
-    table, type_ii, note = _as_published(part, 1 - confidence)
-    differences = _differences(part, confidence)
+def _question(name: str, part: pd.DataFrame, confidence: float) -> Question:
+    table, note = _as_published(part, 1 - confidence)
+    differences, over = _differences(part, confidence), _ranks(part)
     return Question(
         item=name,
         participants=int(part["participant"].nunique()),
         answers=len(part),
         anova=table,
         balanced=bool(part.groupby(["method_a", "order"]).size().nunique() == 1),
-        type_ii=type_ii,
         differences=differences,
         difference=differences[0] if len(differences) == 1 else None,
         mixed_design=_mixed_design(part, 1 - confidence),
-        ranks=_ranks(part),
-        ordinal=_ordinal(part, confidence) if models else None,
+        ranks=Ranks(over, NO_RANKS if over is None else ""),
+        ordinal=_ordinal(part, confidence),
         note=note,
     )
 
 
-def _as_published(part: pd.DataFrame, alpha: float) -> tuple[TwoWay | tuple[()], TwoWay | None, str]:
-    """The analysis of variance between subjects by type III, by type II where that differs, and why not."""
-    factors = (part["rating"], part["method_a"], part["order"], ("method", "order"))
+def _as_published(part: pd.DataFrame, alpha: float) -> tuple[TwoWay | tuple[()], str]:
+    """The analysis of variance between subjects, and why there is none, or no F."""
     try:
-        table = two_way(*factors, alpha=alpha)
+        table = two_way(part["rating"], part["method_a"], part["order"], ("method", "order"), alpha)
     except AnalysisError as error:
-        return (), None, f"no analysis of variance: {error}"
-    note = "the ratings of each combination are all the same: no F" if table[0].f is None else ""
-    uneven = part.groupby(["method_a", "order"]).size().nunique() > 1
-    return table, two_way(*factors, squares="II", alpha=alpha) if uneven else None, note
+        return (), f"no analysis of variance: {error}"
+    return table, "the ratings of each combination are all the same: no F" if table[0].f is None else ""
 
 
 def _means(part: pd.DataFrame) -> pd.DataFrame:
@@ -220,7 +212,6 @@ def _mixed_design(part: pd.DataFrame, alpha: float) -> MixedDesign:
     if still := [row.source for row in effects if row.f is None]:
         note = f"participants do not vary in {', '.join(still)}: no F"
     return MixedDesign(
-        **vars(likeness(values, group)),
         effects=effects,
         factors=factors,
         participants=len(who),
@@ -244,32 +235,7 @@ def _complete(part: pd.DataFrame, people: int) -> tuple[FloatArray, list[str], t
     return wide.to_numpy(dtype=np.float64), list(wide.index), ("method",)
 
 
-def _ranks(part: pd.DataFrame) -> Ranks:
-    """The published design on ranks, and the methods over participants on ranks."""
-    methods, orders = sorted(part["method_a"].unique()), sorted(part["order"].unique())
-    between: tuple[RankEffect, ...] | str = "fewer than two orders, or more than two of either: no 2 x 2 design"
-    if len(methods) == len(orders) == 2:
-        first = (part["method_a"] == methods[1]).to_numpy(dtype=int)
-        second = (part["order"] == orders[1]).to_numpy(dtype=int)
-        a, b = np.array([-1.0, -1, 1, 1]), np.array([-1.0, 1, -1, 1])
-        contrasts = {"method": a[None], "order": b[None], "method x order": (a * b)[None]}
-        cells = 2 * first + second
-        counted = np.bincount(cells, minlength=4)
-        between = (
-            anova_type(part["rating"], cells, contrasts)
-            if counted.min() > 0
-            else "a combination of method and order has no answers"
-        )
-    over = _ranks_over_participants(part)
-    note = between if isinstance(between, str) else ""
-    return Ranks(
-        between=() if isinstance(between, str) else between,
-        participants=over,
-        note="; ".join(filter(None, (note, NO_RANKS if over is None else ""))),
-    )
-
-
-def _ranks_over_participants(part: pd.DataFrame) -> RankTest | None:
+def _ranks(part: pd.DataFrame) -> RankTest | None:
     wide = _means(part).dropna()
     if len(wide) < 2:
         return None

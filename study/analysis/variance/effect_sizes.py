@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from study.analysis.estimates import Interval
-
 LARGEST = 1e6
 
 
-@dataclass(frozen=True)
-class EffectSize:
-    """Shares of variance, 0 to 1.
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """How large an effect is, as shares of variance, 0 to 1; None where there is no F.
 
     Attributes
     ----------
@@ -24,19 +22,10 @@ class EffectSize:
         Sum of squares of the effect over itself and the error's.
     partial_omega_squared
         The same with the part that chance puts into the effect taken out; not below 0.
-    interval
-        Of the share in the population, of 1 - 2 alpha (90% for alpha .05): it holds 0 exactly where F is not
+    effect_low, effect_high
+        Interval of the share in the population, of 1 - 2 alpha (90% for alpha .05): it holds 0 exactly where F is not
         significant at alpha.
     """
-
-    partial_eta_squared: float
-    partial_omega_squared: float
-    interval: Interval
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sizes:
-    """The columns of a table that say how large an effect is; None where there is no F. The interval is of both."""
 
     partial_eta_squared: float | None = None
     partial_omega_squared: float | None = None
@@ -44,20 +33,7 @@ class Sizes:
     effect_high: float | None = None
 
 
-def sizes(f: float | None, degrees: float, error_degrees: float, alpha: float) -> Sizes:
-    """Return the columns of an effect, see `effect_size`."""
-    if f is None:
-        return Sizes()
-    found = effect_size(f, degrees, error_degrees, alpha)
-    return Sizes(
-        partial_eta_squared=found.partial_eta_squared,
-        partial_omega_squared=found.partial_omega_squared,
-        effect_low=found.interval.low,
-        effect_high=found.interval.high,
-    )
-
-
-def effect_size(f: float, degrees: float, error_degrees: float, alpha: float = 0.05) -> EffectSize:
+def sizes(f: float | None, degrees: float, error_degrees: float, alpha: float = 0.05) -> Sizes:
     """Return the size of an effect.
 
     Parameters
@@ -69,19 +45,18 @@ def effect_size(f: float, degrees: float, error_degrees: float, alpha: float = 0
 
     Examples
     --------
-    >>> round(effect_size(6.39, 1, 48).partial_eta_squared, 3)
+    >>> round(sizes(6.39, 1, 48).partial_eta_squared, 3)
     0.117
     """
-    f = max(f, 0.0)
-    omega = degrees * (f - 1) / (degrees * f + error_degrees + 1)
-    low = _noncentrality(f, degrees, error_degrees, 1 - alpha)
-    high = _noncentrality(f, degrees, error_degrees, alpha)
-    total = degrees + error_degrees + 1
-    ends = [None if end is None else end / (end + total) for end in (low, high)]
-    return EffectSize(
-        degrees * f / (degrees * f + error_degrees),
-        max(omega, 0.0),
-        Interval(ends[0], ends[1], 1 - 2 * alpha),
+    if f is None:
+        return Sizes()
+    f, total = max(f, 0.0), degrees + error_degrees + 1
+    low, high = (_noncentrality(f, degrees, error_degrees, share) for share in (1 - alpha, alpha))
+    return Sizes(
+        partial_eta_squared=degrees * f / (degrees * f + error_degrees),
+        partial_omega_squared=max(degrees * (f - 1) / (degrees * f + error_degrees + 1), 0.0),
+        effect_low=None if low is None else low / (low + total),
+        effect_high=None if high is None else high / (high + total),
     )
 
 

@@ -8,7 +8,6 @@ and is corrected by how far that fails (Greenhouse & Geisser 1959; Huynh & Feldt
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -47,20 +46,6 @@ class WithinEffect(Sizes):
     corrected_p_value: float | None
     huynh_feldt_p_value: float | None
     generalized_eta_squared: float | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Likeness:
-    """How similar the values of one participant are, and what that does to tests that treat them as independent.
-
-    The correlation is of consistency, groups and columns taken out, and below zero where people are more alike than
-    chance would have it; the effects are by how much the error variance of a comparison between groups is larger, and
-    of one within participants smaller, than that of independent values.
-    """
-
-    intraclass_correlation: float | None = None
-    between_effect: float | None = None
-    within_effect: float | None = None
 
 
 @dataclass(frozen=True)
@@ -118,38 +103,6 @@ def mixed_design(
         strata.append(_stratum(scores, design, " x ".join(names[axis] for axis in which), between, left))
     errors = sum(stratum.error_squares for stratum in strata)
     return tuple(_finished(*effect, stratum, errors, alpha) for stratum in strata for effect in stratum.effects)
-
-
-def likeness(values: ArrayLike, groups: Sequence[Any] | NDArray[Any]) -> Likeness:
-    """Return how similar the values of one participant are, and what that does to tests that treat them as independent.
-
-    Parameters
-    ----------
-    values : array_like, shape (participants, ...)
-        As `mixed_design` takes them.
-    groups : sequence, shape (participants,)
-    """
-    table = np.asarray(values, dtype=np.float64)
-    people, columns = len(table), math.prod(table.shape[1:])
-    table = table.reshape(people, columns)
-    _, code = np.unique(np.asarray(groups).astype(str), return_inverse=True)
-    count = int(code.max()) + 1 if people else 0
-    if people - count < 1 or columns < 2:
-        return Likeness()
-    means = np.array([table[code == group].mean(axis=0) for group in range(count)])
-    apart = table - means[code]
-    own = apart.mean(axis=1)
-    between = columns * float((own**2).sum()) / (people - count)
-    within = float(((apart - own[:, None]) ** 2).sum()) / ((people - count) * (columns - 1))
-    spread = between + (columns - 1) * within
-    if spread <= 1e-12:
-        return Likeness()
-    correlation = (between - within) / spread
-    return Likeness(
-        intraclass_correlation=correlation,
-        between_effect=1 + (columns - 1) * correlation,
-        within_effect=1 - correlation,
-    )
 
 
 def _subsets(factors: int) -> list[tuple[int, ...]]:

@@ -8,7 +8,6 @@ two sequences each they would be 1 and 48. The same values in a design within pa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +17,6 @@ from study.analysis.variance.effect_sizes import Sizes, sizes
 from study.errors import AnalysisError
 
 FloatArray = NDArray[np.float64]
-Squares = Literal["II", "III"]
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,6 @@ def two_way(
     first: ArrayLike,
     second: ArrayLike,
     names: tuple[str, str],
-    *,
-    squares: Squares = "III",
     alpha: float = 0.05,
 ) -> TwoWay:
     """Between-subjects analysis of variance with two factors and their interaction.
@@ -63,8 +59,6 @@ def two_way(
         Levels of the two factors.
     names
         What the factors are called.
-    squares
-        Type of the sums of squares, see Notes.
     alpha
         Of the intervals of effect sizes, see `effect_sizes`.
 
@@ -76,9 +70,8 @@ def two_way(
     Notes
     -----
     Sums of squares of type III are those of each effect beside all others, factors coded to sum to zero: they compare
-    means of cells that count alike, however many answers are in each. Type II leaves the interaction out when it judges
-    a factor: it compares with more power where there is no interaction, and means something else where there is one.
-    With equally many answers in each combination both are the textbook's.
+    means of cells that count alike, however many answers are in each. With equally many answers in each combination
+    they are the textbook's.
     """
     y = np.asarray(values, dtype=np.float64)
     levels, codes = zip(
@@ -106,9 +99,8 @@ def two_way(
     residual = _left_over(y, list(effects.values()))
     rows = []
     for name, columns in effects.items():
-        beside = [other for key, other in effects.items() if key != name and (squares == "III" or " x " not in key)]
-        with_it = residual if squares == "III" or " x " in name else _left_over(y, [*beside, columns])
-        rows.append(_effect(name, _left_over(y, beside) - with_it, columns.shape[1], residual, left, alpha))
+        beside = [other for key, other in effects.items() if key != name]
+        rows.append(_effect(name, _left_over(y, beside) - residual, columns.shape[1], residual, left, alpha))
     return rows[0], rows[1], rows[2], VarianceRow("residual", residual, left, residual / left)
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.variance.repeated_measures import likeness, mixed_design
+from study.analysis.variance.repeated_measures import mixed_design
 
 
 def rows_of(values: np.ndarray, groups: list[int], names: list[str]) -> dict[str, dict[str, float]]:
@@ -78,33 +78,3 @@ def test_what_can_not_be_analysed_is_said() -> None:
     assert "one level" in mixed_design(np.ones((6, 1)), [0] * 6, ["method"])
     same = rows_of(np.tile([1.0, 2.0], (6, 1)), [0, 0, 0, 1, 1, 1], ["method"])
     assert all(row.f is None and row.p_value is None for row in same.values())
-
-
-def test_likeness_is_recovered_and_is_that_of_the_error_strata() -> None:
-    """True correlation 0.4, in two groups and three columns that differ."""
-    rng = np.random.default_rng(5)
-    groups = np.arange(600) % 2
-    values = np.sqrt(0.4) * rng.normal(size=(600, 1)) + np.sqrt(0.6) * rng.normal(size=(600, 3))
-    values = values + groups[:, None] + np.array([0, 1, 3])
-    found = likeness(values, groups)
-    assert found.intraclass_correlation == pytest.approx(0.4, abs=0.06)
-    effects = rows_of(values, list(groups), ["method"])
-    between = effects["group"].error_sum_of_squares / effects["group"].error_degrees_of_freedom
-    within = effects["method"].error_sum_of_squares / effects["method"].error_degrees_of_freedom
-    pooled = (between + 2 * within) / 3
-    assert found.between_effect == pytest.approx(between / pooled)
-    assert found.within_effect == pytest.approx(within / pooled)
-    assert likeness(np.ones((4, 2)), [0, 0, 1, 1]).intraclass_correlation is None
-    assert likeness(np.ones((4, 1)), [0, 0, 1, 1]).intraclass_correlation is None
-
-
-def test_two_values_a_participant_have_the_correlation_of_the_textbook() -> None:
-    """Consistency by mean squares, (B - W) / (B + W), of two columns; with one column there is nothing to compare."""
-    values = np.array([[1.0, 2.0], [2.0, 4.0], [4.0, 5.0], [6.0, 6.0], [3.0, 5.0]])
-    people = values.mean(axis=1) - values.mean()
-    rest = values - values.mean(axis=0) - people[:, None]
-    between, within = 2 * (people**2).sum() / 4, (rest**2).sum() / 4
-    found = likeness(values, ["all"] * 5)
-    assert found.intraclass_correlation == pytest.approx((between - within) / (between + within))
-    assert found.between_effect == pytest.approx(1 + found.intraclass_correlation)
-    assert likeness(values[:, :1], ["all"] * 5).intraclass_correlation is None

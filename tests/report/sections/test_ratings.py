@@ -7,7 +7,7 @@ import pandas as pd
 
 from study.analysis.estimates import MeanTest
 from study.analysis.ratings.analyse import Ratings
-from study.analysis.ratings.comparisons import MethodDifference, MixedDesign, Question, Ranks, rating_anova
+from study.analysis.ratings.comparisons import MethodDifference, MixedDesign, Ordinal, Question, Ranks, rating_anova
 from study.analysis.ratings.table import MethodRating, rating_table
 from study.analysis.variance.two_way import VarianceEffect, VarianceRow
 from study.report.sections.ratings.section import ratings_section
@@ -24,12 +24,11 @@ def question(item: str, mean: float, f: float, p: float) -> Question:
         answers=52,
         anova=(effect, effect, effect, VarianceRow("residual", 48.0, 48, 1.0)),
         balanced=True,
-        type_ii=None,
         differences=(difference,),
         difference=difference,
         mixed_design=MixedDesign((), ("method",), 26, 0, ""),
-        ranks=Ranks((), None, ""),
-        ordinal=None,
+        ranks=Ranks(None, ""),
+        ordinal=Ordinal(),
         note="",
     )
 

@@ -177,8 +177,7 @@ def _p_of(difference: MethodDifference) -> str:
 
 def _notes(question: Question) -> list[str]:
     """Why something could not be had."""
-    parts = [question.note, question.mixed_design.note, question.ranks.note]
-    parts += [question.ordinal.note] if question.ordinal else []
+    parts = [question.note, question.mixed_design.note, question.ranks.note, question.ordinal.note]
     return [f"{words.sentence(note)}." for note in parts if note]
 
 
@@ -252,12 +251,6 @@ def _folded(name: str, result: Ratings) -> list[Table]:
         "item method order answers participants mean standard_error low high",
         [_readable(row) | {"order": words.readable(row.order)} for row in result.cells],
     )
-    type_ii = tables.make(
-        f"{name}_anova_type_ii",
-        "The published analysis by type II sums of squares. It differs if cells have unequal numbers of answers.",
-        f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
-        _by_question(result.questions, lambda question: question.type_ii or ()),
-    )
     mixed = tables.make(
         f"{name}_mixed_design",
         "Mixed design: participants as random. Methods (and motions, if everybody rated all) vary within "
@@ -267,10 +260,9 @@ def _folded(name: str, result: Ratings) -> list[Table]:
     )
     ranks = tables.make(
         f"{name}_ranks",
-        "The same on ranks. The published design by ANOVA-type statistics, and the methods over participants.",
-        "item source test f chi_square degrees_of_freedom error_degrees_of_freedom p_value",
-        [row for question in result.questions for row in _rank_rows(question)],
-        headings={"source": "effect"},
+        "The methods over participants, on ranks.",
+        "item test f chi_square degrees_of_freedom error_degrees_of_freedom p_value",
+        _by_question(result.questions, lambda question: [over] if (over := question.ranks.participants) else []),
     )
     ordinal = tables.make(
         f"{name}_ordinal",
@@ -282,18 +274,11 @@ def _folded(name: str, result: Ratings) -> list[Table]:
             | {"item": words.readable(question.item), "effect": words.readable(effect.name)}
             | {"low": effect.interval.low, "high": effect.interval.high}
             for question in result.questions
-            if question.ordinal
             for effect in question.ordinal.effects
         ],
         headings={"value": "logits"},
     )
-    return [table for table in (cells_table, type_ii, mixed, ranks, ordinal) if table.rows]
-
-
-def _rank_rows(question: Question) -> list[dict[str, Any]]:
-    item, over = {"item": words.readable(question.item)}, question.ranks.participants
-    rows = [vars(row) | item | {"test": "ANOVA-type"} for row in question.ranks.between]
-    return [*rows, vars(over) | item | {"source": "method, over participants"}] if over else rows
+    return [table for table in (cells_table, mixed, ranks, ordinal) if table.rows]
 
 
 # Beside the section
