@@ -16,8 +16,9 @@ import pandas as pd
 import pytest
 
 from study.analysis.analyse import analyse, analysis_json
-from study.analysis.foreign.answers import AnswerColumns, read_preferences, read_ratings
-from study.analysis.foreign.trials import Columns, read_trials
+from study.analysis.foreign.answers import read_preferences, read_ratings
+from study.analysis.foreign.columns import Columns
+from study.analysis.foreign.trials import read_trials
 from study.analysis.psychometric.analyse import analyse_psychometric
 from study.analysis.psychometric.model import make_model
 from study.analysis.study_result import Settings
@@ -54,7 +55,7 @@ def preferences(rng: np.random.Generator) -> dict[str, Any]:
             rows.append((who, f"m{a}", f"m{b}", f"motion {trial % 3}", sometimes(rng, answer)))
     table = pd.DataFrame(rows, columns=["who", "first", "second", "motion", "answer"])
     motion = "motion" if rng.random() < 0.7 else None
-    columns = AnswerColumns("answer", "first", "second", participant="who", motion=motion, tie=("tie",))
+    columns = Columns("answer", "who", first="first", second="second", motion=motion, tie=("tie",))
     return analysis_json(analyse(read_preferences(table, columns).table))
 
 
@@ -70,7 +71,7 @@ def ratings(rng: np.random.Generator) -> dict[str, Any]:
             rows.append((who, f"m{method}", f"motion {trial % 2}", item, sometimes(rng, str(rated))))
     table = pd.DataFrame(rows, columns=["who", "method", "motion", "item", "answer"])
     asked = {name: name for name in ("method", "motion", "item") if rng.random() < 0.8}
-    return analysis_json(analyse(read_ratings(table, AnswerColumns("answer", participant="who", **asked)).table))
+    return analysis_json(analyse(read_ratings(table, Columns("answer", "who", **asked)).table))
 
 
 def rated_pairs(rng: np.random.Generator) -> dict[str, Any]:
@@ -102,13 +103,13 @@ def levels_answered(rng: np.random.Generator, levels: list[float]) -> pd.DataFra
 def psychometric(rng: np.random.Generator) -> dict[str, Any]:
     task, sigmoid = str(rng.choice(["2afc", "yes-no"])), str(rng.choice(["normal", "logistic", "gumbel", "weibull"]))
     levels = [0.001, 0.5, 1, 2, 3, 5, 100, *([] if sigmoid == "weibull" else [0, -4])]
-    read = read_trials(levels_answered(rng, levels), Columns("level", "answer", participant="who"), task)
+    read = read_trials(levels_answered(rng, levels), Columns("answer", "who", "level"), task)
     return dict(to_json(analyse_psychometric(read.table, make_model(task, sigmoid=sigmoid), simulations=20)))
 
 
 def same_different(rng: np.random.Generator) -> dict[str, Any]:
     table = levels_answered(rng, [-20, -10, -5, 0, 5, 10, 20])
-    read = read_trials(table, Columns("level", "answer", participant="who", order="order"), "same-different").table
+    read = read_trials(table, Columns("answer", "who", "level", order="order"), "same-different").table
     answers = read.rename(columns={"level": "difference_frames"})
     answers["answer"], answers["task"] = np.where(read["yes"] > 0, "different", "same"), "same-different"
     answers["reference_first"] = read["order"] == "AB"

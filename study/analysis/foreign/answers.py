@@ -5,12 +5,11 @@ The result goes through `summary.analyse` as our own answers do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from study.analysis.foreign.columns import column, few, numbers, row_of, taken
+from study.analysis.foreign.columns import Columns, Foreign, column, few, named, numbers, row_of, taken
 from study.analysis.foreign.words import FIRST, SECOND
 from study.counting import counted
 from study.errors import AnalysisError
@@ -22,61 +21,7 @@ if TYPE_CHECKING:
 CODES = (-9.0, -99.0, -999.0, 99.0, 999.0, 9999.0)
 
 
-@dataclass(frozen=True)
-class AnswerColumns:
-    """Names of columns in another program's table of preferences or ratings.
-
-    Attributes
-    ----------
-    answer
-        What was chosen (first or second, or the method itself), or the rating.
-    first, second
-        Preference: the methods shown first and second (or left and right).
-    method
-        Rating: the method that was rated.
-    participant
-        Who answered; one participant where None.
-    motion, item
-        The motion, and the question of a rating; not known where None.
-    yes, tie
-        Preference: what counts as the first, and as neither; the usual words, and nothing, where empty.
-    where
-        Rows to take: pairs of column and value.
-    decimal
-        "point" or "comma" in ratings; found out where None.
-    scale
-        Rating: the points that words stand for, pairs of a word and a number.
-    ends
-        Rating: the lowest and the highest point of the scale; not known where None.
-    """
-
-    answer: str
-    first: str | None = None
-    second: str | None = None
-    method: str | None = None
-    participant: str | None = None
-    motion: str | None = None
-    item: str | None = None
-    yes: tuple[str, ...] = ()
-    tie: tuple[str, ...] = ()
-    where: tuple[tuple[str, str], ...] = ()
-    decimal: str | None = None
-    scale: tuple[tuple[str, float], ...] = ()
-    ends: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class ForeignAnswers:
-    """What was read: a table of answers, missed ones without an answer; rows of the file, used, blank and missed."""
-
-    table: pd.DataFrame
-    rows: int
-    used: int
-    blank: int
-    missed: int
-
-
-def read_preferences(table: pd.DataFrame, columns: AnswerColumns) -> ForeignAnswers:
+def read_preferences(table: pd.DataFrame, columns: Columns) -> Foreign:
     """Return preferences between methods.
 
     Parameters
@@ -118,9 +63,7 @@ def read_preferences(table: pd.DataFrame, columns: AnswerColumns) -> ForeignAnsw
     return _counted(found, rows, found["chose_a"].notna())
 
 
-def _chose_first(
-    answer: pd.Series[str], first: pd.Series[str], second: pd.Series[str], columns: AnswerColumns
-) -> np.ndarray:
+def _chose_first(answer: pd.Series[str], first: pd.Series[str], second: pd.Series[str], columns: Columns) -> np.ndarray:
     """1 where the first was chosen, 0 where the second, one half for a tie, NaN where nothing was."""
     text = answer.str.lower().str.replace(r"\.0+$", "", regex=True)
     yes, tie = ([word.strip().lower() for word in words] for words in (columns.yes, columns.tie))
@@ -148,7 +91,7 @@ def _chose_first(
     return found
 
 
-def read_ratings(table: pd.DataFrame, columns: AnswerColumns) -> ForeignAnswers:
+def read_ratings(table: pd.DataFrame, columns: Columns) -> Foreign:
     """Return ratings of methods.
 
     Parameters
@@ -179,7 +122,7 @@ def read_ratings(table: pd.DataFrame, columns: AnswerColumns) -> ForeignAnswers:
     return _counted(found, rows, rating.notna())
 
 
-def _ratings(answer: pd.Series[str], columns: AnswerColumns) -> pd.Series[float]:
+def _ratings(answer: pd.Series[str], columns: Columns) -> pd.Series[float]:
     """Points of the scale, from numbers or from the words that stand for them."""
     points = {word.strip().lower(): f"{point:g}" for word, point in columns.scale}
     text = answer.str.lower().map(points).fillna(answer) if points else answer
@@ -196,7 +139,7 @@ def _ratings(answer: pd.Series[str], columns: AnswerColumns) -> pd.Series[float]
     return rating
 
 
-def _refuse_off_scale(answer: pd.Series[str], rating: pd.Series[float], columns: AnswerColumns) -> None:
+def _refuse_off_scale(answer: pd.Series[str], rating: pd.Series[float], columns: Columns) -> None:
     """Ratings outside the ends that were given; else codes for no answer that lie far from all others."""
     if columns.ends is not None:
         low, high = columns.ends
@@ -217,17 +160,11 @@ def _refuse_off_scale(answer: pd.Series[str], rating: pd.Series[float], columns:
         )
 
 
-def _common(table: pd.DataFrame, columns: AnswerColumns, task: str, answer: pd.Series[str]) -> pd.DataFrame:
+def _common(table: pd.DataFrame, columns: Columns, task: str, answer: pd.Series[str]) -> pd.DataFrame:
     """What both tasks have: who answered what, in the file's order."""
     import pandas as pd
 
-    who = column(table, columns.participant, "participant") if columns.participant else "participant"
-    found = pd.DataFrame({"participant": who, "task": task, "study": task}, index=table.index)
-    nobody = found["participant"][(found["participant"] == "") & (answer != "")]
-    if len(nobody):
-        raise AnalysisError(
-            f"row {row_of(nobody)}, column {columns.participant!r}: expected a participant, found nothing"
-        )
+    found = pd.DataFrame({"participant": named(table, columns, answer != ""), "task": task, "study": task})
     found["trial"] = np.arange(1, len(found) + 1)
     found["answer"] = answer.astype(object).where(answer != "", None)
     if columns.motion:
@@ -235,9 +172,9 @@ def _common(table: pd.DataFrame, columns: AnswerColumns, task: str, answer: pd.S
     return found
 
 
-def _counted(found: pd.DataFrame, rows: int, given: pd.Series[bool]) -> ForeignAnswers:
+def _counted(found: pd.DataFrame, rows: int, given: pd.Series[bool]) -> Foreign:
     used = int(given.sum())
-    return ForeignAnswers(found.reset_index(drop=True), rows, used, rows - len(found), len(found) - used)
+    return Foreign(found.reset_index(drop=True), rows, used, rows - len(found), len(found) - used)
 
 
 def _nothing(names: str, rows: int) -> AnalysisError:

@@ -6,6 +6,7 @@ import difflib
 import json
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from study.analysis.estimates import LARGEST
@@ -16,6 +17,58 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SMALLEST = 1e-12
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Names of columns in another program's table; what a task does not have stays None or empty."""
+
+    answer: str
+    """What was answered: right or wrong, yes or no, same or different, first or second (or the method chosen), a
+    rating; the number of such answers where `shown` is given."""
+    participant: str | None = None
+    """Who answered; one participant where None."""
+    level: str = ""
+    """Stimulus level; the signed difference in a same-different task."""
+    shown: str | None = None
+    """Number of answers that a row stands for; one a row where None."""
+    order: str | None = None
+    """Which of a pair came first (same-different); not known where None."""
+    first: str | None = None
+    second: str | None = None
+    """`first`, `second`: preference: the methods shown first and second (or left and right)."""
+    method: str | None = None
+    """Rating: the method that was rated."""
+    motion: str | None = None
+    item: str | None = None
+    """`motion`, `item`: the motion, and the question of a rating; not known where None."""
+    yes: tuple[str, ...] = ()
+    """What counts as right, yes, different or the first; the usual words where empty."""
+    tie: tuple[str, ...] = ()
+    """Preference: what counts as neither; nothing where empty."""
+    where: tuple[tuple[str, str], ...] = ()
+    """Rows to take: pairs of column and value."""
+    decimal: str | None = None
+    """Either "point" or "comma" in numbers; found out where None."""
+    scale: tuple[tuple[str, float], ...] = ()
+    """Rating: the points that words stand for, pairs of a word and a number."""
+    ends: tuple[float, float] | None = None
+    """Rating: the lowest and the highest point of the scale; not known where None."""
+
+
+@dataclass(frozen=True, eq=False)
+class Foreign:
+    """What was read of another program's table."""
+
+    table: pd.DataFrame
+    """In our terms. Of tasks with a stimulus level: `participant` (str), `level`, `yes`, `shown` (floats), and `order`
+    (str) where it is known. Else a table of answers, trials without a response among them."""
+    rows: int
+    used: int
+    blank: int
+    missed: int
+    """`rows`, `used`, `blank`, `missed`: rows of the file, rows used, rows without a stimulus (instructions, breaks),
+    rows with one and no answer."""
 
 
 def column(table: pd.DataFrame, name: str, means: str) -> pd.Series[str]:
@@ -153,6 +206,27 @@ def taken(table: pd.DataFrame, where: Sequence[tuple[str, str]]) -> pd.DataFrame
             raise AnalysisError(f"expected rows with {name} = {value}, found none; {name} holds {seen}")
         table = table[matches]
     return table
+
+
+def named(table: pd.DataFrame, columns: Columns, answered: pd.Series[bool]) -> pd.Series[str]:
+    """Return who answered in each row; "participant" where no column says so.
+
+    Raises
+    ------
+    AnalysisError
+        When a row that was answered has no participant.
+    """
+    import pandas as pd
+
+    if columns.participant is None:
+        return pd.Series("participant", index=table.index)
+    who = column(table, columns.participant, "participant")
+    nobody = who[(who == "") & answered]
+    if len(nobody):
+        raise AnalysisError(
+            f"row {row_of(nobody)}, column {columns.participant!r}: expected a participant, found nothing"
+        )
+    return who
 
 
 def row_of(chosen: pd.Series[str]) -> int:

@@ -7,10 +7,9 @@ stimulus level here; preferences and ratings in `foreign_answers`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from study.analysis.foreign.columns import column, few, numbers, row_of, taken
+from study.analysis.foreign.columns import Columns, Foreign, column, few, named, numbers, row_of, taken
 from study.analysis.foreign.words import NO, YES
 from study.counting import counted
 from study.errors import AnalysisError
@@ -22,60 +21,7 @@ TASKS = ("2afc", "yes-no", "same-different")
 MOST_ANSWERS = 1_000_000
 
 
-@dataclass(frozen=True)
-class Columns:
-    """Names of columns in another program's table.
-
-    Attributes
-    ----------
-    level
-        Stimulus level; signed difference in a same-different task.
-    answer
-        Right or wrong (2AFC), yes or no, same or different; the number of such answers where `shown` is given.
-    shown
-        Number of answers a row stands for; one a row where None.
-    participant
-        Who answered; one participant where None.
-    order
-        Which of a pair came first (same-different); not known where None.
-    yes
-        What counts as right, yes or different; the usual words where empty.
-    where
-        Rows to take: pairs of column and value.
-    decimal
-        "point" or "comma"; found out where None.
-    """
-
-    level: str
-    answer: str
-    shown: str | None = None
-    participant: str | None = None
-    order: str | None = None
-    yes: tuple[str, ...] = ()
-    where: tuple[tuple[str, str], ...] = ()
-    decimal: str | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Trials:
-    """What was read.
-
-    Attributes
-    ----------
-    table
-        Columns `participant` (str), `level`, `yes`, `shown` (floats), and `order` (str) where it is known.
-    rows, used, blank, missed
-        Rows of the file, rows used, rows without a level (instructions, breaks), rows with a level and no answer.
-    """
-
-    table: pd.DataFrame
-    rows: int
-    used: int
-    blank: int
-    missed: int
-
-
-def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Trials:
+def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Foreign:
     """Return another program's table in our terms.
 
     Parameters
@@ -107,18 +53,12 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Trials:
             f"{counted(rows, 'row')}; check the columns' names and --where"
         )
     yes, shown = _answers(table, answer[given], columns, task)
-    who: pd.Series[str] | str = "participant"
-    if columns.participant:
-        who = column(table, columns.participant, "participant")[given]
-        if (who == "").any():
-            raise AnalysisError(
-                f"row {row_of(who[who == ''])}, column {columns.participant!r}: expected a participant, found nothing"
-            )
+    who = named(table[given], columns, given[given])
     result = pd.DataFrame({"participant": who, "level": level[given], "yes": yes, "shown": shown})
     if columns.order:
         result["order"] = column(table, columns.order, "order of a pair")[given]
     missed = int((placed & ~given).sum())
-    return Trials(result.reset_index(drop=True), rows, len(result), int((~placed).sum()), missed)
+    return Foreign(result.reset_index(drop=True), rows, len(result), int((~placed).sum()), missed)
 
 
 def _answers(

@@ -15,12 +15,11 @@ from study.errors import AnalysisError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from study.analysis.foreign.answers import ForeignAnswers
-    from study.analysis.foreign.trials import Trials
+    from study.analysis.foreign.columns import Columns, Foreign
     from study.analysis.psychometric.analyse import PsychometricStudy
     from study.analysis.same_different.analyse import SameDifferent
 
-Read = tuple["Trials | ForeignAnswers", Callable[[], dict[str, Any]]]
+Read = tuple["Foreign", Callable[[], dict[str, Any]]]
 """What was read, and its analysis: as JSON holds it, with `answer` in words and `headline`."""
 
 # The options of each task, in addition to the common ones; others are refused.
@@ -149,12 +148,10 @@ def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Serie
 def _own_study(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     """Preferences and ratings, through the analysis of our own studies."""
     from study.analysis.analyse import analyse, analysis_json
-    from study.analysis.foreign.answers import AnswerColumns, read_preferences, read_ratings
+    from study.analysis.foreign.answers import read_preferences, read_ratings
     from study.analysis.study_result import Settings
 
-    own = {name: options[name] for name in ("first", "second", "method", "motion", "item", "ends")}
-    columns = AnswerColumns(**_shared(options), **own, scale=_scale(options["scale"]), tie=tuple(options["tie"]))
-    read = {"preference": read_preferences, "rating": read_ratings}[options["task"]](table, columns)
+    read = {"preference": read_preferences, "rating": read_ratings}[options["task"]](table, _columns(options))
     settings = Settings(confidence=options["confidence"], alpha=options["alpha"] or 0.05)
 
     def analysed() -> dict[str, Any]:
@@ -239,14 +236,15 @@ def _refuse_others(task: str, options: dict[str, Any]) -> None:
         raise AnalysisError(f"expected --level with --task {task}: the column of the stimulus level")
 
 
-def _trials(table: pd.DataFrame, options: dict[str, Any]) -> Trials:
-    from study.analysis.foreign.trials import Columns, read_trials
+def _trials(table: pd.DataFrame, options: dict[str, Any]) -> Foreign:
+    from study.analysis.foreign.trials import read_trials
 
-    levels = {name: options[name] for name in ("level", "shown", "order")}
-    return read_trials(table, Columns(**_shared(options), **levels), options["task"])
+    return read_trials(table, _columns(options), options["task"])
 
 
-def _shared(options: dict[str, Any]) -> dict[str, Any]:
-    """What every table's columns are named by."""
-    named = {name: options[name] for name in ("answer", "participant", "decimal")}
-    return named | {"yes": tuple(options["yes"]), "where": _where(options)}
+def _columns(options: dict[str, Any]) -> Columns:
+    from study.analysis.foreign.columns import Columns
+
+    named: dict[str, Any] = {name: options[name] for name in (*COLUMNS, "decimal", "ends") if options[name] is not None}
+    named |= {name: tuple(options[name]) for name in ("yes", "tie")}
+    return Columns(**named, where=_where(options), scale=_scale(options["scale"]))

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study.analysis.foreign.trials import Columns, Trials, read_trials
+from study.analysis.foreign.columns import Columns, Foreign
+from study.analysis.foreign.trials import read_trials
 from study.analysis.foreign.words import BLANK, FIRST, NO, SECOND, YES
 from study.apps.cli.fit import read_table
 
@@ -31,14 +32,14 @@ def rising(right: str = "1", wrong: str = "0", sep: str = ",") -> str:
     return "\n".join(rows) + "\n"
 
 
-def read(content: str | bytes, folder: Path, participant: str | None = None) -> Trials:
+def read(content: str | bytes, folder: Path, participant: str | None = None) -> Foreign:
     """The trials of a file, as `segue fit` reads them."""
     path = folder / "data.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return read_trials(read_table(path, ("level", "c")), Columns("level", "c", participant=participant), "2afc")
+    return read_trials(read_table(path, ("level", "c")), Columns("c", participant, "level"), "2afc")
 
 
-def right(found: Trials) -> list[float]:
+def right(found: Foreign) -> list[float]:
     """Right answers at each level; those of `rising` are 5 to 10."""
     sums: list[float] = found.table.groupby("level")["yes"].sum().tolist()
     return sums
