@@ -30,7 +30,7 @@ from study.analysis.psychometric.analyse import analyse_psychometric
 from study.analysis.psychometric.likelihood import fit_likelihood
 from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.psychometric.model import make_model
-from study.analysis.psychometric.posterior import fit_many, fit_psychometric
+from study.analysis.psychometric.posterior import fit_psychometric
 from study.analysis.same_different import fits
 from study.analysis.same_different.counts import Counts
 from study.analysis.same_different.interpolation import crossings
@@ -186,8 +186,7 @@ def run_speed(options):
         yes = rng.binomial(40, share, size=(repeats, 7)).astype(float)
         single = clock(lambda row, model=model: fit_psychometric(levels, row, shown, model), yes)
         profile = clock(lambda row, model=model: fit_likelihood(levels, row, shown, model), yes[:20])
-        batch = clock(lambda rows, model=model: fit_many(levels, rows, shown, model), [yes] * 3) / repeats
-        print(f"{task}: posterior with intervals {single:.2f} ms, in a batch {batch:.2f} ms a fit; "
+        print(f"{task}: posterior with intervals {single:.2f} ms; "
               f"likelihood with profile {profile:.0f} ms", flush=True)  # fmt: skip
     group = same_different.DESIGN_2004[-1]
     places = np.array(group.levels)

@@ -125,7 +125,7 @@ def rating_answers(rng, people, better, own, place):
 def ratings(studies, seed):
     """Type I error and power of every test of the methods, by how alike one person's ratings are."""
     print("ratings: how often the methods are found to differ at .05 (26 people, two ratings each)")
-    names = ("published F", "t", "mixed design", "Wilcoxon", "ordinal", "likelihood")
+    names = ("published F", "t", "mixed design", "Wilcoxon", "ordinal")
     print(f"{'people sd':>9} {'effect':>6}  " + "  ".join(names))
     for own, better in ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.7)):
         rng, rows, spent = np.random.default_rng([seed, 4, int(10 * own), int(10 * better)]), [], 0.0
@@ -151,7 +151,6 @@ def _p_values(question):
         within["method"].p_value if within else None,
         people.p_value if people else None,
         ordinal.effects[0].p_value if ordinal.effects else None,
-        ordinal.p_value,
     )
 
 

@@ -53,52 +53,42 @@ class Decided(Protocol):
 
 @dataclass(frozen=True)
 class Results:
-    """What answers say.
-
-    Attributes
-    ----------
-    studies
-        By name.
-    confirmatory
-        The default tests of preference studies, adjusted together by Holm's method.
-    """
+    """What answers say."""
 
     studies: Mapping[str, StudyResult]
+    """By name."""
     confirmatory: tuple[ConfirmatoryTest, ...]
+    """The default tests of preference studies, adjusted together by Holm's method."""
 
     def of(self, kind: type[Kind]) -> dict[str, Kind]:
         """Return the results of one kind, by name of the study."""
         return {name: found for name, found in self.studies.items() if isinstance(found, kind)}
 
+    def headlines(self, alpha: float, confidence: float) -> tuple[Headline, ...]:
+        """Return what each study found: see `headline`."""
+        found = (one for name, study in self.studies.items() for one in study.headlines(name, alpha, confidence))
+        return _adjusted(found, self.confirmatory)
+
 
 @dataclass(frozen=True)
 class Analysis(Results):
-    """What answers say, and what it rests on.
-
-    Attributes
-    ----------
-    exclusions, without_exclusions
-        What each rule excluded, and the same results for all answers; None if nothing was excluded.
-    quality
-        Of all answers.
-    data
-        Who answered.
-    """
+    """What answers say, and what it rests on."""
 
     exclusions: Exclusions
     without_exclusions: Results | None
+    """`exclusions`, `without_exclusions`: what each rule excluded, and the same results for all answers; None if
+    nothing was excluded."""
     quality: Quality
+    """Of all answers."""
     data: Data
+    """Who answered."""
     confidence: float
     alpha: float
 
     @property
     def headline(self) -> tuple[Headline, ...]:
         """What each study found: see `headline`."""
-        found = (
-            one for name, study in self.studies.items() for one in study.headlines(name, self.alpha, self.confidence)
-        )
-        return _adjusted(found, self.confirmatory)
+        return self.headlines(self.alpha, self.confidence)
 
     def sentences(self) -> list[str]:
         """Return the answers of all studies in words."""

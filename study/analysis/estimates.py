@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from study.arrays import BoolArray, FloatArray
 from study.counting import counted, noun
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 
 LARGEST = 1e12
 """Levels, differences and ratings beyond this are slips, and their squares are past what a computer counts with."""
@@ -66,28 +66,20 @@ class MeanTest(Mean):
 
 @dataclass(frozen=True)
 class Clustering:
-    """How alike the answers of one participant are.
-
-    Attributes
-    ----------
-    intraclass_correlation
-        One-way analysis of variance estimator; below zero where participants are more alike than chance would have it.
-    answers_per_participant
-        The mean number of answers, adjusted for unequal numbers.
-    design_effect
-        1 + (answers - 1) x correlation: by how much the variance of a pooled percentage exceeds the one of as many
-        independent answers.
-    effective_answers
-        The answers divided by the design effect.
-    note
-        Why nothing can be given; empty where all can.
-    """
+    """How alike the answers of one participant are."""
 
     intraclass_correlation: float | None
+    """One-way analysis of variance estimator; below zero where participants are more alike than chance would have
+    it."""
     answers_per_participant: float | None
+    """The mean number of answers, adjusted for unequal numbers."""
     design_effect: float | None
+    """1 + (answers - 1) x correlation: by how much the variance of a pooled percentage exceeds the one of as many
+    independent answers."""
     effective_answers: float | None
+    """The answers divided by the design effect."""
     note: str = ""
+    """Why nothing can be given; empty where all can."""
 
 
 def normal_quantile(confidence: float) -> float:
@@ -159,8 +151,6 @@ def mean_of(values: ArrayLike, confidence: float = 0.95) -> Mean:
     ----------
     values : array_like, shape (participants,)
         One number a participant; NaN is ignored.
-    confidence
-        Of the interval.
 
     Notes
     -----
@@ -201,7 +191,7 @@ def in_percent(test: MeanTest) -> MeanTest:
     return MeanTest(**vars(test) | {name: None if value is None else 100 * value for name, value in values.items()})
 
 
-def student_p_values(values: FloatArray, there: NDArray[np.bool_], expected: float) -> FloatArray:
+def student_p_values(values: FloatArray, there: BoolArray, expected: float) -> FloatArray:
     """Return the p-values of Student's t of many samples at once; NaN where a sample has no spread to judge by.
 
     Parameters

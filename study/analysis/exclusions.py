@@ -17,27 +17,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules of exclusion; None and False exclude nothing.
-
-    Attributes
-    ----------
-    fastest_s
-        Answers sooner than this. [seconds]
-    badly_shown
-        Answers after a stimulus that stalled or was hidden.
-    most_missed
-        Participants who missed a larger share of their trials.
-    most_failed_checks
-        Participants who failed a larger share of the attention checks.
-    most_too_fast
-        Participants with a larger share of answers sooner than `fastest_s` (0.2 s where that is not stated).
-    """
+    """Rules of exclusion; None and False exclude nothing."""
 
     fastest_s: float | None = None
+    """Answers sooner than this. [seconds]"""
     badly_shown: bool = False
+    """Answers after a stimulus that stalled or was hidden."""
     most_missed: float | None = None
+    """Participants who missed a larger share of their trials."""
     most_failed_checks: float | None = None
+    """Participants who failed a larger share of the attention checks."""
     most_too_fast: float | None = None
+    """Participants with a larger share of answers sooner than `fastest_s` (0.2 s where that is not stated)."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +70,6 @@ def exclude(answers: pd.DataFrame, rules: Rules, checks: pd.DataFrame | None = N
 
     Parameters
     ----------
-    answers
-        The table of answers.
     rules
         From the protocol.
     checks

@@ -15,35 +15,25 @@ NO_TEST = "a threshold is estimated, and no hypothesis tested"
 
 @dataclass(frozen=True)
 class Headline:
-    """What a study found, in a sentence and in numbers; what can't be given is None.
-
-    Attributes
-    ----------
-    study
-        Its name.
-    statement
-        In words.
-    estimate, unit, interval
-        A number, what it counts, and its confidence interval.
-    p, p_adjusted, test
-        Of the null hypothesis; adjusted for the other tests of its family, as it is where there are none; and what was
-        done.
-    generalises_to
-        What the interval holds for beyond the data.
-    note
-        Why something can't be given.
-    """
+    """What a study found, in a sentence and in numbers; what can't be given is None."""
 
     study: str
+    """Its name."""
     statement: str
+    """In words."""
     estimate: float | None
     unit: str
     interval: Interval
+    """`estimate`, `unit`, `interval`: a number, what it counts, and its confidence interval."""
     p: float | None
     p_adjusted: float | None
     test: str
+    """`p`, `p_adjusted`, `test`: of the null hypothesis; adjusted for the other tests of its family, as it is where
+    there are none; and what was done."""
     generalises_to: str
+    """What the interval holds for beyond the data."""
     note: str = ""
+    """Why something can't be given."""
 
 
 def holds_for(participants: int) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ LONG_RUN = 20
 FEWEST_FOR_UNIFORM = 8
 
 
-def _numbers(answers: pd.DataFrame, column: str) -> NDArray[np.float64]:
+def _numbers(answers: pd.DataFrame, column: str) -> FloatArray:
     """A column as numbers; NaN where there is none."""
     import pandas as pd
 
@@ -88,15 +89,7 @@ class Quality:
 
 
 def quality(answers: pd.DataFrame, fastest_s: float = FASTEST_S) -> Quality:
-    """Return how complete and how plausible the answers are.
-
-    Parameters
-    ----------
-    answers
-        The table of answers.
-    fastest_s
-        See `Quality`.
-    """
+    """Return how complete and how plausible the answers are."""
     table = participant_table(answers, fastest_s)
     given = answers[answers["answer"].notna()]
     times = _numbers(given, "response_s")

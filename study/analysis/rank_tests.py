@@ -10,18 +10,26 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from study.analysis import estimates
-
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
 
 LARGEST_EXACT = 50
+FRIEDMAN = "Friedman's test (F by Iman and Davenport)"
 NO_RANKS = "fewer than two participants lean either way: no test by ranks"
 
 
 @dataclass(frozen=True)
-class Friedman:
+class RankTest:
+    """A test on ranks, by name."""
+
+    test: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Friedman(RankTest):
     """Friedman's test; `f` is None where all rank alike.
 
     The p-value is of F (Iman & Davenport 1980): the chi-square is too careful with few participants.
@@ -31,7 +39,6 @@ class Friedman:
     f: float | None
     degrees_of_freedom: int
     error_degrees_of_freedom: int
-    p_value: float
 
 
 def mid_ranks(values: ArrayLike) -> FloatArray:
@@ -101,4 +108,4 @@ def friedman(values: ArrayLike) -> Friedman | None:
     alike = left <= 1e-9
     f = math.inf if alike else (people - 1) * chi_square / left
     p_value = math.factorial(levels) ** (1 - people) if alike else estimates.f_probability(f, *degrees)
-    return Friedman(chi_square, None if alike else f, *degrees, float(p_value))
+    return Friedman(FRIEDMAN, float(p_value), chi_square, None if alike else f, *degrees)

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from study.arrays import BoolArray, FloatArray
+
 Rows = NDArray[np.intp]
 Value = Callable[[FloatArray, Rows], FloatArray]
 Scores = Callable[[FloatArray, Rows], tuple[FloatArray, FloatArray]]
@@ -22,21 +23,16 @@ LARGEST_STEP = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Maxima:
-    """Where the searches came to rest.
-
-    Attributes
-    ----------
-    point : ndarray, shape (fits, parameters)
-    value : ndarray, shape (fits,)
-    held : ndarray of bool, shape (fits, parameters)
-        True where a parameter is at a bound.
-    settled : ndarray of bool, shape (fits,)
-    """
+    """Where the searches came to rest."""
 
     point: FloatArray
+    """`(fits, parameters)`"""
     value: FloatArray
-    held: NDArray[np.bool_]
-    settled: NDArray[np.bool_]
+    """`(fits,)`"""
+    held: BoolArray
+    """`(fits, parameters)`: true where a parameter is at a bound."""
+    settled: BoolArray
+    """`(fits,)`"""
 
 
 def maximise(

@@ -36,34 +36,24 @@ class StudyResult(Protocol):
 
 @dataclass(frozen=True)
 class Settings:
-    """Preregistered settings of the analysis.
-
-    Attributes
-    ----------
-    threshold
-        Share of "different" that defines the just noticeable difference; above one half.
-    confidence
-        Of all intervals.
-    alpha
-        Level of significance that sentences speak of.
-    resamples, seed
-        Of the bootstrap over participants behind the standard errors; the same seed gives the same numbers.
-    margin
-        How far from an even split a preference may lie and count as none; 0.1 is 40 to 60%.
-    scale_points
-        Points of the scale of each rating study, by its name; needed where pairs were rated.
-    staircases
-        The rule of each study whose trials were chosen by staircases, by its name.
-    """
+    """Preregistered settings of the analysis."""
 
     threshold: float = 0.75
+    """Share of "different" that defines the just noticeable difference; above one half."""
     confidence: float = 0.95
+    """Of all intervals."""
     alpha: float = 0.05
+    """Level of significance that sentences speak of."""
     resamples: int = 1000
     seed: int = 0
+    """`resamples`, `seed`: of the bootstrap over participants behind the standard errors; the same seed gives the
+    same numbers."""
     margin: float = MARGIN
+    """How far from an even split a preference may lie and count as none; 0.1 is 40 to 60%."""
     scale_points: Mapping[str, int] = field(default_factory=dict)
+    """Points of the scale of each rating study, by its name; needed where pairs were rated."""
     staircases: Mapping[str, UpDown] = field(default_factory=dict)
+    """The rule of each study whose trials were chosen by staircases, by its name."""
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.models.sigmoids import logistic
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
+
 Kind = Literal["different", "criterion_free"]
 
 ROOT_TWO = float(np.sqrt(2.0))

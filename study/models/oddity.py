@@ -10,9 +10,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
 
 CHANCE = 1.0 / 3.0
 HALFWAY = (1.0 + CHANCE) / 2

@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.errors import SessionError
 from study.models.differencing import detected
 from study.models.oddity import CHANCE, oddity_correct
-
-FloatArray = NDArray[np.float64]
 
 LEAST_CRITERION = 0.2
 """No participant's criterion lies below this: at 0 a person would say "different" always."""
@@ -23,27 +21,20 @@ LEAST_CRITERION = 0.2
 
 @dataclass(frozen=True)
 class SameDifferentObserver:
-    """Same-different by the differencing model.
-
-    Parameters
-    ----------
-    d_prime_shorter, d_prime_longer
-        Sensitivity a frame of difference, for comparisons shorter and longer than the reference; above 0.
-    criterion
-        Distance of percepts beyond which the answer is "different", in noise units; above 0.
-    lapse
-        Proportion of trials answered without having looked, half of them "different".
-    log_sensitivity_sd, criterion_sd
-        How participants differ: standard deviations of the logarithm of both sensitivities together, and of the
-        criterion.
-    """
+    """Same-different by the differencing model."""
 
     d_prime_shorter: float
     d_prime_longer: float
+    """`d_prime_shorter`, `d_prime_longer`: sensitivity a frame of difference, for comparisons shorter and longer
+    than the reference; above 0."""
     criterion: float = 2.0
+    """Distance of percepts beyond which the answer is "different", in noise units; above 0."""
     lapse: float = 0.02
+    """Proportion of trials answered without having looked, half of them "different"."""
     log_sensitivity_sd: float = 0.15
     criterion_sd: float = 0.15
+    """`log_sensitivity_sd`, `criterion_sd`: how participants differ: standard deviations of the logarithm of both
+    sensitivities together, and of the criterion."""
 
 
 def probability_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.models.sigmoids import SIGMOIDS, Sigmoid
 
-FloatArray = NDArray[np.float64]
 Range = tuple[float, float]
 
 COARSE = (25, 15, 4, 5)
@@ -39,24 +38,16 @@ OPEN = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A posterior.
-
-    Attributes
-    ----------
-    nodes
-        Points of the five axes, evenly spaced but the last.
-    density : ndarray, shape (thresholds, widths, lapses, guesses, overdispersions)
-        Mass at each point; adds to one.
-    marginals
-        Mass along each axis.
-    open_ends
-        For each axis, whether the posterior still has mass at its lower and upper limit, which the prior set.
-    """
+    """A posterior."""
 
     nodes: tuple[FloatArray, ...]
+    """Points of the five axes, evenly spaced but the last."""
     density: FloatArray
+    """`(thresholds, widths, lapses, guesses, overdispersions)`: mass at each point; adds to one."""
     marginals: tuple[FloatArray, ...]
+    """Mass along each axis."""
     open_ends: tuple[tuple[bool, bool], ...]
+    """For each axis, whether the posterior still has mass at its lower and upper limit, which the prior set."""
 
 
 @dataclass(frozen=True)

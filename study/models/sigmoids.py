@@ -10,33 +10,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.arrays import FloatArray
 from study.errors import AnalysisError
 
-FloatArray = NDArray[np.float64]
 Curve = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
 class Sigmoid:
-    """One sigmoid in its standard form.
-
-    Attributes
-    ----------
-    name
-        As the caller says it.
-    curve, slope, inverse
-        The distribution function, its derivative, and its inverse.
-    logarithmic
-        Whether levels enter as logarithms.
-    """
+    """One sigmoid in its standard form."""
 
     name: str
+    """As the caller says it."""
     curve: Curve
     slope: Curve
     inverse: Curve
+    """`curve`, `slope`, `inverse`: the distribution function, its derivative, and its inverse."""
     logarithmic: bool = False
+    """Whether levels enter as logarithms."""
 
     @property
     def half(self) -> float:

@@ -13,62 +13,42 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class UpDown:
-    """A rule.
-
-    Parameters
-    ----------
-    start
-        Level of the first trial.
-    steps
-        Sizes of the steps down: the first until the first reversal, the next until the second, the last from then on.
-    least, most
-        Levels that are never passed.
-    down, up
-        Right answers in a row before a step down, and wrong ones before a step up.
-    up_times
-        How many times as large as steps down the steps up are.
-    reversals, trials
-        A staircase stops after so many changes of direction, or after so many trials.
-    averaged
-        Its threshold is the mean of so many reversals, the last ones.
-    """
+    """A rule."""
 
     start: int
+    """Level of the first trial."""
     steps: tuple[int, ...]
+    """Sizes of the steps down: the first until the first reversal, the next until the second, the last from then on."""
     least: int
     most: int
+    """`least`, `most`: levels that are never passed."""
     down: int = 1
     up: int = 1
+    """`down`, `up`: right answers in a row before a step down, and wrong ones before a step up."""
     up_times: int = 1
+    """How many times as large as steps down the steps up are."""
     reversals: int = 8
     trials: int = 50
+    """`reversals`, `trials`: a staircase stops after so many changes of direction, or after so many trials."""
     averaged: int = 6
+    """Its threshold is the mean of so many reversals, the last ones."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """Where a staircase stands.
-
-    Parameters
-    ----------
-    level
-        Of the next trial.
-    trials
-        Trials so far, those without an answer among them.
-    reversals
-        The levels at which the direction changed, in order.
-    direction
-        Of the last step: -1 down, 1 up, 0 before there was one.
-    right, wrong
-        Answers of a kind in a row since the last step.
-    """
+    """Where a staircase stands."""
 
     level: int
+    """Of the next trial."""
     trials: int = 0
+    """Trials so far, those without an answer among them."""
     reversals: tuple[int, ...] = ()
+    """The levels at which the direction changed, in order."""
     direction: int = 0
+    """Of the last step: -1 down, 1 up, 0 before there was one."""
     right: int = 0
     wrong: int = 0
+    """`right`, `wrong`: answers of a kind in a row since the last step."""
 
 
 def moved(track: Track, rule: UpDown, right: bool | None) -> Track:

@@ -11,14 +11,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis.estimates import Interval, wilson_interval
+from study.arrays import BoolArray
 from study.counting import counted
 from study.errors import AnalysisError
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Run = Callable[[np.random.Generator, int, Sequence[int]], BoolArray]
 """From a generator, a number of studies and rising numbers of participants: what each study found, shape (studies,
 sizes). One simulation may serve every size, by its first so many participants."""
@@ -37,25 +35,17 @@ class PowerPoint:
 
 @dataclass(frozen=True)
 class Power:
-    """A power curve.
-
-    Attributes
-    ----------
-    points
-        One a number of participants, rising.
-    target
-        The power asked for.
-    needed
-        Participants from which on the power is reached, by linear interpolation between the points, made monotone; None
-        where no number tried was enough.
-    note
-        Where the number lies outside those tried.
-    """
+    """A power curve."""
 
     points: tuple[PowerPoint, ...]
+    """One a number of participants, rising."""
     target: float
+    """The power asked for."""
     needed: int | None
+    """Participants from which on the power is reached, by linear interpolation between the points, made monotone;
+    None where no number tried was enough."""
     note: str = ""
+    """Where the number lies outside those tried."""
 
 
 def power_curve(

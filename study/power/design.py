@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from study.analysis.analyse import Analysis
 from study.analysis.exclusions import Rules, exclude
+from study.arrays import BoolArray, FloatArray
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.power.curve import PowerPoint, Run
@@ -22,31 +23,20 @@ from study.tasks.observer import ObserverSettings
 from study.tasks.registry import task_of
 from study.tasks.trial import Trial
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """What is simulated.
-
-    Attributes
-    ----------
-    protocol, study
-        Of the session, and which of its studies.
-    plans
-        Real plans, one a participant, at least as many as the largest study has.
-    settings
-        The observer that the stated effects amount to.
-    rules
-        The protocol's exclusions.
-    """
+    """What is simulated."""
 
     protocol: Protocol
     study: StudySpec
+    """`protocol`, `study`: of the session, and which of its studies."""
     plans: tuple[Plan, ...]
+    """Real plans, one a participant, at least as many as the largest study has."""
     settings: ObserverSettings
+    """The observer that the stated effects amount to."""
     rules: Rules
+    """The protocol's exclusions."""
 
     def trials(self, role: str = "trial") -> list[list[Trial]]:
         """The study's own trials of each plan."""
@@ -63,78 +53,54 @@ class Design:
 
 @dataclass(frozen=True)
 class PlannedStudy:
-    """How many participants a study needs, with all that this rests on.
-
-    Attributes
-    ----------
-    protocol, study, task
-        What is planned.
-    effect
-        Its numbers, by name, the share of trials without a response among them.
-    icc, test, aim
-        As in `Effect`.
-    points, target, needed, note
-        As in `Power`.
-    simulations
-        Simulated studies.
-    through
-        What each of them went through.
-    seed
-        Of the simulation.
-    answers_per_participant
-        On average, where trials depend on the responses.
-    """
+    """How many participants a study needs, with all that this rests on."""
 
     protocol: str
     study: str
     task: str
+    """`protocol`, `study`, `task`: what is planned."""
     effect: Mapping[str, float]
+    """Its numbers, by name, the share of trials without a response among them."""
     icc: float | None
     test: str
     aim: str
+    """`icc`, `test`, `aim`: as in `Effect`."""
     points: tuple[PowerPoint, ...]
     target: float
     needed: int | None
     note: str
+    """`points`, `target`, `needed`, `note`: as in `Power`."""
     simulations: int
+    """Simulated studies."""
     through: str
+    """What each of them went through."""
     seed: int
+    """Of the simulation."""
     answers_per_participant: int
+    """On average, where trials depend on the responses."""
 
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """What a study is to find.
-
-    Attributes
-    ----------
-    observer
-        Who answers as the effect has it.
-    stated
-        Its numbers, by name.
-    icc
-        Intraclass correlation of a participant's answers; None where the effect is not stated by one.
-    test, aim
-        What finds it, and what that is, in words: "to {aim} in 80% of studies".
-    study
-        Simulates and analyses many studies at once.
-    found
-        Whether the whole analysis of one study found it.
-    slow
-        Whether a study takes so long that fewer are simulated.
-    answers
-        How many trials of the study a participant answers, on average.
-    """
+    """What a study is to find."""
 
     observer: ObserverSettings
+    """Who answers as the effect has it."""
     stated: Mapping[str, float]
+    """Its numbers, by name."""
     icc: float | None
+    """Intraclass correlation of a participant's answers; None where the effect is not stated by one."""
     test: str
     aim: str
+    """`test`, `aim`: what finds it, and what that is, in words: "to {aim} in 80% of studies"."""
     study: Callable[[Design], Run]
+    """Simulates and analyses many studies at once."""
     found: Callable[[Analysis], bool]
+    """Whether the whole analysis of one study found it."""
     slow: bool = False
+    """Whether a study takes so long that fewer are simulated."""
     answers: Callable[[Design], int] = lambda design: len(design.trials()[0])
+    """How many trials of the study a participant answers, on average."""
 
 
 def times(design: Design, rng: np.random.Generator, ease: FloatArray) -> tuple[FloatArray, BoolArray]:

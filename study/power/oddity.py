@@ -10,16 +10,17 @@ import pandas as pd
 
 from study.analysis.analyse import Analysis
 from study.analysis.estimates import Interval
-from study.analysis.oddity.analyse import SIGNS, Oddity
+from study.analysis.oddity.analyse import Oddity
 from study.analysis.psychometric.analyse import typical_threshold
 from study.analysis.psychometric.mixed import TypicalThreshold
 from study.analysis.psychometric.model import make_model
+from study.arrays import FloatArray
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.oddity import CHANCE, HALFWAY, d_prime_of
 from study.models.population import probability_odd_found
 from study.power.curve import Run
-from study.power.design import Design, Effect, FloatArray
+from study.power.design import Design, Effect
 from study.power.same_different import level_study, narrow, threshold_numbers
 from study.tasks.observer import ObserverSettings, default_observer
 
@@ -65,7 +66,7 @@ def oddity_study(design: Design, precision: float) -> Run:
         counts = {"yes": right.ravel(), "shown": shown.ravel()}
         table = pd.DataFrame({"participant": np.repeat(np.arange(people), len(levels)).astype(str), **counts})
         table["level"], side = np.tile(np.abs(levels), people), np.tile(np.sign(levels), people)
-        parts = [part for sign in SIGNS.values() if len(part := table[(side == sign) & (table["shown"] > 0)])]
+        parts = [part for sign in (-1, 1) if len(part := table[(side == sign) & (table["shown"] > 0)])]
         return _told([typical_threshold(part, model, 0.95) for part in parts], precision)
 
     return level_study(design, probability_odd_found, CHANCE, told)

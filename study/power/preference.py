@@ -12,12 +12,13 @@ from scipy.special import expit
 from study.analysis.analyse import Analysis
 from study.analysis.preference.analyse import Preference
 from study.analysis.preference.default_test import p_values_of_studies
+from study.arrays import BoolArray, FloatArray
 from study.errors import AnalysisError
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.choice import PreferenceObserver
 from study.power.curve import Run
-from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
+from study.power.design import Design, Effect, kept_of, times
 from study.tasks.observer import ObserverSettings, default_observer
 
 

@@ -10,12 +10,13 @@ import numpy as np
 from study.analysis.analyse import Analysis
 from study.analysis.estimates import student_p_values
 from study.analysis.ratings.analyse import PairRatings, Ratings
+from study.arrays import BoolArray, FloatArray
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.choice import PreferenceObserver
 from study.models.ordinal import RatingObserver
 from study.power.curve import Run
-from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
+from study.power.design import Design, Effect, kept_of, times
 from study.tasks.observer import ObserverSettings, default_observer
 from study.tasks.registry import task_of
 

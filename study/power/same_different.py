@@ -13,12 +13,13 @@ from study.analysis.estimates import Interval
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import Counts
 from study.analysis.same_different.model import ModelFit, fit_model
+from study.arrays import BoolArray, FloatArray
 from study.experiment.observers import person
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.population import SameDifferentObserver, probability_different
 from study.power.curve import Run
-from study.power.design import BoolArray, Design, Effect, FloatArray, kept_of, times
+from study.power.design import Design, Effect, kept_of, times
 from study.tasks.observer import ObserverSettings, default_observer
 
 

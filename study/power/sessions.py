@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 
 from study.analysis.analyse import Analysis, analyse_folder
+from study.arrays import BoolArray
 from study.experiment.observers import person, respond
 from study.experiment.plan import Plan
 from study.experiment.session import open_session, walk
 from study.power.curve import Run
-from study.power.design import BoolArray, Design
+from study.power.design import Design
 from study.tasks.registry import answer_columns
 from study.tasks.trial import Trial
 

@@ -16,7 +16,9 @@ from study.analysis.analyse import Analysis
 from study.analysis.exclusions import exclude
 from study.analysis.oddity.analyse import Oddity
 from study.analysis.same_different.analyse import SameDifferent
-from study.analysis.same_different.staircases import SIGNS, Staircases, staircase_thresholds
+from study.analysis.same_different.counts import SIGNS
+from study.analysis.same_different.staircases import Staircases, staircase_thresholds
+from study.arrays import BoolArray, FloatArray
 from study.errors import AnalysisError
 from study.experiment.observers import person
 from study.experiment.procedures.staircase import Staircase
@@ -26,7 +28,7 @@ from study.models.oddity import CHANCE
 from study.models.population import SameDifferentObserver, probability_different, probability_odd_found
 from study.models.up_down import Track, moved, stopped
 from study.power.curve import Run
-from study.power.design import BoolArray, Design, Effect, FloatArray, times
+from study.power.design import Design, Effect, times
 from study.power.oddity import oddity_observer
 from study.power.same_different import narrow, same_different_observer, threshold_numbers
 from study.tasks.observer import ObserverSettings

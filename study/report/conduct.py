@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,10 +10,8 @@ import numpy as np
 from study.analysis.analyse import Analysis, Results
 from study.analysis.quality import Quality
 from study.counting import counted, noun
-from study.report import tables
-from study.report.drawing import BLUE, FAINT, ORANGE, add_mark, new_figure, quiet_grid, style, to_svg
-from study.report.sections.registry import SECTIONS
-from study.report.sections.section import MainResult
+from study.report import tables, words
+from study.report.drawing import BLUE, FAINT, ORANGE, new_figure, quiet_grid, to_svg
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,8 +56,7 @@ def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> st
     if not len(gaps):
         return None
     most = max(float(gaps.max()), 2.0)
-    with style():
-        figure, axes = new_figure(7.2, 2.1)
+    with new_figure(7.2, 2.1) as (figure, axes):
         edges = np.linspace(0, most, 41)
         counts, _, bars = axes.hist(gaps, bins=edges.tolist(), color=FAINT, edgecolor="white", linewidth=0.5)
         for bar, left in zip(bars, edges, strict=False):
@@ -75,13 +71,12 @@ def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> st
         axes.set_xlabel("longest time between two frames of a presentation, frames")
         axes.set_title("presentations")
         quiet_grid(axes)
-        add_mark(figure, mark)
         over = int((gaps > LONGEST_GAP_FRAMES).sum())
         spoken = (
             f"{counted(len(gaps), 'presentation')}, median {np.median(gaps):.2f} frames, longest {gaps.max():.2f}; "
             f"{over} over {LONGEST_GAP_FRAMES:g} frames"
         )
-        return to_svg(figure, name, "Longest gap between frames of each presentation", spoken)
+        return to_svg(figure, name, "Longest gap between frames of each presentation", spoken, mark)
 
 
 def checks_sentence(checks: pd.DataFrame) -> str:
@@ -145,9 +140,11 @@ def exclusion_tables(analysis: Analysis) -> tuple[tables.Table, ...]:
     )
     if everything is None:
         return (rules,)
-    kept, other = ({row.result: vars(row) for row in _main_results(results)} for results in (analysis, everything))
+    kept, other = (_main_results(results, analysis) for results in (analysis, everything))
     rows = [
-        {f"all_{key}": value for key, value in other.get(result, {}).items()} | kept.get(result, {"result": result})
+        {f"all_{key}": value for key, value in other.get(result, {}).items()}
+        | kept.get(result, {})
+        | {"result": words.sentence(words.readable(result))}
         for result in dict.fromkeys([*kept, *other])
     ]
     return rules, tables.make(
@@ -159,11 +156,13 @@ def exclusion_tables(analysis: Analysis) -> tuple[tables.Table, ...]:
     )
 
 
-def _main_results(results: Results) -> Iterator[MainResult]:
-    """The main results of every study, by kind."""
-    for kind, shown in SECTIONS.items():
-        for study, found in results.of(kind).items():
-            yield from shown.main_results(found, study)
+def _main_results(results: Results, analysis: Analysis) -> dict[str, dict[str, float | None]]:
+    """The headline numbers of every study."""
+    return {
+        f"{one.study}: {one.unit}": {"value": one.estimate, "p_value": one.p}
+        | {"low": one.interval.low, "high": one.interval.high}
+        for one in results.headlines(analysis.alpha, analysis.confidence)
+    }
 
 
 def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Table:

@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from study.arrays import AnyFloat
 from study.counting import counted
 from study.files import whole_file
-from study.report.drawing import BLUE, FAINT, INK, ORANGE, SOFT, TEAL, new_figure, quiet_grid, style
+from study.report.drawing import BLUE, FAINT, INK, ORANGE, SOFT, TEAL, new_figure, quiet_grid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.floating]
 
 # Limbs of 2004 Figure 5: a colour a part, a full line for the left side and a dashed one for the right.
 _PART_COLOURS = {"hip": BLUE, "knee": TEAL, "shoulder": ORANGE, "elbow": "#7b3fa0"}
 
 
 def cost_picture(
-    costs: FloatArray,
+    costs: AnyFloat,
     out: Path,
     *,
     least: tuple[int, int],
@@ -55,9 +55,8 @@ def cost_picture(
     first
         What the first row and column count as.
     """
-    with style():
-        width = 6.2 * min(1.0, 1.4 * span[1] / span[0])
-        figure, axes = new_figure(max(width, 2.5) + 1.0, 6.2 * min(1.0, 1.4 * span[0] / span[1]))
+    width, height = (6.2 * min(1.0, 1.4 * span[one] / span[other]) for one, other in ((1, 0), (0, 1)))
+    with new_figure(max(width, 2.5) + 1.0, height) as (figure, axes):
         extent = (first - 0.5, first + span[1] - 0.5, first + span[0] - 0.5, first - 0.5)
         shown = axes.imshow(costs, cmap="gray", extent=extent, interpolation="nearest", aspect="equal")
         axes.plot(
@@ -74,13 +73,13 @@ def cost_picture(
 
 def curve_picture(
     lengths: NDArray[np.integer],
-    costs: FloatArray,
+    costs: AnyFloat,
     out: Path,
     *,
     chosen: int,
     fps: float,
-    joints: Mapping[str, FloatArray] | None = None,
-    frames: tuple[FloatArray, int] | None = None,
+    joints: Mapping[str, AnyFloat] | None = None,
+    frames: tuple[AnyFloat, int] | None = None,
     words: str = "",
 ) -> None:
     """The cost over blend lengths (2004 Figure 3), of single joints (Figure 5), and frame by frame (Figure 2).
@@ -103,8 +102,7 @@ def curve_picture(
         What transition it is.
     """
     panels = 1 + (joints is not None) + (frames is not None)
-    with style():
-        figure, drawn = new_figure(8.6, 0.6 + 2.3 * panels, panels)
+    with new_figure(8.6, 0.6 + 2.3 * panels, panels) as (figure, drawn):
         all_axes: list[Any] = list(np.atleast_1d(drawn))
         axes = all_axes.pop(0)
         axes.plot(lengths, costs, color=INK, linewidth=1.6)
@@ -128,7 +126,7 @@ def curve_picture(
         _save(figure, out)
 
 
-def _draw_joints(axes: Any, lengths: NDArray[np.integer], joints: Mapping[str, FloatArray], chosen: int) -> None:
+def _draw_joints(axes: Any, lengths: NDArray[np.integer], joints: Mapping[str, AnyFloat], chosen: int) -> None:
     for role, own in joints.items():
         part, _, side = role.partition(".")
         axes.plot(
@@ -158,7 +156,7 @@ class Reducer:
         self.step = max(1, -(-max(shape) // most))
         self.small = np.full((-(-shape[0] // self.step), -(-shape[1] // self.step)), np.inf, dtype=np.float32)
 
-    def add(self, rows: range, block: FloatArray) -> None:
+    def add(self, rows: range, block: AnyFloat) -> None:
         """Take a block of rows into account."""
         across = np.minimum.reduceat(block, np.arange(0, block.shape[1], self.step), axis=1)
         groups, starts = np.unique(np.arange(rows.start, rows.stop) // self.step, return_index=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.analysis.analyse import Results
 from study.report import tables, words
-from study.report.drawing import BLUE, FAINT, RULE, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import BLUE, FAINT, RULE, new_figure, quiet_grid, to_svg
 from study.report.sections.registry import SECTIONS
 from study.report.sections.section import Course
 
@@ -66,8 +66,7 @@ def learning_figure(table: tables.Table, name: str, mark: str) -> str | None:
     studies = list(dict.fromkeys(str(row["study"]) for row in table.rows))
     columns = 4  # also for fewer: panels keep their size
     lines = -(-len(studies) // columns)
-    with style():
-        figure, grid = new_figure(7.2, 2.0 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)
+    with new_figure(7.2, 2.0 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False) as (figure, grid):
         spoken = []
         for axes, study in zip(grid.flat, studies, strict=False):
             own = [row for row in table.rows if row["study"] == study]
@@ -85,8 +84,7 @@ def learning_figure(table: tables.Table, name: str, mark: str) -> str | None:
             axes.set_axis_off()
         for axes in grid[-1]:
             axes.set_xlabel("sixth of the study")
-        add_mark(figure, mark)
-        return to_svg(figure, name, "Answers over the course of each study", "; ".join(spoken))
+        return to_svg(figure, name, "Answers over the course of each study", "; ".join(spoken), mark)
 
 
 def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
@@ -95,8 +93,7 @@ def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
     if timed.empty:
         return None
     times = timed["response_s"].to_numpy(dtype=np.float64)
-    with style():
-        figure, (left, right) = new_figure(7.2, 2.5, 1, 2, width_ratios=(1, 1.25))
+    with new_figure(7.2, 2.5, 1, 2, width_ratios=(1, 1.25)) as (figure, (left, right)):
         left.hist(times, bins=np.linspace(0, max(float(times.max()), 1.0), 31).tolist(), color=FAINT, edgecolor="white")
         middle = float(np.median(times))
         left.axvline(middle, color=BLUE, linewidth=1.6)
@@ -116,6 +113,5 @@ def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
             quiet_grid(right)
         else:
             right.set_axis_off()
-        add_mark(figure, mark)
         spoken = f"median {middle:.2f} s, from {times.min():.2f} to {times.max():.2f} s"
-        return to_svg(figure, name, "Response times", spoken)
+        return to_svg(figure, name, "Response times", spoken, mark)

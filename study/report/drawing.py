@@ -1,6 +1,6 @@
 """Matplotlib figures to inline SVG: the same bytes every time, names for screen readers, the page's own typeface.
 
-`draw` gives an empty figure with the report's quiet style, `to_svg` the text for the page.
+`new_figure` gives an empty figure in the report's quiet style, `to_svg` the text for the page.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -49,20 +49,16 @@ _STYLE: dict[Any, Any] = {
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """Within it, matplotlib draws in the report's style."""
+def new_figure(
+    width: float, height: float, rows: int = 1, columns: int = 1, **options: Any
+) -> Iterator[tuple[Figure, Any]]:
+    """Within it, a figure of this size in inches with its axes is drawn in the report's style."""
     import matplotlib as mpl
-
-    with mpl.rc_context(_STYLE):
-        yield
-
-
-def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
-    """Return a figure of this size in inches with its axes; nothing is registered with pyplot."""
     from matplotlib.figure import Figure as NewFigure
 
-    figure = NewFigure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(rows, columns, **options)
+    with mpl.rc_context(_STYLE):
+        figure = NewFigure(figsize=(width, height), layout="constrained")  # nothing is registered with pyplot
+        yield figure, figure.subplots(rows, columns, **options)
 
 
 def quiet_grid(axes: Axes, axis: str = "y") -> None:
@@ -71,25 +67,37 @@ def quiet_grid(axes: Axes, axis: str = "y") -> None:
     axes.set_axisbelow(True)
 
 
-def add_mark(figure: Figure, mark: str) -> None:
-    """Write at the foot of a figure what its data are (simulated, synthetic); nothing where they need no mark."""
-    if mark:
-        figure.supxlabel(mark, x=0.995, ha="right", fontsize=8.5, color=ORANGE, fontstyle="italic")
+def percent_axis(axes: Axes) -> None:
+    """Percentages upwards, with hairlines."""
+    axes.set_ylim(-3, 103)
+    axes.set_yticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
+    quiet_grid(axes)
 
 
-def to_svg(figure: Figure, name: str, title: str, description: str) -> str:
+def named_rows(axes: Axes, places: Sequence[float], labels: Sequence[str]) -> None:
+    """Labels in place of an axis at the left, for values that are drawn in rows."""
+    axes.set_yticks(places, labels)
+    axes.tick_params(axis="y", labelcolor=INK)
+    axes.spines["left"].set_visible(False)
+    quiet_grid(axes, "x")
+
+
+def to_svg(figure: Figure, name: str, title: str, description: str, mark: str) -> str:
     """Return a figure as an SVG element.
 
     Parameters
     ----------
-    figure
-        The figure.
     name
         Unique in the page; every id in the figure begins with it.
     title, description
         What a screen reader says.
+    mark
+        What its data are (simulated, synthetic), written at its foot; nothing where they need no mark.
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    if mark:
+        figure.supxlabel(mark, x=0.995, ha="right", fontsize=8.5, color=ORANGE, fontstyle="italic")
 
     buffer = io.StringIO()
     # `savefig` would draw everything twice, once without leaving a mark, to place the axes.

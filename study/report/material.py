@@ -20,32 +20,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """What a report is made of.
-
-    Attributes
-    ----------
-    protocol, manifest
-        What was asked, and what was shown.
-    answers, checks
-        One row an answer; answers to attention checks apart.
-    sessions
-        One row a session, those without answers too.
-    presentations
-        One row a stimulus that was shown.
-    withdrawn
-        How many participants had their answers deleted.
-    power
-        Results of `segue power` that lie in the folder.
-    """
+    """What a report is made of."""
 
     protocol: Protocol
     manifest: Manifest
+    """`protocol`, `manifest`: what was asked, and what was shown."""
     answers: pd.DataFrame
     checks: pd.DataFrame
+    """`answers`, `checks`: one row an answer; answers to attention checks apart."""
     sessions: pd.DataFrame
+    """One row a session, those without answers too."""
     presentations: pd.DataFrame
+    """One row a stimulus that was shown."""
     withdrawn: int
+    """How many participants had their answers deleted."""
     power: tuple[FoundPower, ...]
+    """Results of `segue power` that lie in the folder."""
 
 
 def gather(folder: Path, database: str | None = None) -> Material:

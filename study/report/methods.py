@@ -196,8 +196,8 @@ def _shown(analysis: Analysis, presentations: pd.DataFrame) -> str:
         nobody = "No stimulus was shown: observers were simulated." if analysis.data == "simulated" else ""
         return nobody or "How stimuli were shown was not recorded."
     timers = {
-        "requestVideoFrameCallback": "a web browser, with with with with with every presented frame logged",
-        "swap": "a window, with with with with with every buffer swap timed",
+        "requestVideoFrameCallback": "a web browser, with every presented frame logged",
+        "swap": "a window, with every buffer swap timed",
     }
     parts = [
         f"{counted(len(part), 'presentation')} in {timers.get(str(method), f'a way timed by {method} only')}"

@@ -29,38 +29,28 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """What the template shows.
-
-    Attributes
-    ----------
-    title, source, facts, warnings
-        At the head of the page.
-    comparison
-        Results as published and corrected, side by side, and the confirmatory tests.
-    sections
-        One a study, in the protocol's order.
-    power, conduct, stimuli
-        Participants needed; how the sessions went; what was shown.
-    pictures
-        Strips and videos.
-    methods, references, versions, acknowledgement
-        At the foot.
-    """
+    """What the template shows."""
 
     title: str
     source: str
     facts: tuple[str, ...]
     warnings: tuple[str, ...]
+    """`title`, `source`, `facts`, `warnings`: at the head of the page."""
     comparison: Part
+    """Results as published and corrected, side by side, and the confirmatory tests."""
     sections: tuple[Section, ...]
+    """One a study, in the protocol's order."""
     power: Part
     conduct: Part
     stimuli: Part
+    """`power`, `conduct`, `stimuli`: participants needed; how the sessions went; what was shown."""
     pictures: Pictures
+    """Strips and videos."""
     methods: tuple[tuple[str, str], ...]
     references: tuple[str, ...]
     versions: tuple[tuple[str, str], ...]
     acknowledgement: str
+    """`methods`, `references`, `versions`, `acknowledgement`: at the foot."""
 
     @property
     def _parts(self) -> tuple[Part | Section, ...]:

@@ -11,7 +11,7 @@ from typing import Any
 from study.counting import counted
 from study.errors import AnalysisError
 from study.report import tables, words
-from study.report.drawing import BLUE, INK, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import BLUE, INK, SOFT, new_figure, quiet_grid, to_svg
 from study.report.sections.section import Drawing
 
 
@@ -110,8 +110,7 @@ def power_drawing(found: FoundPower, name: str, asked: int) -> Drawing:
     points = found.points
     across, up = [point.participants for point in points], [point.power for point in points]
     below, above = [one.power - one.low for one in points], [one.high - one.power for one in points]
-    with style():
-        figure, axes = new_figure(7.2, 2.6)
+    with new_figure(7.2, 2.6) as (figure, axes):
         axes.axhline(found.target, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
         axes.errorbar(across, up, yerr=[below, above], color=BLUE, marker="o", markersize=4.5, linewidth=1.5,
                       elinewidth=1, capsize=2.5)  # fmt: skip
@@ -128,7 +127,8 @@ def power_drawing(found: FoundPower, name: str, asked: int) -> Drawing:
         axes.set_xlabel("participants")
         axes.set_title("power")
         quiet_grid(axes)
-        add_mark(figure, "simulated studies")
         spoken = "; ".join(f"{counted(point.participants, 'participant')}: {point.power:.2f}" for point in points)
-        svg = to_svg(figure, f"power-{found.study}", f"Power of {words.readable(found.study)}", spoken)
+        svg = to_svg(
+            figure, f"power-{found.study}", f"Power of {words.readable(found.study)}", spoken, "simulated studies"
+        )
     return Drawing(name, svg, f"Power to {found.aim}, by simulation, with Wilson’s 95% intervals.")

@@ -117,7 +117,7 @@ def test_who_and_what_is_left_out_stands_with_counts_and_both_results(results_fo
     assert (left_out["p0"], left_out["p3"]) == ("", "missed 100%")
     assert left_out["p4"] == "failed 100% of the checks"
     both = {row["result"]: row for row in rows(folder, "exclusions")}
-    compared = both["geodesic vs fixed: geodesic over fixed [%]"]
+    compared = both["Geodesic vs fixed: percent favouring geodesic over fixed"]
     assert compared["value"] != compared["all_value"]
     (shown,) = rows(folder, "presentation")
     assert int(shown["badly"]) > 0

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 from study.analysis import estimates
 from study.analysis.headline import Headline
 from study.analysis.psychometric.analyse import BelievedThreshold, PsychometricStudy, analyse_psychometric
 from study.analysis.psychometric.model import make_model
+from study.analysis.same_different.counts import SIDES, SIGNS, Side
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
 from study.models.oddity import CHANCE, d_prime_of
@@ -23,58 +24,40 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-Side = Literal["shorter", "longer"]
-SIGNS: Mapping[Side, int] = {"shorter": -1, "longer": 1}
 NEEDED_COLUMNS = ("participant", "difference_frames", "correct", "answer")
 
 
 @dataclass(frozen=True)
 class OddityLevel:
-    """Answers at one difference in blend length.
-
-    Attributes
-    ----------
-    difference_frames
-        Comparison minus reference.
-    participants, answers
-        Who gave any, and how many.
-    percent, low, high
-        Right answers: mean over participants, with Student's interval, cut at 0 and 100%.
-    p_value
-        That participants are right as often as by chance, one time in three.
-    d_prime
-        Of an observer who is right as often; None where that is always.
-    """
+    """Answers at one difference in blend length."""
 
     difference_frames: int
+    """Comparison minus reference."""
     participants: int
     answers: int
+    """`participants`, `answers`: who gave any, and how many."""
     percent: float
     low: float | None
     high: float | None
+    """`percent`, `low`, `high`: right answers: mean over participants, with Student's interval, cut at 0 and 100%."""
     p_value: float | None
+    """That participants are right as often as by chance, one time in three."""
     d_prime: float | None
+    """Of an observer who is right as often; None where that is always."""
 
 
 @dataclass(frozen=True)
 class Oddity:
-    """The result of an oddity study.
-
-    Attributes
-    ----------
-    levels
-        By difference, rising.
-    functions
-        The psychometric function of each side, over the size of the difference.
-    staircases
-        Thresholds as means of reversals, where trials were chosen by staircases.
-    """
+    """The result of an oddity study."""
 
     keys: ClassVar[Mapping[str, str]] = {"oddity": ""}
 
     levels: tuple[OddityLevel, ...]
+    """By difference, rising."""
     functions: Mapping[Side, PsychometricStudy]
+    """The psychometric function of each side, over the size of the difference."""
     staircases: Staircases | None = None
+    """Thresholds as means of reversals, where trials were chosen by staircases."""
 
     @property
     def thresholds(self) -> dict[Side, BelievedThreshold]:
@@ -132,8 +115,8 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
     )
     model = make_model("2afc", choices=3)
     functions: dict[Side, PsychometricStudy] = {}
-    for side, sign in SIGNS.items():
-        own = trials[trials["difference_frames"].astype(float) * sign > 0]
+    for side in SIDES:
+        own = trials[trials["difference_frames"].astype(float) * SIGNS[side] > 0]
         if len(own):
             functions[side] = analyse_psychometric(own, model, confidence=settings.confidence)
     rule = settings.staircases.get(name)

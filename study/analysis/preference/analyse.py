@@ -101,10 +101,6 @@ def compare(
 
     Parameters
     ----------
-    answers
-        Of one study.
-    confidence
-        Of the intervals.
     alpha
         Level of significance that the sentence in `answer` speaks of.
     margin

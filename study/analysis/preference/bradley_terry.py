@@ -18,10 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from study.analysis.estimates import Interval, chi_square_probability, normal_quantile, t_quantile
 from study.analysis.scoring import maximise
+from study.arrays import BoolArray, FloatArray
 from study.counting import counted
 from study.errors import AnalysisError
-
-FloatArray = NDArray[np.float64]
 
 WIDEST = 15.0
 
@@ -38,33 +37,24 @@ class Strength:
 
 @dataclass(frozen=True)
 class BradleyTerry:
-    """Strengths of methods.
-
-    Attributes
-    ----------
-    strengths
-        Of every method, strongest first; the reference's is 0.
-    reference
-        The reference method.
-    order
-        What coming first (or playing at home) adds, on the logit scale; None where the order is not known.
-    log_likelihood, deviance, degrees_of_freedom, p_value
-        Goodness of fit against free shares of every pair and order.
-    participants
-        Participants behind the standard errors; None where every answer counts as independent.
-    note
-        What can't be estimated, and why.
-    """
+    """Strengths of methods."""
 
     strengths: tuple[Strength, ...]
+    """Of every method, strongest first; the reference's is 0."""
     reference: str
+    """The reference method."""
     order: Strength | None
+    """What coming first (or playing at home) adds, on the logit scale; None where the order is not known."""
     log_likelihood: float
     deviance: float
     degrees_of_freedom: int
     p_value: float | None
+    """`log_likelihood`, `deviance`, `degrees_of_freedom`, `p_value`: goodness of fit against free shares of every
+    pair and order."""
     participants: int | None = None
+    """Participants behind the standard errors; None where every answer counts as independent."""
     note: str = ""
+    """What can't be estimated, and why."""
 
 
 def fit_bradley_terry(
@@ -141,7 +131,7 @@ def _why_no_order(design: FloatArray, yes: FloatArray, total: FloatArray) -> str
     return ""
 
 
-def _differences_finite(design: FloatArray, yes: FloatArray, total: FloatArray, methods: int) -> NDArray[np.bool_]:
+def _differences_finite(design: FloatArray, yes: FloatArray, total: FloatArray, methods: int) -> BoolArray:
     """Which strengths are finitely apart, shape (methods, methods)."""
     pairs = np.array(np.triu_indices(methods, 1)).T
     contrasts = np.zeros((len(pairs), design.shape[1]))
@@ -151,7 +141,7 @@ def _differences_finite(design: FloatArray, yes: FloatArray, total: FloatArray, 
     return found
 
 
-def _finite(design: FloatArray, yes: FloatArray, total: FloatArray, contrasts: FloatArray) -> NDArray[np.bool_]:
+def _finite(design: FloatArray, yes: FloatArray, total: FloatArray, contrasts: FloatArray) -> BoolArray:
     """Which contrasts of the effects have a finite maximum of likelihood.
 
     The likelihood does not fall along a direction that goes with every answer; what changes along one is not finite.
@@ -178,7 +168,7 @@ def _fitted(
     held: str,
     groups: NDArray[np.intp] | None,
     confidence: float,
-    told: NDArray[np.bool_],
+    told: BoolArray,
     note: str,
 ) -> BradleyTerry:
     """The strengths by maximum likelihood, with their covariance over participants where there are groups.

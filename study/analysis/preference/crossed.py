@@ -17,9 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray, IntArray
 
 KEPT_BELOW = 0.5
 """The p-value of its F test below which a variance component is kept."""
@@ -97,7 +97,7 @@ def _means(apart: FloatArray, total: FloatArray) -> FloatArray:
 
 
 def _combined(
-    sums: list[FloatArray], freedoms: list[NDArray[np.int64]], rest: FloatArray, rest_freedom: NDArray[np.int64]
+    sums: list[FloatArray], freedoms: list[IntArray], rest: FloatArray, rest_freedom: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Standard error and degrees of freedom from the variances of participants, of motions, and of the rest."""
     from scipy.special import fdtrc

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from study.analysis.headline import holds_for
 from study.analysis.preference.crossed import crossed
 from study.analysis.preference.motions import FEWEST_MOTIONS
 from study.analysis.preference.participants import default_p_values
+from study.arrays import FloatArray
 
 if TYPE_CHECKING:
     from study.analysis.preference.motions import MotionsAsSample
@@ -51,7 +52,7 @@ def default_test(people: ParticipantTests, motions: MotionsAsSample) -> DefaultT
     )  # fmt: skip
 
 
-def p_values_of_studies(chosen: ArrayLike, shown: ArrayLike) -> NDArray[np.float64]:
+def p_values_of_studies(chosen: ArrayLike, shown: ArrayLike) -> FloatArray:
     """Return the p-values of the default test of many studies at once.
 
     Parameters

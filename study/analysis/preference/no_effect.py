@@ -21,28 +21,19 @@ PRIOR_SCALE = math.sqrt(0.5)
 
 @dataclass(frozen=True)
 class NoEffect:
-    """How far the data speak for no preference.
-
-    Attributes
-    ----------
-    margin
-        Difference from an even split that still counts as none (0.1 is 40 to 60%).
-    equivalence_p_value
-        The larger of two one-sided t tests (Schuirmann 1987); small where the share lies within the margin.
-    interval
-        Of the mean share, of twice the error rate (90% for alpha .05): equivalent where it lies within the margin.
-    bayes_factor_null
-        How many times likelier the data are without a preference than with one (Rouder et al. 2009, Cauchy prior of
-        scale 0.707 on the standardised effect).
-    note
-        Why something can't be given.
-    """
+    """How far the data speak for no preference."""
 
     margin: float
+    """Difference from an even split that still counts as none (0.1 is 40 to 60%)."""
     equivalence_p_value: float | None
+    """The larger of two one-sided t tests (Schuirmann 1987); small where the share lies within the margin."""
     interval: Interval
+    """Of the mean share, of twice the error rate (90% for alpha .05): equivalent where it lies within the margin."""
     bayes_factor_null: float | None
+    """How many times likelier the data are without a preference than with one (Rouder et al. 2009, Cauchy prior of
+    scale 0.707 on the standardised effect)."""
     note: str = ""
+    """Why something can't be given."""
 
 
 def no_preference(shares: ArrayLike, margin: float = MARGIN, alpha: float = 0.05) -> NoEffect:
@@ -52,8 +43,6 @@ def no_preference(shares: ArrayLike, margin: float = MARGIN, alpha: float = 0.05
     ----------
     shares : array_like, shape (participants,)
         Each participant's share of answers for the first method, 0 to 1.
-    margin
-        See `NoEffect`.
     alpha
         Error rate of the equivalence test.
     """

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from study.analysis import estimates
 from study.analysis.rank_tests import NO_RANKS, signed_rank
-
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
 
 STUDENT, SIGN = "Student's t over participants", "exact sign test"
 
@@ -69,8 +68,6 @@ def participant_tests(chosen: ArrayLike, shown: ArrayLike, confidence: float = 0
     ----------
     chosen, shown : array_like, shape (participants,)
         How often each favoured the first method, of how many answers.
-    confidence
-        Of the interval.
     """
     yes, total = np.asarray(chosen, dtype=np.float64), np.asarray(shown, dtype=np.float64)
     share = yes[total > 0] / total[total > 0]

@@ -16,31 +16,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Published:
-    """The pooled test of 2004 Table 2.
-
-    Attributes
-    ----------
-    favouring, answers, percent
-        How many of how many answers favoured the first method.
-    chi_square, degrees_of_freedom, p_value
-        Against an even split, every answer taken as independent.
-    exact_p_value
-        Two-sided binomial test of the same.
-    interval
-        Wilson's interval of the share (0 to 1).
-    note
-        Why nothing can be given; empty where all can.
-    """
+    """The pooled test of 2004 Table 2."""
 
     favouring: int
     answers: int
     percent: float | None
+    """`favouring`, `answers`, `percent`: how many of how many answers favoured the first method."""
     chi_square: float | None
     degrees_of_freedom: int
     p_value: float | None
+    """`chi_square`, `degrees_of_freedom`, `p_value`: against an even split, every answer taken as independent."""
     exact_p_value: float | None
+    """Two-sided binomial test of the same."""
     interval: estimates.Interval
+    """Wilson's interval of the share (0 to 1)."""
     note: str = ""
+    """Why nothing can be given; empty where all can."""
 
 
 @dataclass(frozen=True)

@@ -143,8 +143,6 @@ def analyse_psychometric(
         Columns `participant`, `level`, `yes`, `shown`.
     model
         From `make_model`; 2AFC unless given.
-    confidence
-        Of the intervals.
     simulations
         Data sets drawn for the p-value of the deviance of the pooled fit; 0 takes chi-square.
 

@@ -22,10 +22,9 @@ from study.analysis.psychometric.model import (
     why_no_fit,
 )
 from study.analysis.scoring import Maxima, maximise
+from study.arrays import FloatArray
 from study.models.posterior_grid import prior_limits
 from study.models.sigmoids import Sigmoid
-
-FloatArray = NDArray[np.float64]
 
 PROFILE_POINTS = 41
 REFINED_POINTS = 9
@@ -35,41 +34,29 @@ SMALLEST_PROBABILITY = 1e-9
 
 @dataclass(frozen=True)
 class LikelihoodFit:
-    """A maximum-likelihood fit.
-
-    Attributes
-    ----------
-    threshold
-        Where the sigmoid reaches one half; None where it lies outside the levels or can't be determined.
-    interval
-        By profile likelihood; an end that the levels leave open is None.
-    width, lapse, guess
-        At the maximum.
-    log_likelihood, deviance, degrees_of_freedom
-        The deviance is that from free shares at every level.
-    p_value
-        Of the deviance: by simulation where that was asked for, else by chi-square (rough where levels have few
-        answers); small where the curve does not follow the data.
-    dispersion
-        Deviance over degrees of freedom; much above 1 where performance varied more than the binomial has it.
-    at_bound
-        Parameters that are at the bound of their range.
-    note
-        What can't be estimated, and why.
-    """
+    """A maximum-likelihood fit."""
 
     threshold: float | None
+    """Where the sigmoid reaches one half; None where it lies outside the levels or can't be determined."""
     interval: estimates.Interval
+    """By profile likelihood; an end that the levels leave open is None."""
     width: float
     lapse: float
     guess: float
+    """`width`, `lapse`, `guess`: at the maximum."""
     log_likelihood: float
     deviance: float
     degrees_of_freedom: int
+    """`log_likelihood`, `deviance`, `degrees_of_freedom`: the deviance is that from free shares at every level."""
     p_value: float | None
+    """Of the deviance: by simulation where that was asked for, else by chi-square (rough where levels have few
+    answers); small where the curve does not follow the data."""
     dispersion: float | None
+    """Deviance over degrees of freedom; much above 1 where performance varied more than the binomial has it."""
     at_bound: tuple[str, ...]
+    """Parameters that are at the bound of their range."""
     note: str = ""
+    """What can't be estimated, and why."""
 
 
 def _parts(axis: FloatArray, point: FloatArray, sigmoid: Sigmoid) -> tuple[FloatArray, FloatArray]:

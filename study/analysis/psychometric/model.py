@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from study.analysis.estimates import numbers
+from study.arrays import FloatArray
 from study.errors import AnalysisError
 from study.models.sigmoids import Sigmoid, sigmoid_named
-
-FloatArray = NDArray[np.float64]
 
 LARGEST_LAPSE = 0.25
 LARGEST_GUESS = 0.5
@@ -28,24 +27,16 @@ class Data:
 
 @dataclass(frozen=True)
 class Model:
-    """What is fitted.
-
-    Attributes
-    ----------
-    sigmoid
-        One of `sigmoids.SIGMOIDS`.
-    guess
-        Share of "yes" where nothing can be seen: one half in 2AFC; None where it is estimated (yes-no).
-    lapse
-        Share of answers given blindly where everything can be seen; None where it is estimated.
-    overdispersion
-        Whether performance may vary more between blocks or people than the binomial has it.
-    """
+    """What is fitted."""
 
     sigmoid: Sigmoid
+    """One of `sigmoids.SIGMOIDS`."""
     guess: float | None
+    """Share of "yes" where nothing can be seen: one half in 2AFC; None where it is estimated (yes-no)."""
     lapse: float | None = None
+    """Share of answers given blindly where everything can be seen; None where it is estimated."""
     overdispersion: bool = True
+    """Whether performance may vary more between blocks or people than the binomial has it."""
 
 
 def make_model(

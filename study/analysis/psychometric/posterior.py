@@ -15,14 +15,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from study.analysis.estimates import Interval, check_share
 from study.analysis.psychometric.model import LARGEST_GUESS, LARGEST_LAPSE, Data, Model, make_model, tidy, why_no_fit
+from study.arrays import FloatArray
 from study.models.posterior_grid import OVERDISPERSION_EDGES, Grid, evaluate, posterior_range
 from study.models.sigmoids import Sigmoid
 
-FloatArray = NDArray[np.float64]
 Status = Literal["reached", "not reached", "not estimable"]
 
 
@@ -38,36 +38,25 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class PsychometricFit:
-    """A psychometric function with its uncertainty.
-
-    Attributes
-    ----------
-    data, model
-        What was fitted to what.
-    threshold
-        The level where the sigmoid reaches one half, between guess and lapse rate; 75% in 2AFC without lapses.
-    width
-        Distance from 5% to 95% of the sigmoid; of the logarithm of the level for Weibull.
-    lapse, guess
-        Rates; a fixed one has an interval of no length.
-    overdispersion
-        Square root of the correlation of answers at one level; 0 for plain binomial.
-    grid
-        The posterior.
-    note
-        What to be careful about.
-    """
+    """A psychometric function with its uncertainty."""
 
     data: Data
     model: Model
+    """`data`, `model`: what was fitted to what."""
     threshold: Estimate
+    """The level where the sigmoid reaches one half, between guess and lapse rate; 75% in 2AFC without lapses."""
     width: Estimate
+    """Distance from 5% to 95% of the sigmoid; of the logarithm of the level for Weibull."""
     lapse: Estimate
     guess: Estimate
+    """`lapse`, `guess`: rates; a fixed one has an interval of no length."""
     overdispersion: Estimate
+    """Square root of the correlation of answers at one level; 0 for plain binomial."""
     grid: Grid
+    """The posterior."""
     confidence: float
     note: str = ""
+    """What to be careful about."""
 
 
 def fit_psychometric(
@@ -83,8 +72,6 @@ def fit_psychometric(
         Answers "yes" (right answers in 2AFC), and all answers.
     model
         From `make_model`; 2AFC with a cumulative normal unless given.
-    confidence
-        Of the intervals.
 
     Notes
     -----
@@ -104,23 +91,10 @@ def fit_psychometric(
     reason = why_no_fit(data)
     if reason:
         return reason
-    return _fit(data, chosen, confidence)
-
-
-def fit_many(
-    levels: ArrayLike, yes: ArrayLike, shown: ArrayLike, model: Model | None = None, *, confidence: float = 0.95
-) -> list[PsychometricFit | str]:
-    """Fit many data sets with the same levels: `yes` and `shown` of shape (fits, levels)."""
-    right, total = np.atleast_2d(np.asarray(yes, float)), np.atleast_2d(np.asarray(shown, float))
-    pairs = zip(right, np.broadcast_to(total, right.shape), strict=True)
-    return [fit_psychometric(levels, one, of, model, confidence=confidence) for one, of in pairs]
-
-
-def _fit(data: Data, model: Model, confidence: float) -> PsychometricFit:
-    axis = model.sigmoid.axis(data.levels)
-    rates = [(model.lapse, LARGEST_LAPSE), (model.guess, LARGEST_GUESS)]
-    ranges = posterior_range(axis, data.yes, data.shown, model.sigmoid, rates, model.overdispersion)
-    grid = evaluate(axis, data.yes, data.shown, model.sigmoid, ranges, model.overdispersion)
+    axis = chosen.sigmoid.axis(data.levels)
+    rates = [(chosen.lapse, LARGEST_LAPSE), (chosen.guess, LARGEST_GUESS)]
+    ranges = posterior_range(axis, data.yes, data.shown, chosen.sigmoid, rates, chosen.overdispersion)
+    grid = evaluate(axis, data.yes, data.shown, chosen.sigmoid, ranges, chosen.overdispersion)
     threshold, width, lapse, guess, excess = (
         _estimate(grid, place, confidence, name)
         for place, name in enumerate(("threshold", "width", "lapse rate", "guess rate", "overdispersion"))
@@ -128,8 +102,8 @@ def _fit(data: Data, model: Model, confidence: float) -> PsychometricFit:
     note = _caution(data)
     return PsychometricFit(
         data=data,
-        model=model,
-        threshold=_within_levels(threshold, axis, model.sigmoid, note),
+        model=chosen,
+        threshold=_within_levels(threshold, axis, chosen.sigmoid, note),
         width=_positive(width),
         lapse=lapse,
         guess=guess,

@@ -46,7 +46,7 @@ class Ratings:
                 study=study,
                 statement=f"{question.item or 'rating'}: {_difference(row, alpha)}.",
                 estimate=row.mean,
-                unit="points of the scale",
+                unit=f"points of the scale, {_what(question.item, row.of)}",
                 interval=Interval(row.low, row.high, confidence),
                 p=row.p_value,
                 p_adjusted=row.p_value if row.holm_p_value is None else row.holm_p_value,
@@ -79,7 +79,7 @@ class PairRatings:
                 study=study,
                 statement=f"{sentence}.",
                 estimate=question.participants.mean,
-                unit=f"points of the scale, {question.middle:g} being the same",
+                unit=f"points of the scale, {_what(question.item, question.of)} ({question.middle:g} is the same)",
                 interval=Interval(question.participants.low, question.participants.high, confidence),
                 p=question.participants.p_value,
                 p_adjusted=question.participants.p_value,
@@ -110,6 +110,11 @@ def analyse_ratings(answers: pd.DataFrame, name: str, settings: Settings) -> Rat
             "scale_points"
         )
     return PairRatings(pair_ratings(answers, settings.scale_points[name], confidence))
+
+
+def _what(item: str, of: str) -> str:
+    """What a number is of, with the question where there are several."""
+    return f"{item}: {of}" if item else of
 
 
 def anova_sentences(questions: Sequence[Question], alpha: float) -> list[str]:

@@ -12,20 +12,18 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis import estimates
-from study.analysis.rank_tests import NO_RANKS, Friedman, friedman, signed_rank
+from study.analysis.rank_tests import NO_RANKS, Friedman, RankTest, friedman, signed_rank
 from study.analysis.ratings.answers import first_seen, rated
-from study.analysis.regression.ordinal import OrdinalFit, fit_ordinal
+from study.analysis.regression.ordinal import fit_ordinal
 from study.analysis.variance.repeated_measures import WithinEffect, mixed_design
 from study.analysis.variance.two_way import TwoWay, two_way
+from study.arrays import FloatArray
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -53,19 +51,6 @@ class MixedDesign:
 
 
 @dataclass(frozen=True)
-class RankTest:
-    """All methods over participants, on ranks."""
-
-    test: str
-    p_value: float
-
-
-@dataclass(frozen=True)
-class FriedmanTest(RankTest, Friedman):
-    """The same where there are more than two methods."""
-
-
-@dataclass(frozen=True)
 class Ranks:
     """The methods over participants on ranks; `note` says why they can't be compared."""
 
@@ -87,15 +72,12 @@ class OrdinalEffect:
 
 @dataclass(frozen=True)
 class Ordinal:
-    """A cumulative-link mixed model, and the test of all methods by its likelihood ratio; `note` says what is amiss."""
+    """A cumulative-link mixed model; `note` says what is amiss."""
 
     effects: tuple[OrdinalEffect, ...] = ()
     spread: float | None = None
     points: tuple[float, ...] = ()
     thresholds: tuple[float, ...] = ()
-    likelihood_ratio: float | None = None
-    degrees_of_freedom: int | None = None
-    p_value: float | None = None
     note: str = ""
 
 
@@ -111,7 +93,6 @@ class Question:
     participants: int
     answers: int
     anova: TwoWay | tuple[()]
-    balanced: bool
     differences: tuple[MethodDifference, ...]
     difference: MethodDifference | None
     mixed_design: MixedDesign
@@ -152,11 +133,10 @@ def _question(name: str, part: pd.DataFrame, confidence: float) -> Question:
         participants=int(part["participant"].nunique()),
         answers=len(part),
         anova=table,
-        balanced=bool(part.groupby(["method_a", "order"]).size().nunique() == 1),
         differences=differences,
         difference=differences[0] if len(differences) == 1 else None,
         mixed_design=_mixed_design(part, 1 - confidence),
-        ranks=Ranks(over, NO_RANKS if over is None else ""),
+        ranks=Ranks(over, _ranks_note(over)),
         ordinal=_ordinal(part, confidence),
         note=note,
     )
@@ -242,8 +222,13 @@ def _ranks(part: pd.DataFrame) -> RankTest | None:
     if wide.shape[1] == 2:
         p_value = signed_rank(wide.iloc[:, 1] - wide.iloc[:, 0])
         return None if p_value is None else RankTest("Wilcoxon's signed ranks", p_value)
-    found = friedman(wide)
-    return None if found is None else FriedmanTest(test="Friedman's test (F by Iman and Davenport)", **vars(found))
+    return friedman(wide)
+
+
+def _ranks_note(found: RankTest | None) -> str:
+    if isinstance(found, Friedman) and found.f is None:
+        return "all participants rank the methods alike: no F by ranks, but an exact p-value"
+    return NO_RANKS if found is None else ""
 
 
 def _ordinal(part: pd.DataFrame, confidence: float) -> Ordinal:
@@ -260,28 +245,16 @@ def _ordinal(part: pd.DataFrame, confidence: float) -> Ordinal:
     fit = fit_ordinal(design, part["rating"], who, names=[*names, "shown second"], confidence=confidence)
     if isinstance(fit, str):
         return Ordinal(note=fit)
-    people = fit.participants
-    without = fit_ordinal(design[:, len(columns) :], part["rating"], who, confidence=confidence)
-    ratio = 2 * (fit.log_likelihood - without.log_likelihood) if isinstance(without, OrdinalFit) else None
     return Ordinal(
         effects=tuple(
-            OrdinalEffect(
-                name=effect.name,
-                value=effect.value if effect.standard_error else None,
-                standard_error=effect.standard_error,
-                interval=effect.interval,
-                p_value=effect.p_value,
-                odds_ratio=float(np.exp(effect.value)) if effect.standard_error else None,
-            )
+            OrdinalEffect(**vars(effect), odds_ratio=float(np.exp(effect.value)))
+            if effect.standard_error
+            else OrdinalEffect(**vars(effect) | {"value": None}, odds_ratio=None)
             for effect in fit.effects
         ),
         spread=fit.spread,
         points=fit.points,
         thresholds=fit.thresholds,
-        likelihood_ratio=None if ratio is None else max(ratio, 0.0),
-        degrees_of_freedom=len(columns),
-        # The chi-square finds too much with few participants; F with participants less one, as Student's t, does not.
-        p_value=None if ratio is None else estimates.f_probability(ratio / len(columns), len(columns), people - 1),
         note=fit.note,
     )
 

@@ -110,8 +110,6 @@ def pair_ratings(answers: pd.DataFrame, points: int, confidence: float = 0.95) -
         there are several `item` and `motion`.
     points
         Of the scale, which is counted from 0.
-    confidence
-        Of the intervals.
 
     Raises
     ------
@@ -187,8 +185,6 @@ def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> OrderTest:
     ----------
     part
         Of one question: `participant`, `a_first`, `score`.
-    confidence
-        Of the intervals.
     """
     rows, groups = [], []
     for a_first in (True, False):

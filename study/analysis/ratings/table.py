@@ -72,8 +72,6 @@ def rating_cells(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[CellR
     ----------
     answers
         Of one rating study: `participant`, `method_a`, `answer`, and where they are known `item` and `trial`.
-    confidence
-        Of the intervals.
 
     Raises
     ------

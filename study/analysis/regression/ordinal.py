@@ -24,9 +24,7 @@ from study.analysis.regression.random_effects import (
     effects_of,
     quadrature,
 )
-from study.errors import AnalysisError
-
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
 
 NODES = 9
 MODE_STEPS = 15
@@ -35,34 +33,23 @@ LARGEST_THRESHOLD = 25.0
 
 @dataclass(frozen=True, eq=False)
 class OrdinalFit:
-    """A cumulative-link mixed model's fit.
-
-    Attributes
-    ----------
-    effects
-        On the logit scale: above 0 where the column makes ratings higher.
-    thresholds
-        Between the points that were used, for a participant with b = 0 and a row of zeros.
-    points
-        The points of the scale that were used, rising.
-    spread
-        Standard deviation of `b` between participants.
-    log_likelihood
-        At the maximum.
-    participants, answers
-        What it rests on.
-    note
-        What to be careful about.
-    """
+    """A cumulative-link mixed model's fit."""
 
     effects: tuple[Effect, ...]
+    """On the logit scale: above 0 where the column makes ratings higher."""
     thresholds: tuple[float, ...]
+    """Between the points that were used, for a participant with b = 0 and a row of zeros."""
     points: tuple[float, ...]
+    """The points of the scale that were used, rising."""
     spread: float
+    """Standard deviation of `b` between participants."""
     log_likelihood: float
+    """At the maximum."""
     participants: int
     answers: int
+    """`participants`, `answers`: what it rests on."""
     note: str = ""
+    """What to be careful about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,26 +82,14 @@ def fit_ordinal(
         Points of the scale. Unused points have no threshold.
     participants : sequence, shape (answers,)
         Who answered.
-    names
-        Of the effects.
     nodes
         Quadrature points.
-
-    Raises
-    ------
-    AnalysisError
-        When shapes do not fit each other.
 
     Notes
     -----
     Standard errors come from the curvature at the maximum; tests are Student's with participants less one.
     """
     matrix, values = np.asarray(design, dtype=np.float64), np.asarray(ratings, dtype=np.float64)
-    if matrix.ndim != 2 or len(matrix) != len(values) or len(participants) != len(values):
-        raise AnalysisError(
-            f"expected as many rows of the design as ratings and participants, found {matrix.shape}, {values.shape} "
-            f"and {len(participants)}"
-        )
     points, code = np.unique(values, return_inverse=True)
     _, person = np.unique(np.asarray(participants).astype(str), return_inverse=True)
     people = int(person.max()) + 1 if len(person) else 0

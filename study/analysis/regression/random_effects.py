@@ -13,11 +13,9 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis.estimates import Interval, t_probability, t_quantile
-
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
 
 NO_SPREAD = 1e-3
 LARGEST_EFFECT = 12.0

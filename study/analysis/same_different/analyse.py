@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.headline import NO_TEST, Headline, holds_for
 from study.analysis.same_different.counts import (
+    PRINTED,
     Counts,
     PercentDifferent,
     Side,
@@ -29,7 +29,7 @@ from study.analysis.same_different.interpolation import crossings
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.analysis.same_different.motions import AcrossMotions, across_motions
-from study.analysis.same_different.order import OrderShare, OrderTest, order_test, shares_by_order
+from study.analysis.same_different.order import OrderTest, order_test
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
 
@@ -39,13 +39,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What all motions together and each by itself have; see `SameDifferent`."""
+    """What all motions together and each by itself have."""
 
     answers: int
     percent_different: tuple[PercentDifferent, ...]
+    """The points of Figure 6."""
     published: dict[Side, Threshold]
+    """Where linear interpolation between them crosses."""
     model: ModelFit | None
     model_note: str
+    """The differencing model of the group's curve, and what to be careful about, or why there is none."""
 
 
 @dataclass(frozen=True)
@@ -53,47 +56,33 @@ class MotionThresholds(Thresholds):
     """A same-different study by one motion."""
 
     motion: str
-    percent_where_different: float | None
-    percent_where_same: float | None
     note: str
 
 
 @dataclass(frozen=True)
 class SameDifferent(Thresholds):
-    """The result of a same-different study.
-
-    Attributes
-    ----------
-    level
-        Share of "different" at threshold.
-    percent_different, published
-        The points of Figure 6, and where linear interpolation between them crosses, by side.
-    model, mixed
-        The differencing model of the group's curve, and that of participants who differ; their notes say what to be
-        careful about, or why there is none.
-    clustering
-        How alike the answers of a participant are, at the pairs with a difference.
-    answer
-        The thresholds in sentences.
-    staircases
-        Thresholds as means of reversals, where trials were chosen by staircases.
-    """
+    """The result of a same-different study."""
 
     keys: ClassVar[Mapping[str, str]] = {"jnd": ""}
 
     participants: int
     missed: int
     level: float
+    """Share of "different" at threshold."""
     mixed: MixedThresholds | None
+    """The differencing model of participants who differ; its note says what to be careful about, or why there is
+    none."""
     mixed_note: str
     d_prime: tuple[LevelDPrime, ...]
     clustering: estimates.Clustering
+    """How alike the answers of a participant are, at the pairs with a difference."""
     motions: tuple[MotionThresholds, ...]
     across_motions: AcrossMotions
-    order: tuple[OrderShare, ...]
     order_test: OrderTest
     answer: str
+    """The thresholds in sentences."""
     staircases: Staircases | None = None
+    """Thresholds as means of reversals, where trials were chosen by staircases."""
 
     def sentences(self, alpha: float) -> list[str]:
         """Return the thresholds in words; they rest on no level of significance."""
@@ -130,8 +119,6 @@ def analyse_jnd(
 
     Parameters
     ----------
-    answers
-        Of one study.
     level
         Share of "different" at threshold.
     confidence, resamples, seed
@@ -162,7 +149,6 @@ def analyse_jnd(
         clustering=estimates.clustering(counts.different[:, moved].sum(axis=1), counts.shown[:, moved].sum(axis=1)),
         motions=_by_motion(given, level, confidence, resamples, rng),
         across_motions=across_motions(given),
-        order=shares_by_order(given),
         order_test=order_test(given),
         answer=in_words(found, mixed, level),
     )
@@ -210,9 +196,8 @@ def in_words(found: Thresholds, mixed: MixedThresholds | str, level: float) -> s
 
 
 def _sides_in_words(thresholds: Mapping[Side, Threshold]) -> str:
-    signs: dict[Side, str] = {"longer": "+", "shorter": "−"}
     parts = []
-    for side, sign in signs.items():
+    for side, sign in PRINTED.items():
         found = thresholds.get(side)
         if found is None:
             continue
@@ -237,14 +222,7 @@ def _by_motion(
             MotionThresholds(
                 **vars(_thresholds(counts, level, confidence, resamples, rng)),
                 motion=str(motion),
-                percent_where_different=_percent(counts, moved),
-                percent_where_same=_percent(counts, ~moved),
                 note="" if moved.any() and not moved.all() else "pairs with a difference only, or without one",
             )
         )
     return tuple(rows)
-
-
-def _percent(counts: Counts, levels: NDArray[np.bool_]) -> float | None:
-    shown = float(counts.shown[:, levels].sum())
-    return 100 * float(counts.different[:, levels].sum()) / shown if shown else None

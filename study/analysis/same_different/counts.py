@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis import estimates
+from study.arrays import FloatArray
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 Side = Literal["shorter", "longer"]
 SIDES: tuple[Side, Side] = ("shorter", "longer")
+SIGNS: Mapping[Side, int] = {"longer": 1, "shorter": -1}
+PRINTED: Mapping[Side, str] = {"longer": "+", "shorter": "−"}
+"""How a difference on a side is written after k."""
 Status = Literal["reached", "not reached", "above", "not estimable"]
 
 FEWEST_FOR_INTERVAL = 2
@@ -27,54 +30,37 @@ NEEDED_COLUMNS = ("participant", "difference_frames", "answer")
 
 @dataclass(frozen=True)
 class Counts:
-    """Answers counted by participant and level.
-
-    Attributes
-    ----------
-    participants
-        In the order of the rows below.
-    differences : ndarray, shape (levels,)
-        Signed difference in blend length, frames, rising: comparison minus reference.
-    different, shown : ndarray, shape (participants, levels)
-        Answers "different", and all answers given; trials without a response are in neither.
-    """
+    """Answers counted by participant and level."""
 
     participants: tuple[str, ...]
+    """In the order of the rows below."""
     differences: FloatArray
+    """`(levels,)`: signed difference in blend length, frames, rising: comparison minus reference."""
     different: FloatArray
     shown: FloatArray
+    """`different`, `shown`: `(participants, levels)`: answers "different", and all answers given; trials without a
+    response are in neither."""
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """A threshold on one side.
-
-    Attributes
-    ----------
-    side
-        "shorter" or "longer" than the reference.
-    frames
-        Size of the difference, always positive; None unless `status` is "reached".
-    standard_error
-        Frames.
-    interval
-        Frames; an open end lies outside the levels shown, or can't be determined.
-    status
-        "reached"; "not reached" within the levels shown; "above": the curve is above the level at the smallest
-        difference shown; "not estimable".
-    method
-        How it was found, and what its interval rests on.
-    note
-        In words, where the status is not "reached" or the estimate needs a caution.
-    """
+    """A threshold on one side."""
 
     side: Side
+    """Either "shorter" or "longer" than the reference."""
     frames: float | None
+    """Size of the difference, always positive; None unless `status` is "reached"."""
     standard_error: float | None
+    """Frames."""
     interval: estimates.Interval
+    """Frames; an open end lies outside the levels shown, or can't be determined."""
     status: Status
+    """One of "reached"; "not reached" within the levels shown; "above": the curve is above the level at the smallest
+    difference shown; "not estimable"."""
     method: str
+    """How it was found, and what its interval rests on."""
     note: str = ""
+    """In words, where the status is not "reached" or the estimate needs a caution."""
 
 
 def log_threshold(

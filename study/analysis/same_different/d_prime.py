@@ -48,8 +48,6 @@ def d_prime(hits: float, different_pairs: float, alarms: float, same_pairs: floa
         Answers "different" of all answers where there was a difference.
     alarms, same_pairs
         The same where there was none.
-    confidence
-        Of the interval.
 
     Raises
     ------

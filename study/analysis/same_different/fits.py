@@ -12,13 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis.estimates import normal_quantile
 from study.analysis.scoring import maximise
+from study.arrays import BoolArray, FloatArray
 from study.models.differencing import ROOT_TWO, Kind, density, detected, probability_different, threshold_delta
-
-FloatArray = NDArray[np.float64]
 
 LARGEST_LAPSE = 0.1
 SMALLEST_PROBABILITY = 1e-9
@@ -28,30 +26,21 @@ D_PRIME_POINTS = 40
 
 @dataclass(frozen=True)
 class Fits:
-    """Maximum-likelihood fits of many data sets, first axis `fits`.
-
-    Attributes
-    ----------
-    criterion : ndarray, shape (fits,)
-        Size of the felt difference above which the answer is "different", in standard deviations of an impression.
-    lapse : ndarray, shape (fits,)
-        Share of answers given blindly, half of them "different".
-    slopes : ndarray, shape (fits, slopes)
-        d-prime a frame.
-    log_likelihood : ndarray, shape (fits,)
-        Without the binomial coefficients.
-    held : ndarray of bool, shape (fits, 2 + slopes)
-        True where a parameter (criterion, lapse, slopes) is at the bound of its range.
-    settled : ndarray of bool, shape (fits,)
-        Whether the search came to rest.
-    """
+    """Maximum-likelihood fits of many data sets, first axis `fits`."""
 
     criterion: FloatArray
+    """`(fits,)`: size of the felt difference above which the answer is "different", in standard deviations of an
+    impression."""
     lapse: FloatArray
+    """`(fits,)`: share of answers given blindly, half of them "different"."""
     slopes: FloatArray
+    """`(fits, slopes)`: d-prime a frame."""
     log_likelihood: FloatArray
-    held: NDArray[np.bool_]
-    settled: NDArray[np.bool_]
+    """`(fits,)`: without the binomial coefficients."""
+    held: BoolArray
+    """`(fits, 2 + slopes)`: true where a parameter (criterion, lapse, slopes) is at the bound of its range."""
+    settled: BoolArray
+    """`(fits,)`: whether the search came to rest."""
 
 
 def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, largest_lapse: float = LARGEST_LAPSE) -> Fits:

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.same_different.counts import FEWEST_FOR_INTERVAL, SIDES, Counts, Side, Threshold, percentages
-
-FloatArray = NDArray[np.float64]
+from study.arrays import FloatArray
 
 
 def crossing_of_lines(sizes: FloatArray, shares: FloatArray, level: float = 0.75) -> FloatArray:
@@ -72,8 +71,6 @@ def crossings(
 
     Parameters
     ----------
-    counts
-        Answers.
     level
         Share of "different" at threshold.
     confidence, resamples

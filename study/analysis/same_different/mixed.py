@@ -15,16 +15,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.same_different import fits
 from study.analysis.same_different.counts import SIDES, Counts, Side, Threshold, frames_by_side, log_threshold
 from study.analysis.same_different.model import why_no_fit
+from study.arrays import BoolArray, FloatArray
 from study.counting import counted
 from study.models.differencing import ROOT_TWO, density, detected
-
-FloatArray = NDArray[np.float64]
 
 FEWEST_PEOPLE = 3
 FARTHEST_SCORE = 4.2
@@ -37,37 +35,26 @@ METHOD = "mixed differencing model; Student interval of the logarithm"
 
 @dataclass(frozen=True)
 class MixedThresholds:
-    """What the mixed model says.
-
-    Attributes
-    ----------
-    typical
-        The median observer's threshold, by side.
-    population
-        Where the mean of all people's curves crosses, by side: what percentages of a large group would show.
-    sensitivity_spread, criterion_spread
-        Standard deviations over people of the logarithms.
-    criterion, lapse
-        The typical observer's criterion, and everybody's lapse rate.
-    log_likelihood, alike_log_likelihood
-        Of this model, and of one without individual differences.
-    alike_p_value
-        Likelihood-ratio test that people are alike. A spread of none is the least there can be, so the ratio is half of
-        the time 0; the mixture of chi-square distributions takes that into account.
-    note
-        What to be careful about.
-    """
+    """What the mixed model says."""
 
     typical: dict[Side, Threshold]
+    """The median observer's threshold, by side."""
     population: dict[Side, Threshold]
+    """Where the mean of all people's curves crosses, by side: what percentages of a large group would show."""
     sensitivity_spread: float
     criterion_spread: float
+    """`sensitivity_spread`, `criterion_spread`: standard deviations over people of the logarithms."""
     criterion: float
     lapse: float
+    """`criterion`, `lapse`: the typical observer's criterion, and everybody's lapse rate."""
     log_likelihood: float
     alike_log_likelihood: float
+    """`log_likelihood`, `alike_log_likelihood`: of this model, and of one without individual differences."""
     alike_p_value: float
+    """Likelihood-ratio test that people are alike. A spread of none is the least there can be, so the ratio is half
+    of the time 0; the mixture of chi-square distributions takes that into account."""
     note: str = ""
+    """What to be careful about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +83,8 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
 
     Parameters
     ----------
-    counts
-        Answers.
     level
         Share of "different" at threshold.
-    confidence
-        Of the intervals.
 
     Returns
     -------
@@ -151,7 +134,7 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
     )
 
 
-def _people(counts: Counts, answered: NDArray[np.bool_]) -> _People:
+def _people(counts: Counts, answered: BoolArray) -> _People:
     present = counts.shown.sum(axis=0) > 0
     shown = counts.shown[answered][:, present]
     # One participant's answers tell the scores to about 2 / sqrt(answers); the grid has to be finer.

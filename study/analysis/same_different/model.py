@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.analysis import estimates
 from study.analysis.same_different import fits
@@ -24,49 +23,33 @@ from study.analysis.same_different.counts import (
     frames_by_side,
     log_threshold,
 )
+from study.arrays import FloatArray
 from study.models.differencing import Kind, probability_different
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ModelFit:
-    """The differencing model fitted to all answers.
-
-    Attributes
-    ----------
-    criterion, lapse
-        Estimates, the first with a standard error that takes the participants as independent.
-    false_alarms
-        Share of "different" that the model gives to pairs with no difference.
-    slopes
-        d-prime a frame, by side.
-    level
-        Share at threshold in what follows, usually 0.75.
-    jnd
-        That share "different", by side.
-    corrected
-        The difference at which an observer with the best criterion is right in that share of the pairs, by side: what
-        the sensitivity allows, whatever the criterion.
-    curve
-        Points (difference in frames, percent) for drawing.
-    log_likelihood
-        At the maximum, without binomial coefficients.
-    note
-        What to be careful about.
-    """
+    """The differencing model fitted to all answers."""
 
     criterion: float
     criterion_error: float | None
+    """Standard error that takes the participants as independent."""
     lapse: float
     false_alarms: float
+    """Share of "different" that the model gives to pairs with no difference."""
     slopes: dict[Side, float]
-    level: float
+    """d-prime a frame, by side."""
     jnd: dict[Side, Threshold]
+    """Where `level` of the answers are "different", by side."""
     corrected: dict[Side, Threshold]
+    """The difference at which an observer with the best criterion is right in that share of the pairs, by side:
+    what the sensitivity allows, whatever the criterion."""
     curve: tuple[tuple[float, float], ...]
+    """Points (difference in frames, percent) for drawing."""
     log_likelihood: float
+    """At the maximum, without binomial coefficients."""
     note: str = ""
+    """What to be careful about."""
 
 
 def fit_model(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) -> ModelFit | str:
@@ -74,12 +57,8 @@ def fit_model(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) 
 
     Parameters
     ----------
-    counts
-        Answers.
     level
         Share of "different", or of right answers, at threshold; above one half.
-    confidence
-        Of the intervals.
 
     Notes
     -----
@@ -113,7 +92,6 @@ def fit_model(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) 
         lapse=float(best.lapse[0]),
         false_alarms=float(alarms[0, 0]),
         slopes={SIDES[side]: float(best.slopes[0, place]) for place, side in enumerate(sides)},
-        level=level,
         jnd=thresholds("different"),
         corrected=thresholds("criterion_free"),
         curve=tuple((float(x), 100 * float(y)) for x, y in zip(line, curve, strict=True)),

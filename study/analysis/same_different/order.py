@@ -1,4 +1,4 @@
-"""Whether the order of presentation matters in a same-different task: answers in, shares by order and tests out."""
+"""Whether the order of presentation matters in a same-different task: answers in, a test out."""
 
 from __future__ import annotations
 
@@ -11,15 +11,6 @@ from study.analysis import estimates
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-@dataclass(frozen=True)
-class OrderShare:
-    """Percent "different", at pairs with a difference, where the reference came first or second."""
-
-    reference_first: bool
-    answers: int
-    percent: float
 
 
 @dataclass(frozen=True)
@@ -37,21 +28,6 @@ class OrderTest:
     degrees_of_freedom: int | None = None
     p_value: float | None = None
     note: str = ""
-
-
-def shares_by_order(given: pd.DataFrame) -> tuple[OrderShare, ...]:
-    """Return the share of "different" where the reference came first and where it came second.
-
-    Under the differencing rule the order does not matter; a gap points to a drift between first and second, or to
-    another rule.
-    """
-    if "reference_first" not in given.columns:
-        return ()
-    known = given[given["reference_first"].notna() & (given["difference_frames"] != 0)]
-    return tuple(
-        OrderShare(bool(first), len(part), 100 * int((part["answer"] == "different").sum()) / len(part))
-        for first, part in known.groupby(known["reference_first"].astype(bool), sort=True)
-    )
 
 
 def order_test(given: pd.DataFrame) -> OrderTest:

@@ -14,78 +14,60 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
-from study.analysis.same_different.counts import Side, Threshold
+from study.analysis.same_different.counts import PRINTED, SIGNS, Side, Threshold
 from study.counting import counted
 from study.models.up_down import Track, UpDown, moved, target
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SIGNS: dict[Side, int] = {"longer": 1, "shorter": -1}
-
 
 @dataclass(frozen=True)
 class StaircaseRun:
-    """One staircase.
-
-    Attributes
-    ----------
-    participant, motion, side, repeat
-        Whose it is, and what it asked.
-    trials, reversals
-        How many there were.
-    frames, spread
-        Mean and standard deviation of the last reversals; None where it stopped before it had as many.
-    levels
-        The difference that each trial showed, in frames without a sign.
-    turns
-        The trials, from 1, at which the direction changed.
-    """
+    """One staircase."""
 
     participant: str
     motion: str
     side: Side
     repeat: int
+    """`participant`, `motion`, `side`, `repeat`: whose it is, and what it asked."""
     trials: int
     reversals: int
+    """`trials`, `reversals`: how many there were."""
     frames: float | None
     spread: float | None
+    """`frames`, `spread`: mean and standard deviation of the last reversals; None where it stopped before it had as
+    many."""
     levels: tuple[int, ...]
+    """The difference that each trial showed, in frames without a sign."""
     turns: tuple[int, ...]
+    """The trials, from 1, at which the direction changed."""
 
 
 @dataclass(frozen=True)
 class Staircases:
-    """The staircases of a study.
-
-    Attributes
-    ----------
-    target
-        The share of right responses at which the rule aims.
-    averaged
-        How many reversals a threshold is the mean of.
-    thresholds
-        Mean over participants of their mean thresholds, by side.
-    spread
-        Mean standard deviation of the averaged reversals within a staircase, in frames, by side.
-    runs
-        Each staircase.
-    """
+    """The staircases of a study."""
 
     target: float
+    """The share of right responses at which the rule aims."""
     averaged: int
+    """How many reversals a threshold is the mean of."""
     thresholds: dict[Side, Threshold]
+    """Mean over participants of their mean thresholds, by side."""
     spread: dict[Side, float]
+    """Mean standard deviation of the averaged reversals within a staircase, in frames, by side."""
     runs: tuple[StaircaseRun, ...]
+    """Each staircase."""
 
     def in_words(self, counted_as: str = "“different”") -> str:
         """Return the thresholds in a sentence; `counted_as` is what right responses are called."""
-        signs: dict[Side, str] = {"longer": "+", "shorter": "−"}
         parts = []
         for side, found in self.thresholds.items():
             error = "" if found.standard_error is None else f" ± {found.standard_error:.1f}"
-            place = f"nothing ({found.note})" if found.frames is None else f"k {signs[side]} {found.frames:.1f}{error}"
-            parts.append(f"{place} frames" if found.frames is not None else place)
+            if found.frames is None:
+                parts.append(f"nothing ({found.note})")
+            else:
+                parts.append(f"k {PRINTED[side]} {found.frames:.1f}{error} frames")
         return (
             f"By the staircases, {100 * self.target:.1f}% of the responses are {counted_as} at {' and '.join(parts)} "
             f"(mean of the last {self.averaged} reversals)."

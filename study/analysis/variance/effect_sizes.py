@@ -14,23 +14,16 @@ LARGEST = 1e6
 
 @dataclass(frozen=True, kw_only=True)
 class Sizes:
-    """How large an effect is, as shares of variance, 0 to 1; None where there is no F.
-
-    Attributes
-    ----------
-    partial_eta_squared
-        Sum of squares of the effect over itself and the error's.
-    partial_omega_squared
-        The same with the part that chance puts into the effect taken out; not below 0.
-    effect_low, effect_high
-        Interval of the share in the population, of 1 - 2 alpha (90% for alpha .05): it holds 0 exactly where F is not
-        significant at alpha.
-    """
+    """How large an effect is, as shares of variance, 0 to 1; None where there is no F."""
 
     partial_eta_squared: float | None = None
+    """Sum of squares of the effect over itself and the error's."""
     partial_omega_squared: float | None = None
+    """The same with the part that chance puts into the effect taken out; not below 0."""
     effect_low: float | None = None
     effect_high: float | None = None
+    """`effect_low`, `effect_high`: interval of the share in the population, of 1 - 2 alpha (90% for alpha .05): it
+    holds 0 exactly where F is not significant at alpha."""
 
 
 def sizes(f: float | None, degrees: float, error_degrees: float, alpha: float = 0.05) -> Sizes:

@@ -19,9 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from study.analysis import estimates
 from study.analysis.variance.effect_sizes import Sizes, sizes
 from study.analysis.variance.two_way import sum_to_zero
+from study.arrays import FloatArray
 from study.counting import counted
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from study.analysis import estimates
 from study.analysis.variance.effect_sizes import Sizes, sizes
+from study.arrays import FloatArray, IntArray
 from study.errors import AnalysisError
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ def _effect(name: str, squares: float, degrees: int, residual: float, left: int,
     return VarianceEffect(name, squares, degrees, mean_square, f, left, p_value, **vars(of))
 
 
-def sum_to_zero(code: NDArray[np.int64], levels: int) -> FloatArray:
+def sum_to_zero(code: IntArray, levels: int) -> FloatArray:
     """Columns that code a factor so that effects sum to zero, shape (rows, levels - 1): the last level is minus one."""
     rows = np.vstack([np.eye(levels - 1), -np.ones(levels - 1)])
     return rows[code]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -41,76 +41,46 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class MainResult:
-    """A result that is given with and without exclusions: what it is, its value, interval, and p-value."""
-
-    result: str
-    value: float | None
-    low: float | None
-    high: float | None
-    p_value: float | None = None
-
-
-@dataclass(frozen=True)
 class Section:
-    """One study on the page.
-
-    Attributes
-    ----------
-    anchor, title
-        Where links lead, and the heading.
-    headlines
-        Shown at the top of the page.
-    drawings, tables, notes
-        In this order; the tables follow the first drawing.
-    folded
-        Tables to open.
-    readings
-        Its lines of the table that compares readings.
-    """
+    """One study on the page."""
 
     anchor: str
     title: str
+    """`anchor`, `title`: where links lead, and the heading."""
     headlines: tuple[Headline, ...]
+    """Shown at the top of the page."""
     drawings: tuple[Drawing, ...] = ()
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
+    """`drawings`, `tables`, `notes`: in this order; the tables follow the first drawing."""
     folded: tuple[Table, ...] = ()
+    """Tables to open."""
     readings: tuple[Reading, ...] = ()
+    """Its lines of the table that compares readings."""
 
 
 @dataclass(frozen=True)
 class About:
-    """What a section knows of its study beside the result.
-
-    Attributes
-    ----------
-    name, title
-        Of the study.
-    fps
-        Frames per second, for seconds beside frames.
-    data, mark
-        Whose answers they are, and what every figure says about its data.
-    alpha
-        Level of significance.
-    points, ends
-        Of a rating scale, counted from 0, and the words at its lowest and highest point, by question.
-    transitions
-        Names of the transitions in the protocol's order.
-    known
-        What is known of simulated observers; empty where people took part.
-    """
+    """What a section knows of its study beside the result."""
 
     name: str
     title: str
+    """`name`, `title`: of the study."""
     fps: float = 30.0
+    """Frames per second, for seconds beside frames."""
     data: Data = "collected"
     mark: str = ""
+    """`data`, `mark`: whose answers they are, and what every figure says about its data."""
     alpha: float = 0.05
+    """Level of significance."""
     points: int = 5
     ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """`points`, `ends`: of a rating scale, counted from 0, and the words at its lowest and highest point, by
+    question."""
     transitions: tuple[str, ...] = ()
+    """Names of the transitions in the protocol's order."""
     known: Mapping[str, Any] = field(default_factory=dict)
+    """What is known of simulated observers; empty where people took part."""
 
     def place(self, motion: str) -> int:
         """Where a motion stands in the protocol; the first participant's plan has another order."""
@@ -126,27 +96,16 @@ Course = tuple[str, Callable[["pd.DataFrame"], "pd.Series[bool]"]]
 
 @dataclass(frozen=True)
 class SectionKind(Generic[Result]):
-    """How a kind of result is shown.
-
-    Attributes
-    ----------
-    section
-        From a result and what is known of its study; None where there is nothing to show.
-    main_results
-        From a result and the study's name: the lines that are given with and without exclusions.
-    methods
-        How studies of this kind were analysed, for a Methods section: from the results and the whole analysis.
-    references
-        Keys of the works that this rests on.
-    course
-        None where answers do not change over a study in any way that is told.
-    """
+    """How a kind of result is shown."""
 
     section: Callable[[Result, About], Section | None]
-    main_results: Callable[[Result, str], Iterable[MainResult]]
+    """From a result and what is known of its study; None where there is nothing to show."""
     methods: Callable[[Collection[Result], Analysis], str]
+    """How studies of this kind were analysed, for a Methods section: from the results and the whole analysis."""
     references: Callable[[Collection[Result]], set[str]]
+    """Keys of the works that this rests on."""
     course: Course | None = None
+    """None where answers do not change over a study in any way that is told."""
 
 
 def readings_table(sections: Sequence[Section]) -> Table | None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from study.analysis.same_different.staircases import SIGNS, StaircaseRun, Staircases
+from study.analysis.same_different.counts import SIGNS
+from study.analysis.same_different.staircases import StaircaseRun, Staircases
 from study.counting import counted
 from study.report import words
-from study.report.drawing import BLUE, FAINT, INK, ORANGE, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import BLUE, FAINT, INK, ORANGE, new_figure, quiet_grid, to_svg
 from study.report.sections.section import Drawing
 from study.report.tables import Table, make
 
@@ -43,8 +44,7 @@ def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
     )
     columns = min(len(drawn), COLUMNS)
     lines = -(-len(drawn) // columns)
-    with style():
-        figure, grid = new_figure(7.2, 1.45 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)
+    with new_figure(7.2, 1.45 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False) as (figure, grid):
         for axes, participant in zip(grid.flat, drawn, strict=False):
             _tracks(axes, [run for run in found.runs if run.participant == participant])
             axes.set_title(participant)
@@ -54,8 +54,7 @@ def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
         for axes in grid.flat[max(len(drawn) - columns, 0) : len(drawn)]:
             axes.tick_params(labelbottom=True)
             axes.set_xlabel("trial")
-        add_mark(figure, mark)
-        svg = to_svg(figure, f"study-{name}-tracks", "The course of every staircase", _spoken(drawn, found))
+        svg = to_svg(figure, f"study-{name}-tracks", "The course of every staircase", _spoken(drawn, found), mark)
     return Drawing(f"{name}_tracks", svg, caption)
 
 

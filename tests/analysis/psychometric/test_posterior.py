@@ -11,7 +11,7 @@ from scipy.stats import betabinom, gumbel_l, logistic, norm
 
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
 from study.analysis.psychometric.model import make_model
-from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_many, fit_psychometric, threshold_at
+from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric, threshold_at
 from study.errors import AnalysisError
 from study.models import posterior_grid
 
@@ -110,7 +110,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     rng = np.random.default_rng(6)
     yes = rng.binomial(40, share("normal", 4, 3, 0.5, 0.02), size=(150, 7))
     inside = []
-    for fit in fit_many(LEVELS, yes, np.full(7, 40)):
+    for fit in (fit_psychometric(LEVELS, one, np.full(7, 40)) for one in yes):
         assert isinstance(fit, PsychometricFit)
         low, high = fit.threshold.interval.low, fit.threshold.interval.high
         inside.append((low is None or low < 4) and (high is None or high > 4))
@@ -214,5 +214,6 @@ def test_speed_is_of_the_right_order() -> None:
     yes = rng.binomial(40, share("normal", 4, 3, 0.5, 0.02), size=(10, 7))
     fit_psychometric(LEVELS, yes[0], [40] * 7)
     start = time.perf_counter()
-    fit_many(LEVELS, yes, np.full(7, 40))
+    for one in yes:
+        fit_psychometric(LEVELS, one, np.full(7, 40))
     assert (time.perf_counter() - start) / 10 < 0.03

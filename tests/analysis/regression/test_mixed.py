@@ -14,7 +14,6 @@ from scipy.stats import norm
 from study.analysis.preference.mixed import mixed_preference
 from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.regression.mixed import MixedFit, fit_mixed
-from study.errors import AnalysisError
 
 
 def group(rng: np.random.Generator, people: int, answers: int, mean: float, spread: float) -> np.ndarray:
@@ -95,13 +94,6 @@ def test_missing_cells_and_empty_data() -> None:
     assert mixed_preference(alike).percent is None
     separated = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": [1.0, 0] * 5, "a_first": [True, False] * 5})
     assert mixed_preference(separated).note
-
-
-def test_refusals() -> None:
-    with pytest.raises(AnalysisError, match="expected the link probit or logit, found 'cloglog'"):
-        fit_mixed([[1.0]], [[1.0]], [1], [2], ["a"], link="cloglog")  # type: ignore[arg-type]
-    with pytest.raises(AnalysisError, match="as many rows"):
-        fit_mixed(np.ones((3, 1)), np.ones((2, 1)), [1, 1, 1], [2, 2, 2], list("abc"))
 
 
 def test_eight_participants_are_fast() -> None:

@@ -9,7 +9,6 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from study.analysis.regression.ordinal import OrdinalFit, fit_ordinal
-from study.errors import AnalysisError
 
 
 def drawn(rng: np.random.Generator, people: int, effect: float, spread: float) -> tuple[np.ndarray, ...]:
@@ -91,8 +90,3 @@ def test_separated_ratings_have_no_standard_error() -> None:
 )
 def test_hopeless_ratings_are_said(ratings: list[int], who: list[int], says: str) -> None:
     assert says in str(fit_ordinal(np.ones((len(ratings), 1)), ratings, who))
-
-
-def test_refusals() -> None:
-    with pytest.raises(AnalysisError, match="as many rows of the design"):
-        fit_ordinal(np.ones((2, 1)), [1, 2, 3], [0, 1, 2])

@@ -200,7 +200,6 @@ def test_tests_over_participants_agree_where_they_ask_the_same() -> None:
         effects["method"].p_value,
         question.ranks.participants.p_value,
         ordinal.p_value,
-        question.ordinal.p_value,
     ):
         assert p_value < 0.01
     assert [effect.name for effect in question.ordinal.effects] == [ordinal.name, "shown second"]

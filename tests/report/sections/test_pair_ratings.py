@@ -141,4 +141,4 @@ def test_a_whole_report_of_rated_pairs(results_folder: Callable[..., Path], peop
     if left_out:
         with (folder / "tables" / "exclusions.csv").open(encoding="utf-8") as file:
             results = [line["result"] for line in csv.DictReader(file)]
-        assert "naturalness: natural: fixed compared with geodesic" in results
+        assert "Naturalness: points of the scale, natural: fixed compared with geodesic (2 is the same)" in results

@@ -23,7 +23,6 @@ def question(item: str, mean: float, f: float, p: float) -> Question:
         participants=26,
         answers=52,
         anova=(effect, effect, effect, VarianceRow("residual", 48.0, 48, 1.0)),
-        balanced=True,
         differences=(difference,),
         difference=difference,
         mixed_design=MixedDesign((), ("method",), 26, 0, ""),

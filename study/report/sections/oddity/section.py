@@ -6,14 +6,15 @@ from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from study.analysis.analyse import Analysis
-from study.analysis.oddity.analyse import SIGNS, Oddity
+from study.analysis.oddity.analyse import Oddity
 from study.analysis.psychometric.analyse import BelievedThreshold
+from study.analysis.same_different.counts import SIGNS
 from study.counting import counted
 from study.models.oddity import CHANCE, HALFWAY
 from study.report import tables, words
-from study.report.drawing import BLUE, INK, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import BLUE, INK, SOFT, new_figure, percent_axis, to_svg
 from study.report.references import MACMILLAN_2005
-from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.report.tables import Table
 
@@ -52,11 +53,8 @@ def oddity_section(result: Oddity, about: About) -> Section | None:
 def oddity_figure(result: Oddity, name: str, mark: str) -> str:
     """Draw right answers by difference, with the function of each side and its threshold."""
     levels = result.levels
-    with style():
-        figure, axes = new_figure(7.2, 3.7)
-        axes.set_ylim(-3, 103)
-        axes.set_yticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
-        quiet_grid(axes)
+    with new_figure(7.2, 3.7) as (figure, axes):
+        percent_axis(axes)
         axes.axhline(100 * CHANCE, color=SOFT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
         axes.axhline(100 * HALFWAY, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
         for side, found in result.functions.items():
@@ -71,9 +69,8 @@ def oddity_figure(result: Oddity, name: str, mark: str) -> str:
         axes.set_xticks(ticks, [f"{tick:+d}".replace("-", "−") for tick in ticks])
         axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
         axes.set_ylabel("right answers")
-        add_mark(figure, mark)
         spoken = "; ".join(f"{one.difference_frames:+d} frames: {one.percent:.0f}%" for one in levels)
-        return to_svg(figure, name, "Percent of right answers by difference in blend length", spoken)
+        return to_svg(figure, name, "Percent of right answers by difference in blend length", spoken, mark)
 
 
 def _frames(found: BelievedThreshold, fps: float) -> str:
@@ -128,11 +125,6 @@ def _readings(result: Oddity) -> Iterator[Reading]:
             yield Reading(f"threshold, {side} [frames]", "", told)
 
 
-def _main_results(result: Oddity, study: str) -> Iterator[MainResult]:
-    for side, found in result.thresholds.items():
-        yield MainResult(f"{words.readable(study)}: threshold, {side} [frames]", found.value, found.low, found.high)
-
-
 def _methods(found: Collection[Oddity], analysis: Analysis) -> str:
     del found, analysis
     return (
@@ -147,4 +139,4 @@ def _right(given: pd.DataFrame) -> pd.Series[bool]:
     return given["correct"].astype(bool)
 
 
-KIND = SectionKind(oddity_section, _main_results, _methods, lambda _: {MACMILLAN_2005}, ("right answers", _right))
+KIND = SectionKind(oddity_section, _methods, lambda _: {MACMILLAN_2005}, ("right answers", _right))

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from study.analysis.ratings.pairs import PairQuestion, ScoreTest
-from study.report.drawing import BLUE, INK, ORANGE, RULE, SOFT, add_mark, new_figure, quiet_grid, style, to_svg
+from study.report.drawing import BLUE, INK, ORANGE, RULE, SOFT, new_figure, quiet_grid, to_svg
 from study.report.words import readable
 
 if TYPE_CHECKING:
@@ -36,8 +36,10 @@ def likert_figure(questions: Sequence[PairQuestion], name: str, mark: str, ends:
     """
     points = len(questions[0].distribution)
     places = [-float(row) for row in range(len(questions))]
-    with style():
-        figure, (bars, means) = new_figure(7.2, 0.62 * len(questions) + 1.35, 1, 2, width_ratios=(1.9, 1), sharey=True)
+    with new_figure(7.2, 0.62 * len(questions) + 1.35, 1, 2, width_ratios=(1.9, 1), sharey=True) as (
+        figure,
+        (bars, means),
+    ):
         widest = max(_bar(bars, question, at, points) for question, at in zip(questions, places, strict=True))
         for question, at in zip(questions, places, strict=True):
             _mean(means, question.participants, at)
@@ -54,8 +56,7 @@ def likert_figure(questions: Sequence[PairQuestion], name: str, mark: str, ends:
             axes.spines["left"].set_visible(False)
         figure.legend(loc="outside upper center", ncols=points, fontsize=8.5, labelcolor=SOFT, handlelength=1.0,
                       handles=_keys(points), title="points of the scale", title_fontsize=8.5)  # fmt: skip
-        add_mark(figure, mark)
-        return to_svg(figure, name, "Answers at each point of the scale, and mean scores", _spoken(questions))
+        return to_svg(figure, name, "Answers at each point of the scale, and mean scores", _spoken(questions), mark)
 
 
 def shades(points: int) -> list[str]:

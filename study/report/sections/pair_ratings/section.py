@@ -14,7 +14,7 @@ from study.analysis.ratings.pairs import AllAnswers, PairQuestion, ScoreTest
 from study.counting import counted
 from study.report import tables, words
 from study.report.sections.pair_ratings.figures import likert_figure
-from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.tables import Table
 from study.transitions.methods.method import WANG_2003
 
@@ -199,13 +199,6 @@ def _folded(name: str, questions: Sequence[PairQuestion]) -> list[Table]:
 # Beside the section
 
 
-def _main_results(result: PairRatings, study: str) -> Iterator[MainResult]:
-    for question in result.questions:
-        people = question.participants
-        what = words.readable(": ".join(filter(None, (question.item, question.of))))
-        yield MainResult(f"{words.readable(study)}: {what}", people.mean, people.low, people.high, people.p_value)
-
-
 def _methods(found: Collection[PairRatings], analysis: Analysis) -> str:
     del found, analysis
     return (
@@ -215,4 +208,4 @@ def _methods(found: Collection[PairRatings], analysis: Analysis) -> str:
     )
 
 
-KIND = SectionKind(pair_ratings_section, _main_results, _methods, lambda _: {WANG_2003})
+KIND = SectionKind(pair_ratings_section, _methods, lambda _: {WANG_2003})

@@ -14,10 +14,8 @@ from study.report.drawing import (
     INK,
     RULE,
     SOFT,
-    add_mark,
+    named_rows,
     new_figure,
-    quiet_grid,
-    style,
     to_svg,
 )
 from study.report.words import readable
@@ -30,8 +28,7 @@ def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
     """Percent favouring the first method: every motion with Wilson's interval, and all together by the default test."""
     motions, found, pooled = comparison.motions, comparison.default, comparison.published
     labels = [readable(row.motion) for row in motions]
-    with style():
-        figure, axes = new_figure(7.2, 0.34 * (len(motions) + 3) + 0.9)
+    with new_figure(7.2, 0.34 * (len(motions) + 3) + 0.9) as (figure, axes):
         axes.axvline(50, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
         for row, motion in enumerate(motions):
             if motion.percent is not None:
@@ -52,18 +49,14 @@ def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
         axes.axhline(-len(motions) + 0.35, color=RULE, linewidth=0.9)
         places = [*(-row for row in range(len(motions))), foot, foot - 1]
         over = "all, over participants" + (" and motions" if found.test == OVER_BOTH else "")
-        axes.set_yticks(places, [*labels, "all answers", over])
-        axes.tick_params(axis="y", labelcolor=INK)
-        axes.spines["left"].set_visible(False)
-        quiet_grid(axes, "x")
+        named_rows(axes, places, [*labels, "all answers", over])
         axes.set_xlim(-1, 101)
         axes.set_xticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
         a, b = readable(comparison.method_a), readable(comparison.method_b)
         axes.set_xlabel(f"responses that favoured {a} over {b}")
-        add_mark(figure, mark)
         known = [row for row in motions if row.percent is not None]
         spoken = "; ".join(f"{readable(row.motion)}: {row.percent:.0f}%" for row in known)
-        return to_svg(figure, name, f"Percent favouring {a} over {b}", spoken)
+        return to_svg(figure, name, f"Percent favouring {a} over {b}", spoken, mark)
 
 
 def _at_the_right(axes: Axes, height: float, text: str, colour: str = INK) -> None:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,7 +28,7 @@ from study.report.references import (
     WILSON_1927,
 )
 from study.report.sections.preference.figures import preference_figure
-from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.tables import Table
 
 
@@ -314,13 +314,6 @@ def confirmatory_table(tests: Sequence[ConfirmatoryTest]) -> Table | None:
 # Beside the section
 
 
-def _main_results(result: Preference, study: str) -> Iterator[MainResult]:
-    for compared in result.comparisons:
-        found = compared.default
-        what = f"{words.readable(study)}: {' over '.join(methods_of(compared))} [%]"
-        yield MainResult(what, found.percent, found.low, found.high, found.p_value)
-
-
 def _methods(found: Collection[Preference], analysis: Analysis) -> str:
     count = len(analysis.confirmatory)
     family = f" P-values were adjusted by Holm’s method over {count} comparisons." if count > 1 else ""
@@ -349,7 +342,6 @@ def _references(found: Collection[Preference]) -> set[str]:
 
 KIND = SectionKind(
     preference_section,
-    _main_results,
     _methods,
     _references,
     ("answers for the first", lambda given: given["answer"] == "first"),

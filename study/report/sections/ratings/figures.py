@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any
 from study.analysis.ratings.table import CellRating, MethodRating
 from study.report.drawing import (
     BLUE,
-    INK,
     ORANGE,
     SOFT,
     TEAL,
-    add_mark,
+    named_rows,
     new_figure,
     quiet_grid,
-    style,
     to_svg,
 )
 from study.report.words import readable
@@ -27,24 +25,19 @@ if TYPE_CHECKING:
 
 def ratings_figure(rows: Sequence[MethodRating], name: str, mark: str, points: int) -> str:
     """Mean ratings with intervals over participants, for every question and method."""
-    with style():
-        figure, axes = new_figure(7.2, 0.36 * len(rows) + 1.0)
+    with new_figure(7.2, 0.36 * len(rows) + 1.0) as (figure, axes):
         axes.set_ylim(0.5 - len(rows), 0.5)
         for place, row in enumerate(rows):
             if row.low is not None:
                 axes.plot([row.low, row.high], [-place, -place], color=BLUE, linewidth=2)
             axes.plot([row.mean], [-place], "s", color=BLUE, markersize=5.5)
         labels = [readable(": ".join(filter(None, (row.item, row.method)))) for row in rows]
-        axes.set_yticks([-place for place in range(len(rows))], labels)
-        axes.tick_params(axis="y", labelcolor=INK)
-        axes.spines["left"].set_visible(False)
-        quiet_grid(axes, "x")
+        named_rows(axes, [-place for place in range(len(rows))], labels)
         axes.set_xlim(-0.1, points - 0.9)
         axes.set_xticks(range(points))
         axes.set_xlabel("mean rating")
-        add_mark(figure, mark)
         spoken = "; ".join(f"{label}: {row.mean:.2f}" for label, row in zip(labels, rows, strict=True))
-        return to_svg(figure, name, "Mean ratings", spoken)
+        return to_svg(figure, name, "Mean ratings", spoken, mark)
 
 
 def cells_figure(cells: Sequence[CellRating], name: str, mark: str, points: int) -> str:
@@ -54,8 +47,7 @@ def cells_figure(cells: Sequence[CellRating], name: str, mark: str, points: int)
     orders = list(dict.fromkeys(row.order for row in cells))
     columns = 3  # also for fewer: panels keep their size
     lines = -(-len(items) // columns)
-    with style():
-        figure, grid = new_figure(7.2, 2.3 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False)
+    with new_figure(7.2, 2.3 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False) as (figure, grid):
         for axes, item in zip(grid.flat, items, strict=False):
             for place, order in enumerate(orders):
                 own = [row for row in cells if row.item == item and row.order == order]
@@ -69,11 +61,10 @@ def cells_figure(cells: Sequence[CellRating], name: str, mark: str, points: int)
         for axes in grid.flat[len(items) :]:
             axes.set_axis_off()
         _cells_key(figure, orders)
-        add_mark(figure, mark)
         spoken = "; ".join(
             readable(f"{row.item} {row.method}, {row.order} seen first: {row.mean:.2f}") for row in cells
         )
-        return to_svg(figure, name, "Mean ratings by method and order of presentation", spoken)
+        return to_svg(figure, name, "Mean ratings by method and order of presentation", spoken, mark)
 
 
 def _order_style(place: int) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from study.analysis.variance.two_way import VarianceEffect
 from study.counting import counted
 from study.report import tables, words
 from study.report.sections.ratings import figures
-from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.tables import Table
 from study.transitions.methods.method import WANG_2003
 
@@ -284,12 +284,6 @@ def _folded(name: str, result: Ratings) -> list[Table]:
 # Beside the section
 
 
-def _main_results(result: Ratings, study: str) -> Iterator[MainResult]:
-    for rated in result.table:
-        what = words.readable(": ".join(filter(None, (rated.item, rated.method))))
-        yield MainResult(f"{words.readable(study)}: {what}", rated.mean, rated.low, rated.high)
-
-
 def _methods(found: Collection[Ratings], analysis: Analysis) -> str:
     del found, analysis
     return (
@@ -298,4 +292,4 @@ def _methods(found: Collection[Ratings], analysis: Analysis) -> str:
     )
 
 
-KIND = SectionKind(ratings_section, _main_results, _methods, lambda _: {WANG_2003})
+KIND = SectionKind(ratings_section, _methods, lambda _: {WANG_2003})

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
-from study.analysis.same_different.counts import PercentDifferent, Side, Threshold
+from study.analysis.same_different.counts import SIDES, SIGNS, PercentDifferent, Side, Threshold
 from study.report.drawing import (
     BLUE,
     FAINT,
@@ -17,18 +17,15 @@ from study.report.drawing import (
     ORANGE,
     RULE,
     SOFT,
-    add_mark,
+    named_rows,
     new_figure,
-    quiet_grid,
-    style,
+    percent_axis,
     to_svg,
 )
 from study.report.words import readable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-SIGNS: Mapping[Side, float] = {"shorter": -1.0, "longer": 1.0}
 
 
 def _points(axes: Axes, rows: Sequence[PercentDifferent], size: float = 5.0) -> None:
@@ -40,16 +37,13 @@ def _points(axes: Axes, rows: Sequence[PercentDifferent], size: float = 5.0) -> 
     axes.errorbar(across, up, yerr=errors, fmt="o", color=INK, markersize=size, elinewidth=1.1, capsize=2.5, zorder=4)
 
 
-def _percent_axis(axes: Axes, level: float) -> None:
-    axes.set_ylim(-3, 103)
-    axes.set_yticks([0, 25, 50, 75, 100], ["0", "25", "50", "75", "100%"])
-    quiet_grid(axes)
+def _level_axis(axes: Axes, level: float) -> None:
+    percent_axis(axes)
     axes.axhline(100 * level, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
     axes.axvline(0, color=RULE, linewidth=0.9, zorder=0)
 
 
-def _level_ticks(axes: Axes, rows: Sequence[PercentDifferent]) -> None:
-    levels = [row.difference_frames for row in rows]
+def _level_ticks(axes: Axes, levels: Sequence[float]) -> None:
     axes.set_xticks(levels, [f"{level:+.0f}".replace("-", "−") if level else "k" for level in levels])
 
 
@@ -74,11 +68,10 @@ def _model_threshold(axes: Axes, threshold: Threshold, level: float, label: bool
 def same_different_figure(result: SameDifferent, name: str, mark: str) -> str:
     """Percent "different" by difference in blend length, with both readings of the threshold (2004 Figure 6)."""
     rows, model = result.percent_different, result.model
-    with style():
-        figure, axes = new_figure(7.2, 3.9)
-        _percent_axis(axes, result.level)
+    with new_figure(7.2, 3.9) as (figure, axes):
+        _level_axis(axes, result.level)
         _points(axes, rows)
-        _level_ticks(axes, rows)
+        _level_ticks(axes, [row.difference_frames for row in rows])
         if model:
             across, up = zip(*model.curve, strict=True)
             axes.plot(across, up, color=BLUE, linewidth=1.8, zorder=3)
@@ -87,8 +80,7 @@ def same_different_figure(result: SameDifferent, name: str, mark: str) -> str:
         axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
         axes.set_ylabel("answers “different”")
         _key(axes, bool(model))
-        add_mark(figure, mark)
-        return to_svg(figure, name, "Percent “different” by difference in blend length", _spoken_levels(rows))
+        return to_svg(figure, name, "Percent “different” by difference in blend length", _spoken_levels(rows), mark)
 
 
 def _key(axes: Axes, with_model: bool) -> None:
@@ -112,10 +104,9 @@ def motions_figure(result: SameDifferent, name: str, mark: str) -> str:
     motions = result.motions
     columns = min(len(motions), 3)
     lines = -(-len(motions) // columns)
-    with style():
-        figure, grid = new_figure(7.2, 2.5 * lines + 0.25, lines, columns, sharey=True, sharex=True, squeeze=False)
+    with new_figure(7.2, 2.5 * lines + 0.25, lines, columns, sharey=True, sharex=True, squeeze=False) as (figure, grid):
         for axes, motion in zip(grid.flat, motions, strict=False):
-            _percent_axis(axes, result.level)
+            _level_axis(axes, result.level)
             _points(axes, motion.percent_different, size=3.5)
             if motion.model:
                 across, up = zip(*motion.model.curve, strict=True)
@@ -128,38 +119,32 @@ def motions_figure(result: SameDifferent, name: str, mark: str) -> str:
         figure.supylabel("answers “different”", fontsize=9.5)
         for axes in grid[-1]:
             axes.set_xlabel("difference, frames")
-        add_mark(figure, mark)
         spoken = ". ".join(f"{readable(m.motion)}: {_spoken_levels(m.percent_different)}" for m in motions)
-        return to_svg(figure, name, "Percent “different” for every motion", spoken)
+        return to_svg(figure, name, "Percent “different” for every motion", spoken, mark)
 
 
 def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mapping[Side, float]) -> str:
     """Thresholds with intervals: all motions and each one, linear interpolation and model, shorter and longer."""
     entries: list[tuple[str, SameDifferent | MotionThresholds]] = [("all motions", result)]
     entries += [(readable(motion.motion), motion) for motion in result.motions if len(result.motions) > 1]
-    with style():
-        figure, axes = new_figure(7.2, 0.62 * len(entries) + 1.15)
+    with new_figure(7.2, 0.62 * len(entries) + 1.15) as (figure, axes):
         axes.axvline(0, color=FAINT, linewidth=0.9)
         for row, (_, entry) in enumerate(entries):
-            for side in SIGNS:
+            for side in SIDES:
                 _bar(axes, entry.published[side], -row + 0.14, INK, "o")
                 if entry.model and side in entry.model.jnd:
                     _bar(axes, entry.model.jnd[side], -row - 0.14, BLUE, "s")
         for side, place in known.items():
             axes.axvline(SIGNS[side] * place, color=ORANGE, linewidth=1.0, linestyle=(0, (2, 2)), zorder=0)
-        axes.set_yticks([-row for row in range(len(entries))], [label for label, _ in entries])
-        axes.tick_params(axis="y", labelcolor=INK)
+        named_rows(axes, [-row for row in range(len(entries))], [label for label, _ in entries])
         axes.set_ylim(-len(entries) + 0.5, 0.5)
-        axes.spines["left"].set_visible(False)
-        quiet_grid(axes, "x")
         ticks = sorted({row.difference_frames for row in result.percent_different})
         if ticks:
             axes.set_xlim(min(*ticks, -1) * 1.02, max(*ticks, 1) * 1.02)
-            axes.set_xticks(ticks, [f"{tick:+.0f}".replace("-", "−") if tick else "k" for tick in ticks])
+            _level_ticks(axes, ticks)
         axes.set_xlabel(f"{100 * result.level:.0f}% “different”, frames from k")
         _threshold_key(axes, bool(known))
-        add_mark(figure, mark)
-        return to_svg(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries))
+        return to_svg(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries), mark)
 
 
 def _bar(axes: Axes, threshold: Threshold, height: float, colour: str, marker: str) -> None:
@@ -190,7 +175,7 @@ def _threshold_key(axes: Axes, known: bool) -> None:
 def _spoken_thresholds(entries: Sequence[tuple[str, SameDifferent | MotionThresholds]]) -> str:
     parts = []
     for label, entry in entries:
-        for side in SIGNS:
+        for side in SIDES:
             found = entry.published[side].frames
             parts.append(f"{label}, {side}: " + (f"{found:.1f} frames" if found is not None else "not found"))
     return "; ".join(parts)

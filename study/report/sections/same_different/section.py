@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from study.analysis.analyse import Analysis
 from study.analysis.same_different.analyse import SameDifferent
-from study.analysis.same_different.counts import Side, Threshold
+from study.analysis.same_different.counts import PRINTED, Side, Threshold
 from study.analysis.same_different.mixed import MixedThresholds
 from study.analysis.same_different.model import ModelFit
 from study.analysis.same_different.motions import AcrossMotions
@@ -21,14 +21,13 @@ from study.report import words
 from study.report.references import FIELLER_1954, MACMILLAN_2005, WILSON_1927
 from study.report.sections.same_different import figures
 from study.report.sections.same_different.tables import (
-    SIDES,
     d_prime_table,
     motion_table,
     percent_table,
     recovery_table,
     threshold_table,
 )
-from study.report.sections.section import About, Drawing, Headline, MainResult, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.transitions.methods.method import WANG_2004
 
@@ -69,32 +68,30 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
     )
 
 
-def _drawings(result: SameDifferent, about: About) -> list[Drawing]:
-    truth = {
-        side: abs(known) for side, _ in SIDES if (known := about.known.get(f"threshold_{side}_frames")) is not None
-    }
-    makers: list[tuple[str, Callable[[str], str], str]] = [
-        (
-            "curve",
-            lambda place: figures.same_different_figure(result, place, about.mark),
-            "Answers “different” by the difference in blend length from k, the length that the reference method "
-            "gives. Points: means over participants ± one standard error, interpolated linearly as in 2004. Curve: "
-            "the differencing model; its drop lines are the just noticeable differences, the bars at their feet 95% "
-            "intervals (jackknife over participants).",
-        ),
-        (
-            "thresholds",
-            lambda place: figures.thresholds_figure(result, place, about.mark, truth),
-            "The just noticeable difference with 95% intervals over participants: Fieller’s for linear interpolation, "
-            "the jackknife’s for the model. Without a bar, the interval reaches beyond the levels shown.",
-        ),
-    ]
+def _drawings(result: SameDifferent, about: About) -> Iterator[Drawing]:
+    name, mark = about.name, about.mark
+    truth = {side: abs(known) for side in PRINTED if (known := about.known.get(f"threshold_{side}_frames")) is not None}
+    yield Drawing(
+        f"{name}_curve",
+        figures.same_different_figure(result, f"study-{name}-curve", mark),
+        "Answers “different” by the difference in blend length from k, the length that the reference method gives. "
+        "Points: means over participants ± one standard error, interpolated linearly as in 2004. Curve: the "
+        "differencing model; its drop lines are the just noticeable differences, the bars at their feet 95% intervals "
+        "(jackknife over participants).",
+    )
+    yield Drawing(
+        f"{name}_thresholds",
+        figures.thresholds_figure(result, f"study-{name}-thresholds", mark, truth),
+        "The just noticeable difference with 95% intervals over participants: Fieller’s for linear interpolation, the "
+        "jackknife’s for the model. Without a bar, the interval reaches beyond the levels shown.",
+    )
     if len(result.motions) > 1:
-        caption = "The same for every motion by itself: means ± one standard error, and the model."
-        makers.append(("motions", lambda place: figures.motions_figure(result, place, about.mark), caption))
-    name = about.name
-    drawn = [Drawing(f"{name}_{part}", draw(f"study-{name}-{part}"), caption) for part, draw, caption in makers]
-    return [*drawn, *([tracks_drawing(name, result.staircases, about.mark)] if result.staircases else [])]
+        svg = figures.motions_figure(result, f"study-{name}-motions", mark)
+        yield Drawing(
+            f"{name}_motions", svg, "The same for every motion by itself: means ± one standard error, and the model."
+        )
+    if result.staircases:
+        yield tracks_drawing(name, result.staircases, mark)
 
 
 # In words
@@ -109,7 +106,7 @@ def headline(result: SameDifferent, fps: float, data: str) -> Headline:
     who = SUBJECTS[data](result.participants)
     percent = f"{100 * result.level:.0f}% “different”"
     chosen = thresholds_of(result)
-    places = [place for side, _ in SIDES if (place := _place(result, chosen, side, fps))]
+    places = [place for side in PRINTED if (place := _place(result, chosen, side, fps))]
     if not places:
         return Headline(
             f"No just noticeable difference can be given from the answers of {who}.", _detail(result, chosen)
@@ -140,18 +137,18 @@ def _detail(result: SameDifferent, chosen: Mapping[Side, Threshold]) -> str:
     size = f"{counted(result.answers, 'answer')} of {counted(result.participants, 'participant')}"
     parts = []
     if result.model:
-        ends = [f"{_ends(found)} {side}" for side, _ in SIDES if (found := chosen.get(side)) and _closed(found)]
+        ends = [f"{_ends(found)} {side}" for side in PRINTED if (found := chosen.get(side)) and _closed(found)]
         over = "over participants" if result.participants > 1 else "of one participant, answers treated as independent"
         parts.append(
             f"Differencing model, {size}" + (f"; 95% intervals {over}: {words.joined(ends)}." if ends else ".")
         )
     else:
         parts.append(f"Linear interpolation, {size}. No model was fitted: {result.model_note}.")
-    absent = [side for side, _ in SIDES if side in chosen and chosen[side].frames is None]
+    absent = [side for side in PRINTED if side in chosen and chosen[side].frames is None]
     parts += [f"Where the blend was {side}: {chosen[side].note}." for side in absent]
     if result.model:
         published = result.published
-        places = [f"k {sign} {_frames(published[side])}" for side, sign in SIDES if side in published]
+        places = [f"k {sign} {_frames(published[side])}" for side, sign in PRINTED.items() if side in published]
         parts.append(f"Linear interpolation, as published in 2004: {words.joined(places)} frames.")
     return " ".join(parts)
 
@@ -170,7 +167,7 @@ def _frames(threshold: Threshold) -> str:
 
 def _readings(result: SameDifferent) -> Iterator[Reading]:
     model = result.model.jnd if result.model else {}
-    for side, sign in SIDES:
+    for side, sign in PRINTED.items():
         published = result.published.get(side)
         yield Reading(
             f"just noticeable difference, {side}",
@@ -266,12 +263,6 @@ def thresholds_of(result: SameDifferent) -> Mapping[Side, Threshold]:
     return result.model.jnd if result.model else result.published
 
 
-def _main_results(result: SameDifferent, study: str) -> Iterator[MainResult]:
-    for side, found in thresholds_of(result).items():
-        what = f"{words.readable(study)}: threshold, {side} [frames]"
-        yield MainResult(what, found.frames, found.interval.low, found.interval.high)
-
-
 def _methods(found: Collection[SameDifferent], analysis: Analysis) -> str:
     del analysis
     percent = f"{100 * next(iter(found)).level:.0f}%"
@@ -292,7 +283,6 @@ def _right(given: pd.DataFrame) -> pd.Series[bool]:
 
 KIND = SectionKind(
     same_different_section,
-    _main_results,
     _methods,
     lambda _: {WANG_2004, FIELLER_1954, MACMILLAN_2005, WILSON_1927},
     ("right answers", _right),

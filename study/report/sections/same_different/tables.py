@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
-from study.analysis.same_different.counts import Side, Threshold
+from study.analysis.same_different.counts import PRINTED, Side, Threshold
 from study.report import words
 from study.report.tables import Table, make
-
-SIDES: tuple[tuple[Side, str], ...] = (("longer", "+"), ("shorter", "−"))
 
 
 def _threshold_rows(entry: SameDifferent | MotionThresholds, fps: float) -> list[dict[str, Any]]:
@@ -106,7 +104,7 @@ def d_prime_table(name: str, result: SameDifferent) -> Table:
 def recovery_table(name: str, result: SameDifferent, known: Mapping[str, Any]) -> Table:
     """Return the thresholds that the simulated observers had beside those that were found."""
     rows = []
-    for side, _ in SIDES:
+    for side in PRINTED:
         own = result.staircases.thresholds if result.staircases else {}
         for label, thresholds, truths, key in (
             ("differencing model", result.model.jnd if result.model else {}, known, f"threshold_{side}_frames"),
