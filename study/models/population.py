@@ -39,29 +39,30 @@ class SameDifferentObserver:
 
 def probability_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
     """Probability of "different" for one observer without deviations, in the shape of the differences."""
-    differences = np.asarray(difference_frames, dtype=np.float64)
-    slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
-    return _with_lapses(detected(np.abs(differences) * slope, observer.criterion), observer.lapse)
+    return _with_lapses(detected(_d_prime(observer, difference_frames), observer.criterion), observer.lapse)
 
 
 def probability_odd_found(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
     """Probability that one observer finds which of three differs, in the shape of the differences."""
-    differences = np.asarray(difference_frames, dtype=np.float64)
-    slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
-    return np.asarray(observer.lapse * CHANCE + (1 - observer.lapse) * oddity_correct(np.abs(differences) * slope))
+    seen = oddity_correct(_d_prime(observer, difference_frames))
+    return np.asarray(observer.lapse * CHANCE + (1 - observer.lapse) * seen)
 
 
 def population_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
     """Probability of "different" over all participants: the mean over their sensitivities and criteria."""
-    differences = np.asarray(difference_frames, dtype=np.float64)
-    slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
     nodes, weights = np.polynomial.hermite_e.hermegauss(31)
     weights = weights / weights.sum()
     sensitivity = np.exp(observer.log_sensitivity_sd * nodes)[:, None]
     criterion = np.maximum(observer.criterion + observer.criterion_sd * nodes, LEAST_CRITERION)[None, :]
-    distance = (np.abs(differences) * slope)[..., None, None] * sensitivity
+    distance = _d_prime(observer, difference_frames)[..., None, None] * sensitivity
     chances = _with_lapses(detected(distance, criterion), observer.lapse)
     return np.asarray(np.einsum("...sc,s,c->...", chances, weights, weights))
+
+
+def _d_prime(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
+    differences = np.asarray(difference_frames, dtype=np.float64)
+    slope = np.where(differences < 0, observer.d_prime_shorter, observer.d_prime_longer)
+    return np.asarray(np.abs(differences) * slope)
 
 
 def _with_lapses(share: FloatArray, lapse: float) -> FloatArray:

@@ -141,12 +141,7 @@ def _threshold(side: Side, runs: list[StaircaseRun], rule: UpDown, confidence: f
     method = f"mean of the last {rule.averaged} reversals, Student's t over participants"
     if not own:
         return Threshold(side, None, None, estimates.Interval(None, None, confidence), "not reached", method, note)
-    means = np.array([np.mean(frames) for frames in own.values()])
-    mean, count = float(means.mean()), len(means)
-    if count < 2:
-        return Threshold(side, mean, None, estimates.Interval(None, None, confidence), "reached", method, note)
-    error = float(means.std(ddof=1) / np.sqrt(count))
-    reach = estimates.t_quantile(confidence, count - 1) * error
-    return Threshold(
-        side, mean, error, estimates.Interval(mean - reach, mean + reach, confidence), "reached", method, note
-    )
+    mean = estimates.mean_of([float(np.mean(frames)) for frames in own.values()], confidence)
+    interval = estimates.Interval(mean.low, mean.high, confidence)
+    said = "; ".join(filter(None, (mean.note, note)))
+    return Threshold(side, mean.mean, mean.standard_error, interval, "reached", method, said)

@@ -136,10 +136,12 @@ def _notes(comparison: Comparison) -> list[str]:
         notes.append(f"{counted(comparison.ties, 'answer')} chose neither: excluded from the published test.")
     if clusters.design_effect is not None and clusters.intraclass_correlation is not None:
         correlation = words.signed(clusters.intraclass_correlation, 3, plus=False)
+        answers = comparison.published.answers
         notes.append(
             f"Answers of one participant correlate by {correlation}: the pooled test counts "
-            f"{counted(comparison.published.answers, 'answer')} as informative as "
-            f"{clusters.effective_answers or 0:.0f} independent ones (design effect {clusters.design_effect:.2f})."
+            f"{counted(answers, 'answer')} as informative as "
+            f"{min(clusters.effective_answers or 0.0, answers):.0f} independent ones (design effect "
+            f"{clusters.design_effect:.2f})."
         )
     if order.first_percent is not None:
         test = f", {words.p(order.p_value)} over participants" if order.p_value is not None else ""
