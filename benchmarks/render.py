@@ -36,16 +36,10 @@ from renderer.figure import Figure, make_figure
 from renderer.framing import frame_group
 from renderer.jobs import RenderJob, default_workers, render_many
 from renderer.offscreen import paste_frames, render_frames
-from renderer.video import CRF, PRESET, frame_rate, open_encoder, render_video
+from renderer.video import frame_rate, open_encoder, render_video
 
 SIZES = ((640, 480), (1280, 720))
-PRESETS = ("veryfast", "ultrafast")
-GOALS = {
-    ((640, 480), "veryfast"): 0.70,
-    ((1280, 720), "veryfast"): 0.85,
-    ((640, 480), "ultrafast"): 0.50,
-    ((1280, 720), "ultrafast"): 0.65,
-}
+GOALS = {(640, 480): 0.50, (1280, 720): 0.65}
 FPS = 30
 PEERS = {"matplotlib": 10, "pyvista": 15, "pyrender": 25}
 HOW_TO_GET = {
@@ -102,7 +96,7 @@ def _prepare(size: tuple[int, int]) -> int:
     return os.getpid()
 
 
-def _run(what: str, size: tuple[int, int], preset: str, repeats: int) -> tuple[float, float]:
+def _run(what: str, size: tuple[int, int], repeats: int) -> tuple[float, float]:
     """Seconds by the clock and of the processor."""
     clip: Clip = _worker["clip"]
     target = Path(_worker["folder"]) / "x.mp4"
@@ -111,9 +105,9 @@ def _run(what: str, size: tuple[int, int], preset: str, repeats: int) -> tuple[f
     start, busy = time.perf_counter(), time.process_time()
     for _ in range(repeats):
         if what == "ours":
-            render_video(target, clip.positions, clip.figure, camera, fps=FPS, preset=preset)
+            render_video(target, clip.positions, clip.figure, camera, fps=FPS)
         else:
-            with open_encoder(target, size, frame_rate(FPS), preset, CRF) as encode:
+            with open_encoder(target, size, frame_rate(FPS)) as encode:
                 for frame in _worker["frames"][size]:
                     encode(frame)
     busy = time.process_time() - busy
@@ -127,34 +121,28 @@ def encoder(clip: Clip, workers: int, turns: int, repeats: int) -> list[dict[str
     with spawn.Pool(workers, _start, (clip, spawn.Barrier(workers))) as pool:
         for size in SIZES:
             pool.map(_prepare, [size] * workers, chunksize=1)
-            rows += [
-                _compare(pool, size, preset, workers, turns, repeats * len(clip.positions), repeats)
-                for preset in PRESETS
-            ]
+            rows.append(_compare(pool, size, workers, turns, repeats * len(clip.positions), repeats))
     return rows
 
 
-def _compare(
-    pool: Any, size: tuple[int, int], preset: str, workers: int, turns: int, frames: int, repeats: int
-) -> dict[str, Any]:
+def _compare(pool: Any, size: tuple[int, int], workers: int, turns: int, frames: int, repeats: int) -> dict[str, Any]:
     """Ours and x264 alone in turns; the first turn warms up shaders, files and the processor's clock."""
     clock: dict[str, list[float]] = {"ours": [], "x264": []}
     busy: dict[str, list[float]] = {"ours": [], "x264": []}
     for _ in range(turns + 1):
         for what in clock:
-            took = pool.starmap(_run, [(what, size, preset, repeats)] * workers, chunksize=1)
+            took = pool.starmap(_run, [(what, size, repeats)] * workers, chunksize=1)
             clock[what].append(max(wall for wall, _ in took))
             busy[what].append(sum(used for _, used in took))
     ours, alone = (statistics.median(clock[what][1:]) for what in ("ours", "x264"))
     return {
         "size": f"{size[0]}x{size[1]}",
-        "preset": preset,
         "workers": workers,
         "ours_fps": round(workers * frames / ours, 1),
         "x264_fps": round(workers * frames / alone, 1),
         "ratio": round(alone / ours, 3),
         "cpu_ratio": round(statistics.median(busy["x264"][1:]) / statistics.median(busy["ours"][1:]), 3),
-        "goal": GOALS[size, preset],
+        "goal": GOALS[size],
     }
 
 
@@ -183,7 +171,7 @@ def study(clip: Clip, workers: int) -> dict[str, Any]:
 
 def draw_ours(clip: Clip, size: tuple[int, int], target: Path | None, frames: int) -> None:
     if target is None:
-        for _ in paste_frames(clip.positions[:frames], clip.figure, clip.camera(size), None, 16, None):
+        for _ in paste_frames(clip.positions[:frames], clip.figure, clip.camera(size)):
             pass
     else:
         render_video(target, clip.positions[:frames], clip.figure, clip.camera(size), fps=FPS)
@@ -197,7 +185,7 @@ def _write_rgb(target: Path | None, size: tuple[int, int], pictures: Any) -> Non
     import av
 
     with av.open(str(target), "w") as out:
-        stream = out.add_stream("libx264", rate=FPS, options={"preset": PRESET, "crf": str(CRF)})
+        stream = out.add_stream("libx264", rate=FPS, options={"preset": "ultrafast", "crf": "18"})
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
         stream.codec_context.thread_count = 1
@@ -377,7 +365,7 @@ def main() -> None:
         return
     print(f"{result['clip']}, {result['frames']} frames; {result['context']}: {result['gl_renderer']}")
     for row in result.get("encoder", []):
-        speeds = "{size} {preset:9} ours {ours_fps:7} frames/s, x264 alone {x264_fps:7}".format(**row)
+        speeds = "{size} ours {ours_fps:7} frames/s, x264 alone {x264_fps:7}".format(**row)
         print(speeds + ": {ratio} (goal {goal}; by processor time {cpu_ratio})".format(**row))
     if "study" in result:
         print(

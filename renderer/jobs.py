@@ -30,7 +30,7 @@ from renderer.capsules import Figure
 from renderer.context import os_environ_defaults
 from renderer.errors import RendererError
 from renderer.files import cannot_write, discard_unfinished, scratch_folder
-from renderer.video import CRF, PRESET, VideoInfo, render_video
+from renderer.video import VideoInfo, render_video
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class RenderJob:
         The mp4 to write.
     positions : (frames, points, 3)
         Metres; float32 or float64.
-    figure, camera, fps, preset, crf
+    figure, camera, fps
         As for `render_video`.
     """
 
@@ -52,8 +52,6 @@ class RenderJob:
     figure: Figure
     camera: Camera
     fps: float | Fraction = 30
-    preset: str = PRESET
-    crf: int = CRF
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ class Progress:
 
 def run_job(job: RenderJob) -> VideoInfo:
     """Make one video in this process."""
-    return render_video(job.path, job.positions, job.figure, job.camera, fps=job.fps, preset=job.preset, crf=job.crf)
+    return render_video(job.path, job.positions, job.figure, job.camera, fps=job.fps)
 
 
 def default_workers() -> int:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +22,6 @@ from renderer.camera import Camera, camera_path, check_positions, check_size
 from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
 from renderer.context import Context, shared_context
-from renderer.errors import RendererError
 from renderer.floor import Floor
 from renderer.painter import Painter
 from renderer.segments import Segment
@@ -50,7 +48,6 @@ def render_frames(
     figure: Figure,
     camera: Camera,
     *,
-    size: tuple[int, int] | None = None,
     batch: int = BATCH,
     context: Context | None = None,
     fps: float = 30.0,
@@ -63,8 +60,6 @@ def render_frames(
         Metres, Y up.
     figure, camera
         What to draw, and from where.
-    size
-        Only to check: must be the camera's.
     batch
         Frames drawn at a time; has no influence on the pixels.
     context
@@ -75,9 +70,9 @@ def render_frames(
     Raises
     ------
     RendererError
-        For positions that are not finite, no frames, or another size than the camera's.
+        For positions that are not finite, or no frames.
     """
-    for frame, _ in paste_frames(positions, figure, camera, size, batch, context, fps):
+    for frame, _ in paste_frames(positions, figure, camera, fps=fps, batch=batch, context=context):
         yield frame.copy()
 
 
@@ -88,33 +83,22 @@ def render_rgb(
     points = check_positions(positions)
     shapes = lay_out(points, figure, camera, fps)
     ground = Ground(figure, camera, points, fps)
-    with _rgb_target(camera.size, context) as (target, painter):
-        for number, data in enumerate(shapes.data):
-            with target.ctx:
-                _start_rgb(target, figure, ground.floor(number), ground.path.shift[number])
-                picture = _painted_rgb(target, painter, data, camera.size)
-            yield picture
-
-
-def render_layers(layers: Sequence[tuple[ArrayLike, Figure]], camera: Camera, context: Context | None = None) -> Bytes:
-    """One RGB picture `(height, width, 3)` of several poses `(points, 3)`, each over those before it."""
-    if not layers:
-        raise RendererError("Expected at least one pose to draw, got none.")
-    with _rgb_target(camera.size, context) as (target, painter):
-        first = layers[0][1]
-        _start_rgb(target, first, None if first.floor_m is None else Floor(first, camera), np.zeros(3))
-        for pose, figure in layers:
-            shapes = lay_out(check_positions(np.asarray(pose)[None], "a pose"), figure, camera)
-            picture = _painted_rgb(target, painter, shapes.data[0], camera.size)
-    return picture
-
-
-@contextmanager
-def _rgb_target(size: tuple[int, int], context: Context | None) -> Iterator[tuple[Any, Painter]]:
     gl = (context or shared_context()).gl
-    target = gl.framebuffer([gl.texture(size, 3)])
+    width, height = camera.size
+    target = gl.framebuffer([gl.texture(camera.size, 3)])
     try:
-        yield target, painter_of(gl)
+        for number, data in enumerate(shapes.data):
+            with gl:
+                floor = ground.floor(number)
+                if floor is None:
+                    target.clear(*(value / 255.0 for value in figure.background))
+                else:
+                    target.color_attachments[0].write(floor.rgb(ground.path.shift[number]).tobytes(), alignment=1)
+                target.use()
+                painter = painter_of(gl)
+                painter.paint("rgb", painter.load(data), camera.size)
+                read = target.read(components=3, alignment=1)
+            yield np.frombuffer(read, dtype=np.uint8).reshape(height, width, 3)
     finally:
         with gl:
             _release(target)
@@ -126,29 +110,15 @@ def _release(target: Any) -> None:
     target.release()
 
 
-def _start_rgb(target: Any, figure: Figure, floor: Floor | None, shift: NDArray[np.float64]) -> None:
-    if floor is None:
-        target.clear(*(value / 255.0 for value in figure.background))
-    else:
-        target.color_attachments[0].write(floor.rgb(shift).tobytes(), alignment=1)
-
-
-def _painted_rgb(target: Any, painter: Painter, data: NDArray[np.float32], size: tuple[int, int]) -> Bytes:
-    target.use()
-    painter.paint("rgb", painter.load(data), size)
-    width, height = size
-    return np.frombuffer(target.read(components=3, alignment=1), dtype=np.uint8).reshape(height, width, 3)
-
-
 def paste_frames(
     positions: ArrayLike,
     figure: Figure,
     camera: Camera,
-    size: tuple[int, int] | None,
-    batch: int,
-    context: Context | None,
+    *,
     fps: float = 30.0,
     segments: Sequence[Segment] = (),
+    batch: int = BATCH,
+    context: Context | None = None,
 ) -> Iterator[tuple[Bytes, Box]]:
     """The frames of `render_frames`, each in the *same* array: to be used up before the next one is asked for.
 
@@ -156,10 +126,6 @@ def paste_frames(
     it is the background.
     """
     points = check_positions(positions)
-    if size is not None and check_size(size) != camera.size:
-        raise RendererError(f"Expected the size that the camera was made for, {camera.size}, got {tuple(size)}.")
-    if batch < 1:
-        raise RendererError(f"Expected a batch of at least one frame, got {batch}.")
     shapes = lay_out(points, figure, camera, fps, segments)
     backdrop = Ground(figure, camera, points, fps)
     gl = (context or shared_context()).gl

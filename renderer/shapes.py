@@ -50,10 +50,24 @@ class Shapes:
     boxes: NDArray[np.int64]
 
 
-def on_picture(
-    positions: FloatArray, figure: Figure, camera: Camera, fps: float, frames: Sequence[int]
-) -> tuple[FloatArray, FloatArray]:
-    """Where some frames of a motion land in the picture, in pixels, y down.
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Some frames of a motion with a figure on them, for any camera to look at; made by `pose`."""
+
+    positions: FloatArray
+    frames: list[int]
+    figure: Figure
+    placed: FloatArray
+
+
+def pose(positions: FloatArray, figure: Figure, frames: Sequence[int]) -> Poses:
+    """Put the figure on some frames of a motion `(frames, points, 3)`, in metres."""
+    shown = list(frames)
+    return Poses(positions, shown, *_without_hidden(figure, place(figure, positions[shown])))
+
+
+def on_picture(poses: Poses, camera: Camera, fps: float) -> tuple[FloatArray, FloatArray]:
+    """Where poses land in the picture, in pixels, y down.
 
     Returns
     -------
@@ -61,13 +75,12 @@ def on_picture(
         The points, `(frames, points, 2)`, and the edges of the figure as `lay_out` draws it, without smooth edges and
         shadows: `(frames, 4)`, left, top, right, bottom; not cut at the edges of the picture.
     """
-    path, shown = camera_path(positions, camera, fps), list(frames)
-    seen, axes = (positions - path.shift[:, None])[shown], path.axes[shown]
-    figure, placed = _without_hidden(figure, place(figure, seen))
-    ends, nearness = project(camera, placed, axes)
-    reach = (figure.radii * camera.focal_pixels * nearness)[..., None]
+    path, shown = camera_path(poses.positions, camera, fps), poses.frames
+    shift, axes = path.shift[shown][:, None], path.axes[shown]
+    ends, nearness = project(camera, poses.placed - shift[:, None], axes)
+    reach = (poses.figure.radii * camera.focal_pixels * nearness)[..., None]
     edges = np.concatenate([(ends - reach).min(axis=(1, 2)), (ends + reach).max(axis=(1, 2))], axis=1)
-    return project(camera, seen, axes)[0], edges
+    return project(camera, poses.positions[shown] - shift, axes)[0], edges
 
 
 def lay_out(

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -25,27 +26,24 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.camera import Camera, check_size
 from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
-from renderer.context import Context
 from renderer.digest import Box, FramesHash
 from renderer.errors import RendererError
 from renderer.files import whole_file
-from renderer.offscreen import BATCH, paste_frames
+from renderer.offscreen import paste_frames
 from renderer.segments import Segment
-
-PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow")
-
-# Measured on a walking stick figure of 130 frames at 640x480, all at crf 18: ultrafast keeps the figure best (47.6 dB,
-# 46.3 superfast, 45.0 veryfast) in the least time (1.0, 1.6 and 1.9), and takes 456 kB instead of 356 or 286.
-PRESET, CRF = "ultrafast", 18
 
 # ISO/IEC 23091-2: 1 is BT.709 for primaries, transfer and matrix; 1 in FFmpeg's range enumeration is limited.
 _BT709, _LIMITED = 1, 1
 
-# libx264 saves bits on what moves fast and on what stands out from its surroundings, which here are the limbs that
-# participants judge: without its macroblock tree and adaptive quantisation the figure's error is 8 dB lower (37 against
-# 45 dB at 640x480, crf 16 and 18). Its search for scene cuts, fades and where to put B-frames finds nothing in a
-# figure before a still background, and takes a third of the time.
-_X264 = "mbtree=0:aq-mode=0:b-adapt=0:scenecut=0:weightp=0:rc-lookahead=0:force-cfr=1:open-gop=0"
+# One quantiser for all P-frames: how finely a figure is drawn must not depend on how it moves. libx264's own choice
+# (crf) would besides look at each frame twice. It also saves bits on what moves fast and on what stands out from its
+# surroundings, which here are the limbs that participants judge: its macroblock tree and adaptive quantisation are off,
+# as are its searches for scene cuts, fades and B-frames, which find nothing in a figure before a still background.
+_OPTIONS = {
+    "preset": "ultrafast",
+    "qp": "13",
+    "x264-params": "mbtree=0:aq-mode=0:b-adapt=0:scenecut=0:weightp=0:rc-lookahead=0:force-cfr=1:open-gop=0",
+}
 
 
 @dataclass(frozen=True)
@@ -102,12 +100,7 @@ def render_video(
     figure: Figure,
     camera: Camera,
     *,
-    size: tuple[int, int] | None = None,
     fps: float | Fraction = 30,
-    preset: str = PRESET,
-    crf: int = CRF,
-    batch: int = BATCH,
-    context: Context | None = None,
     segments: Sequence[Segment] = (),
 ) -> VideoInfo:
     """Draw a motion and encode it.
@@ -120,14 +113,8 @@ def render_video(
         Metres, Y up.
     figure, camera
         What to draw, and from where; the camera has the frame's size.
-    size
-        Only to check: must be the camera's.
     fps
         Frames per second.
-    preset, crf
-        Of libx264: how long it searches, and how much it may lose (0 nothing, 18 nothing that is seen).
-    batch, context
-        As for `render_frames`; neither changes a pixel.
     segments
         Stretches of frames with colours of their own.
 
@@ -137,51 +124,31 @@ def render_video(
         For input that can't be drawn, a folder that can't be written, a full disk, a missing encoder. Nothing is then
         left under `path`, except for what was there before.
     """
-    frames = paste_frames(
-        positions, figure, camera, size, batch, context, fps=float(frame_rate(fps)), segments=segments
-    )
+    frames = paste_frames(positions, figure, camera, fps=float(frame_rate(fps)), segments=segments)
     luma, blue, red = (round(value) for value in to_ycbcr(figure.background))
-    return _write(path, frames, (luma, blue, red), size=camera.size, fps=fps, preset=preset, crf=crf)
+    return write_video(path, frames, size=camera.size, fps=fps, ground=(luma, blue, red))
 
 
 def write_video(
     path: Path | str,
-    frames: Iterable[NDArray[np.uint8]],
+    frames: Iterable[tuple[NDArray[np.uint8], Box]],
     *,
     size: tuple[int, int],
+    ground: tuple[int, int, int],
     fps: float | Fraction = 30,
-    preset: str = PRESET,
-    crf: int = CRF,
 ) -> VideoInfo:
     """Encode NV12 frames `(height * 3 / 2, width)`; each array may be reused once the next is asked for.
 
-    The other arguments, and what is raised and returned: as for `render_video`.
+    With each comes the box (left, top, right, bottom) outside which it is `ground`: luma, blue and red chroma. What is
+    raised and returned: as for `render_video`.
     """
-    return _write(path, ((frame, None) for frame in frames), None, size=size, fps=fps, preset=preset, crf=crf)
-
-
-def _write(
-    path: Path | str,
-    frames: Iterable[tuple[NDArray[np.uint8], Box | None]],
-    ground: tuple[int, int, int] | None,
-    *,
-    size: tuple[int, int],
-    fps: float | Fraction,
-    preset: str,
-    crf: int,
-) -> VideoInfo:
-    """Encode frames that come with the box outside which they are ground."""
     width, height = check_size(size)
     rate = frame_rate(fps)
-    if preset not in PRESETS:
-        raise RendererError(f"Expected a preset of {', '.join(PRESETS)}, got {preset!r}.")
-    if crf not in range(52):
-        raise RendererError(f"Expected crf as a whole number from 0 to 51, got {crf!r}.")
     target = Path(path)
     if target.suffix.lower() != ".mp4":
         raise RendererError(f"Expected a video's name to end in .mp4, got {target.name!r}.")
     digest = FramesHash((width, height))
-    with whole_file(target) as unfinished, open_encoder(unfinished, (width, height), rate, preset, crf) as encode:
+    with whole_file(target) as unfinished, open_encoder(unfinished, (width, height), rate) as encode:
         for frame, touched in frames:
             if frame.shape != (height * 3 // 2, width) or frame.dtype != np.uint8:
                 raise RendererError(
@@ -205,7 +172,7 @@ def _write(
 
 
 @contextmanager
-def open_encoder(path: Path, size: tuple[int, int], rate: Fraction, preset: str, crf: int) -> Iterator[Any]:
+def open_encoder(path: Path, size: tuple[int, int], rate: Fraction) -> Iterator[Any]:
     """A function that takes the next frame; the file is complete when the block ends without an error."""
     import av
 
@@ -218,7 +185,7 @@ def open_encoder(path: Path, size: tuple[int, int], rate: Fraction, preset: str,
         ) from error
     try:
         with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart", "fflags": "+bitexact"}) as out:
-            stream = _stream(out, size, rate, preset, crf)
+            stream = _stream(out, size, rate)
             yield _feeder(out, stream)
             out.mux(stream.encode())
     except av.error.FFmpegError as error:
@@ -229,9 +196,8 @@ def open_encoder(path: Path, size: tuple[int, int], rate: Fraction, preset: str,
         raise RendererError(f"The encoder failed: {error}.") from error
 
 
-def _stream(out: Any, size: tuple[int, int], rate: Fraction, preset: str, crf: int) -> Any:
-    options = {"preset": preset, "crf": str(crf), "x264-params": _X264}
-    stream = out.add_stream("libx264", rate=rate, options=options)
+def _stream(out: Any, size: tuple[int, int], rate: Fraction) -> Any:
+    stream = out.add_stream("libx264", rate=rate, options=_OPTIONS)
     stream.width, stream.height = size
     codec = stream.codec_context
     # libx264 takes NV12 and writes 4:2:0 as ever: a decoder gives yuv420p.
@@ -249,23 +215,19 @@ def _stream(out: Any, size: tuple[int, int], rate: Fraction, preset: str, crf: i
 def _feeder(out: Any, stream: Any) -> Any:
     import av
 
-    known: dict[int, Any] = {}
-    number = 0
+    numbers = count()
+    # The encoder copies what it is given before it returns, so one wrapper serves an array that is used again.
+    known: tuple[Any, Any] = (None, None)
 
     def encode(frame: NDArray[np.uint8]) -> None:
-        nonlocal number
-        # The encoder copies what it is given before it returns, so one wrapper serves an array that is used again.
-        key = id(frame)
-        if key not in known:
-            known.clear()
+        nonlocal known
+        if known[0] is not frame:
             picture = av.VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), format="nv12")
             picture.colorspace, picture.color_range = _BT709, _LIMITED
-            known[key] = (picture, frame)
-        picture = known[key][0]
-        picture.pts = number
-        picture.time_base = stream.codec_context.time_base
-        number += 1
-        for packet in stream.encode(picture):
+            known = frame, picture
+        known[1].pts = next(numbers)
+        known[1].time_base = stream.codec_context.time_base
+        for packet in stream.encode(known[1]):
             out.mux(packet)
 
     return encode

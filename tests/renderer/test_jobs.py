@@ -93,7 +93,7 @@ if __name__ == "__main__":
     figure = make_figure(bones, ["centre"] * 12)
     clip = np.cumsum(np.random.default_rng(1).normal(0, 0.01, (90, 12, 3)), axis=0)
     camera = frame_group([clip], size=(640, 480))
-    jobs = [RenderJob(Path(sys.argv[1]) / f"{i}.mp4", clip, figure, camera, preset="slow") for i in range(20)]
+    jobs = [RenderJob(Path(sys.argv[1]) / f"{i}.mp4", clip, figure, camera) for i in range(20)]
     render_many(jobs, 2, lambda p: print(p, flush=True))
 """
 

@@ -17,7 +17,7 @@ from renderer.digest import hash_frames
 from renderer.errors import RendererError
 from renderer.figure import STYLES, make_figure
 from renderer.framing import frame_group
-from renderer.offscreen import plain_frame, render_frames, render_layers, render_rgb
+from renderer.offscreen import plain_frame, render_frames, render_rgb
 from renderer.shapes import lay_out
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("context")]
@@ -268,15 +268,6 @@ def test_stills_and_video_frames_look_alike(puppet: Any) -> None:
         assert difference[background].max(axis=-1).mean() < 2.0
 
 
-def test_layers_are_painted_over_one_another() -> None:
-    red, blue = capsules([(0.5, 0.5)], [(200, 0, 0)]), capsules([(0.5, 0.5)], [(0, 0, 200)])
-    pose = points((-0.2, 0, 0), (0.2, 0, 0))[0]
-    picture = render_layers([(pose, red), (pose, blue)], CAMERA)
-    assert np.abs(picture[12, 16].astype(int) - [0, 0, 200]).max() <= 2
-    with pytest.raises(RendererError, match="at least one pose"):
-        render_layers([], CAMERA)
-
-
 def test_a_tracking_camera_follows(puppet: Any) -> None:
     clip, figure, camera = puppet_scene(puppet, frames=30, view="side", camera="track", track_seconds=0.5)
     middles = []
@@ -311,18 +302,6 @@ def test_a_floor_travels_under_a_tracking_camera(puppet: Any) -> None:
     assert (frames[0][100:120, :30] != frames[5][100:120, :30]).any()
     alone = list(render_frames(clip, figure, camera, batch=1))
     assert all((a == b).all() for a, b in zip(frames, alone, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("change", "match"),
-    [
-        ({"size": (640, 480)}, r"size that the camera was made for, \(32, 24\), got \(640, 480\)"),
-        ({"batch": 0}, "batch of at least one"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused(change: dict[str, Any], match: str) -> None:
-    with pytest.raises(RendererError, match=match):
-        next(render_frames(points((0, 0, 0), (1, 0, 0)), capsules([(0.1, 0.1)], [BLACK]), CAMERA, **change))
 
 
 def test_bad_positions_are_refused_before_anything_is_drawn() -> None:

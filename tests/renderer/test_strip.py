@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from renderer.colour import to_ycbcr
 from renderer.errors import RendererError
 from renderer.figure import make_figure
 from renderer.segments import SEGMENT_COLOURS, Segment
-from renderer.strip import draw_strip, render_strip
+from renderer.strip import render_strip
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("context")]
 
@@ -27,6 +28,12 @@ def figures_in(picture: np.ndarray) -> int:
     """Runs of columns with something on them."""
     drawn = (picture != picture[0, 0]).any(axis=(0, 2)).astype(int)
     return int((np.diff(np.concatenate([[0], drawn])) == 1).sum())
+
+
+def draw_strip(*scene: Any, **how: Any) -> np.ndarray:
+    """The picture of a strip, RGB `(height, width, 3)`."""
+    with TemporaryDirectory() as folder, Image.open(render_strip(Path(folder) / "strip.png", *scene, **how)) as picture:
+        return np.asarray(picture)
 
 
 def near(picture: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
@@ -64,28 +71,17 @@ def test_segments_have_their_own_colours_in_a_row(scene: Any) -> None:
         assert sum(counts) - counts[i] < 0.1 * counts[i], (name, counts)
 
 
-def test_an_onion_skin_shows_the_way_and_fades_what_is_past(scene: Any) -> None:
-    clip, figure = scene
-    picture = draw_strip(clip, figure, count=8, segments=SEGMENTS, layout="onion", height=240, view="side")
-    left, right = np.array_split((np.abs(picture.astype(int) - figure.background)).sum(axis=2), 2, axis=1)
-    assert right.max() > left.max() + 60, "the last pose is the clearest; it walks to the right"
-    assert (left > 20).any()
-    assert picture.shape[1] > 240
-
-
 def test_the_file_is_a_png_and_whole(scene: Any, tmp_path: Path) -> None:
     path = render_strip(tmp_path / "new" / "strip.png", *scene, count=4, segments=SEGMENTS, height=160)
     with Image.open(path) as picture:
         assert picture.format == "PNG"
         assert picture.height == 160
-        assert (np.asarray(picture) == draw_strip(*scene, count=4, segments=SEGMENTS, height=160)).all()
     assert [p.name for p in path.parent.iterdir()] == ["strip.png"]
 
 
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ({"layout": "spiral"}, "row, onion, got 'spiral'"),
         ({"height": 31}, "even height"),
         ({"count": 0}, "at least one pose"),
         ({"frames": [40]}, "frames from 0 to 39"),

@@ -17,7 +17,8 @@ from study.tasks.trial import Pair
 
 if TYPE_CHECKING:
     from renderer.camera import Camera
-    from renderer.figure import Figure
+    from renderer.capsules import Figure
+    from renderer.shapes import Poses
 
 FloatArray = NDArray[np.float64]
 
@@ -69,7 +70,10 @@ def audit(pairs: Sequence[Pair], moving: Mapping[str, Moving], fps: float) -> tu
 
     `moving` is what is seen of each stimulus, by its id.
     """
-    seen = {one: view(moving[one], fps) for one in dict.fromkeys(one for pair in pairs for one in pair.stimuli)}
+    seen = {}
+    for one in dict.fromkeys(one for pair in pairs for one in pair.stimuli):
+        positions, figure, camera = moving[one]
+        seen[one] = view(first_and_last(positions, figure), camera, fps)
     return tuple(compared(pair.name, *(seen[one] for one in pair.stimuli)) for pair in pairs if len(pair.stimuli) > 1)
 
 
@@ -83,16 +87,22 @@ class Seen:
     joints: FloatArray
 
 
-def view(moving: Moving, fps: float) -> Seen:
-    """What is seen of one stimulus."""
-    from renderer.shapes import on_picture
+def first_and_last(positions: FloatArray, figure: Figure) -> Poses:
+    """The first and the last frame of a stimulus that show its figure."""
+    from renderer.shapes import pose
 
-    positions, figure, camera = moving
-    steps = np.diff(positions[:, 0][:, [0, 2]], axis=0)
     # Half way through a fade, and before a cover: what is seen last.
     last = len(positions) - 1 - figure.ending[1] - figure.ending[0] // 2
-    joints, edges = on_picture(positions, figure, camera, fps, (0, last))
-    return Seen(len(positions) / fps, float(np.linalg.norm(steps, axis=1).sum()), edges, joints)
+    return pose(positions, figure, (0, last))
+
+
+def view(ends: Poses, camera: Camera, fps: float) -> Seen:
+    """What a camera sees of one stimulus, by its first and last frame."""
+    from renderer.shapes import on_picture
+
+    steps = np.diff(ends.positions[:, 0][:, [0, 2]], axis=0)
+    joints, edges = on_picture(ends, camera, fps)
+    return Seen(len(ends.positions) / fps, float(np.linalg.norm(steps, axis=1).sum()), edges, joints)
 
 
 def compared(name: str, one: Seen, other: Seen) -> PairAudit:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol
+from study.experiment.stimuli.audit import first_and_last
 from study.experiment.stimuli.drafts import Draft
 from study.experiment.stimuli.films import Film, Planned
 from study.experiment.stimuli.shortcuts import largest_cue
@@ -59,7 +60,7 @@ def with_cameras(
             figures = [_figure(protocol, drafts[film].clip) for film in films]
             seen_from: str | float = view
             if view in ("clearest", "least-cue"):
-                score = _evenness(protocol, planned, films, drafts) if view == "least-cue" else None
+                score = _evenness(protocol, planned, films, figures, drafts) if view == "least-cue" else None
                 seen_from = best_view(moving, score=score, **framing)
             camera = frame_group(moving, figures=figures, view=seen_from, **framing)
             for film, figure in zip(films, figures, strict=True):
@@ -70,18 +71,17 @@ def with_cameras(
 
 
 def _evenness(
-    protocol: Protocol, planned: Sequence[Planned], films: Sequence[Film], drafts: Mapping[Film, Draft]
+    protocol: Protocol,
+    planned: Sequence[Planned],
+    films: Sequence[Film],
+    figures: Sequence[Figure],
+    drafts: Mapping[Film, Draft],
 ) -> Callable[[Camera], float]:
     """How little a camera shows of what gives pairs of a group away; the higher, the less."""
-    figures = {film: _figure(protocol, drafts[film].clip) for film in films}
+    ends = {film: first_and_last(drafts[film].positions, figure) for film, figure in zip(films, figures, strict=True)}
     shown = (showing.films for each in planned for showing in each.showings)
-    pairs = [pair for pair in shown if all(film in figures for film in pair)]
-
-    def evenness(camera: Camera) -> float:
-        moving = {film: (drafts[film].positions, figure, camera) for film, figure in figures.items()}
-        return -largest_cue(pairs, moving, protocol.fps)
-
-    return evenness
+    pairs = [pair for pair in shown if all(film in ends for film in pair)]
+    return lambda camera: -largest_cue(pairs, ends, camera, protocol.fps)
 
 
 def camera_groups(protocol: Protocol, planned: Sequence[Planned]) -> dict[str, list[Film]]:

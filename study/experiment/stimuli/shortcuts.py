@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from study.experiment.protocol.whole import Protocol, StudySpec
-from study.experiment.stimuli.audit import FrameAudit, Moving, PairAudit, Seen, compared, view
+from study.experiment.stimuli.audit import FrameAudit, PairAudit, Seen, compared, view
 from study.tasks.registry import task_of
 from study.tasks.trial import Pair
 
 if TYPE_CHECKING:
+    from renderer.camera import Camera
+    from renderer.shapes import Poses
     from study.tasks.task import Shortcut
 
 DURATION_SD, POSITION_SD, SIZE_SD = 0.05, 0.1, 0.03
@@ -72,12 +74,12 @@ CUES: tuple[Cue, ...] = (
 )
 
 
-def largest_cue(pairs: Sequence[Sequence[Hashable]], moving: Mapping[Any, Moving], fps: float) -> float:
+def largest_cue(pairs: Sequence[Sequence[Hashable]], ends: Mapping[Any, Poses], camera: Camera, fps: float) -> float:
     """The largest difference in place or size within any pair, in standard deviations of a percept.
 
-    `pairs` name the stimuli that are compared, `moving` is what is seen of each.
+    `pairs` name the stimuli that are compared, `ends` are the `first_and_last` of each, which the camera sees.
     """
-    seen: dict[Any, Seen] = {name: view(one, fps) for name, one in moving.items()}
+    seen: dict[Any, Seen] = {name: view(one, camera, fps) for name, one in ends.items()}
     audits = [compared("", seen[pair[0]], seen[other]) for pair in pairs for other in pair[1:]]
     return max((abs(cue.apart(one)) for one in audits for cue in CUES[1:]), default=0.0)
 
