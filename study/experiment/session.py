@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 from study.errors import SessionError
 from study.experiment import wording
@@ -116,10 +117,10 @@ def advanced(session: Session) -> Session:
     return _at(session, session.position + 1)
 
 
-def _at(session: Session, position: int) -> Session:
+def _at(session: Session, position: int, badly_shown: frozenset[tuple[int, int]] | None = None) -> Session:
     # Not `replace`, which takes as long as the rest of an answer.
-    known = session.steps, session.trials_left, session.folded
-    return Session(session.plan, session.protocol, *known, position, session.badly_shown)
+    known = session.plan, session.protocol, session.steps, session.trials_left, session.folded
+    return Session(*known, position, session.badly_shown if badly_shown is None else badly_shown)
 
 
 def near(session: Session) -> tuple[list[Step], list[Step]]:
@@ -127,26 +128,20 @@ def near(session: Session) -> tuple[list[Step], list[Step]]:
 
     Where the trial after it depends on the answer, those are the stimuli of all trials that may come.
     """
-    own: list[Step] = []
-    after: list[Step] = []
-    for position in range(session.position, len(session.steps)):
-        step = session.steps[position]
-        if step.trial and (not own or _same_showing(step, own[0])):
-            own.append(step)
-        elif step.trial and (not after or _same_showing(step, after[0])):
-            after.append(step)
-        elif step.trial:
-            break
+    shown: dict[tuple[int, int], list[Step]] = {}
+    for step in islice(session.steps, session.position, None):
+        if step.trial:
+            of = shown.setdefault((step.trial, step.attempt), [])
+            if len(shown) > 2:
+                break
+            of.append(step)
+    own, after, *_ = (*shown.values(), [], [])
     if own and not (after and after[0].study == own[0].study):
         study, folded = own[0].study, session.folded
         candidates = folded.procedures[study].candidates(folded.given[study])
         may_come = [trial_steps(session.protocol, one, 1, frozenset()) for one in candidates if one is not None]
         after = [*(step for steps in may_come for step in steps), *(after if None in candidates else ())]
     return own, [step for step in after if step.slot]
-
-
-def _same_showing(step: Step, other: Step) -> bool:
-    return (step.trial, step.attempt) == (other.trial, other.attempt)
 
 
 def restarted(session: Session) -> Session:
@@ -242,7 +237,7 @@ def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     """Move on; after a display failure, add the trial once more to the end of its study. Practice gets feedback."""
     here, showing = current(session), (answer.trial, answer.attempt)
     badly_shown = session.badly_shown if answer.shown_well else session.badly_shown | {showing}
-    session = replace(session, position=session.position + 1, badly_shown=badly_shown)
+    session = _at(session, session.position + 1, badly_shown)
     following = current(session)
     trial_goes_on = following.kind == "answer" and following.trial == answer.trial
     trial = session.trial(answer.trial)

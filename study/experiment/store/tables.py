@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.types import TypeDecorator
@@ -24,19 +25,29 @@ class UtcTime(TypeDecorator[datetime]):
 
 
 class StoredText(TypeDecorator[str]):
-    """Text that every database takes: PostgreSQL refuses NUL, and none can write half a surrogate pair.
-
-    A participant may send either; U+FFFD takes their place, so that the rest of what was said is kept.
-    """
+    """Text that every database takes."""
 
     impl = sa.Text
     cache_ok = True
 
     def process_bind_param(self, value: str | None, dialect: sa.Dialect) -> str | None:  # noqa: ARG002
         """Without what can't be stored."""
-        if value is None or (value.isascii() and "\0" not in value):
+        return None if value is None else str(storable(value))
+
+
+def storable(value: Any) -> Any:
+    """A value of any column here as both databases' drivers take it.
+
+    PostgreSQL refuses NUL in texts, and none can write half a surrogate pair. A participant may send either; U+FFFD
+    takes their place, so that the rest of what was said is kept.
+    """
+    if isinstance(value, str):
+        if value.isascii() and "\0" not in value:
             return value
         return "".join("\ufffd" if c == "\0" or "\ud800" <= c <= "\udfff" else c for c in value)
+    if isinstance(value, datetime):
+        return value.astimezone(UTC).replace(tzinfo=None).isoformat(" ", "microseconds")
+    return value
 
 
 metadata = sa.MetaData()
