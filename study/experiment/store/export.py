@@ -38,13 +38,10 @@ BIDS_VERSION = "1.10.0"
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """What is exported: four tables whose columns `variables` tells, and words on the whole."""
+    """What is exported: tables by name, `variables` with the meaning of their columns, and words on the whole."""
 
     protocol: Protocol
-    answers: pd.DataFrame
-    stimuli: pd.DataFrame
-    presentations: pd.DataFrame
-    participants: pd.DataFrame
+    tables: Mapping[str, pd.DataFrame]
     variables: Mapping[str, Mapping[str, Variable]]
 
     @property
@@ -55,7 +52,7 @@ class Shared:
     @property
     def whose(self) -> str:
         """Said where not all answers are people's."""
-        simulated = self.participants["simulated"].astype(bool)
+        simulated = self.tables["participants"]["simulated"].astype(bool)
         if not simulated.any():
             return ""
         return "simulated answers, no people" if simulated.all() else "people's and simulated answers mixed"
@@ -63,7 +60,8 @@ class Shared:
     @property
     def words(self) -> str:
         """A paragraph on the data set."""
-        size = f"{counted(len(self.answers), 'answer')} of {counted(len(self.participants), 'participant')}"
+        answers, people = (len(self.tables[name]) for name in ("answers", "participants"))
+        size = f"{counted(answers, 'answer')} of {counted(people, 'participant')}"
         source = f" After {self.protocol.source}." if self.protocol.source else ""
         whose = f" NOT PEOPLE'S ANSWERS ALONE: {self.whose}." if self.whose else ""
         return (
@@ -110,10 +108,14 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
         said = {row["session_id"]: row["value"] for row in form if f"form_{row['name']}" == column}
         participants[column] = sessions["id"].map(said)
     asked = {column: Variable(f"Asked in the form: {label}") for column, label in labels.items()}
-    tables: dict[str, Mapping[str, Variable]] = {"answers": ANSWERS, "stimuli": STIMULI, "presentations": PRESENTATIONS}
-    tables["participants"] = {**PARTICIPANTS, **SHOWN_TO, **asked}
-    frames = {"answers": answers, "stimuli": stimuli, "presentations": presentations, "participants": participants}
-    return Shared(protocol, variables=tables, **{name: safe_table(frame) for name, frame in frames.items()})
+    variables: dict[str, Mapping[str, Variable]] = {
+        "answers": ANSWERS,
+        "stimuli": STIMULI,
+        "presentations": PRESENTATIONS,
+        "participants": {**PARTICIPANTS, **SHOWN_TO, **asked},
+    }
+    frames = {"answers": answers, "participants": participants, "stimuli": stimuli, "presentations": presentations}
+    return Shared(protocol, {name: safe_table(frame) for name, frame in frames.items()}, variables)
 
 
 def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) -> Path:
@@ -175,10 +177,9 @@ def _write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 def _by_study(shared: Shared) -> list[tuple[str, pd.DataFrame]]:
     """Answers by study, with a label, in the protocol's order."""
-    names = labels([each.name for each in shared.protocol.studies])
-    parts = [
-        (names[each.name], shared.answers[shared.answers["study"] == each.name]) for each in shared.protocol.studies
-    ]
+    answers = shared.tables["answers"]
+    names = labels([study.name for study in shared.protocol.studies])
+    parts = [(name, answers[answers["study"] == study]) for study, name in names.items()]
     return [(name, part) for name, part in parts if len(part)]
 
 
@@ -189,8 +190,7 @@ def _write_psych_ds(shared: Shared, folder: Path) -> None:
     data = folder / "data"
     data.mkdir()
     parts = [(f"task-{name}", part) for name, part in _by_study(shared)]
-    described = {"participants": shared.participants, "stimuli": shared.stimuli, "presentations": shared.presentations}
-    parts += [(f"description-{name}", table) for name, table in described.items()]
+    parts += [(f"description-{name}", table) for name, table in shared.tables.items() if name != "answers"]
     for name, table in parts:
         if len(table):
             table.to_csv(data / f"{name}_data.csv", index=False, lineterminator="\n")
@@ -231,7 +231,7 @@ def _readme(shared: Shared) -> str:
 
 
 def _write_bids(shared: Shared, folder: Path) -> None:
-    subjects = labels([str(name) for name in shared.participants["participant"]])
+    subjects = labels([str(name) for name in shared.tables["participants"]["participant"]])
     generated = [{"Name": MADE_BY, "Version": study.__version__}]
     _write_json(
         folder / DESCRIPTION,
@@ -240,14 +240,14 @@ def _write_bids(shared: Shared, folder: Path) -> None:
     (folder / "README.md").write_text(_readme(shared), encoding="utf-8")
     (folder / "code").mkdir()
     (folder / "code" / "protocol.toml").write_text(shared.protocol.text, encoding="utf-8")
-    people = shared.participants.rename(columns={"participant": "name"})
+    people = shared.tables["participants"].rename(columns={"participant": "name"})
     people.insert(0, "participant_id", [f"sub-{subjects[str(name)]}" for name in people["name"]])
     _write_tsv(folder / "participants.tsv", people)
     columns = {"participant_id": Variable("Label of the participant in this data set.")}
     columns |= {"name": Variable("Name of the session in Segue's database.")}
     columns |= {name: one for name, one in shared.variables["participants"].items() if name != "participant"}
-    _write_json(folder / "participants.json", {name: _sidecar(variable) for name, variable in columns.items()})
-    described = {name: _sidecar(variable) for name, variable in ANSWERS.items() if name not in ("participant", "study")}
+    _write_json(folder / "participants.json", {name: variable.entry() for name, variable in columns.items()})
+    described = {name: variable.entry() for name, variable in ANSWERS.items() if name not in ("participant", "study")}
     for task, part in _by_study(shared):
         title = next(each.title or each.name for each in shared.protocol.studies if each.name == part["study"].iloc[0])
         about = {"TaskName": task, "TaskDescription": title}
@@ -257,16 +257,6 @@ def _write_bids(shared: Shared, folder: Path) -> None:
             file = beh / f"sub-{subjects[str(name)]}_task-{task}_beh.tsv"
             _write_tsv(file, own.drop(columns=["participant", "study"]))
             _write_json(file.with_suffix(".json"), {**about, **described})
-
-
-def _sidecar(variable: Variable) -> dict[str, Any]:
-    """A column in BIDS's words."""
-    found: dict[str, Any] = {"Description": variable.description}
-    if variable.unit:
-        found["Units"] = variable.unit
-    if variable.levels:
-        found["Levels"] = dict(variable.levels)
-    return found
 
 
 def _write_tsv(path: Path, table: pd.DataFrame) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import sqlalchemy as sa
 from study.errors import SessionError
 from study.experiment.store.responses import Responses, rows_of
 from study.experiment.store.tables import answer_stimuli, answers, sessions
+from study.experiment.store.variables import ANSWERS
 from study.files import write_whole
 from study.spreadsheets import safe_table
 from study.tasks.trial import PLACES
@@ -19,13 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ROLES = ("trial", "practice", "check")
-# The seam with the analysis: one row an answer.
-ANSWER_COLUMNS = (
-    "participant", "simulated", "study", "task", "trial", "attempt", "item", "repeat", "pair", "motion", "category",
-    *PLACES, "difference_frames", "reference_first", "method_a", "method_b", "a_first", "answer", "missed",
-    "correct", "chose_a", "response_s", "shown_well", "answered_at",
-    "role", "expected",
-)  # fmt: skip
+ANSWER_COLUMNS = tuple(ANSWERS)
+"""The seam with the analysis: one row an answer."""
 
 
 def answers_frame(
@@ -91,6 +88,13 @@ def answers_csv(responses: Responses) -> str:
 
 
 def export_csv(responses: Responses, path: str | Path) -> Path:
-    """Write `answers_csv` to a file."""
+    """Write `answers_csv` to a file, and what its columns mean beside it (`dictionary_beside`)."""
     write_whole(path, answers_csv(responses))
+    entries = {name: {**ANSWERS[name].entry(), "Type": ANSWERS[name].kind} for name in ANSWER_COLUMNS}
+    write_whole(dictionary_beside(path), json.dumps(entries, indent=2, ensure_ascii=False) + "\n")
     return Path(path)
+
+
+def dictionary_beside(path: str | Path) -> Path:
+    """Where the meaning of a table's columns stands: `answers_columns.json` beside `answers.csv`."""
+    return Path(path).with_name(f"{Path(path).stem}_columns.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 from study.tasks.registry import NAMES, TASKS
 
@@ -17,6 +17,11 @@ class Variable:
     kind: Literal["text", "number", "boolean", "time"] = "text"
     unit: str = ""
     levels: Mapping[str, str] = field(default_factory=dict)
+
+    def entry(self) -> dict[str, Any]:
+        """What a data dictionary says of it, in BIDS's words."""
+        found = {"Description": self.description, "Units": self.unit, "Levels": dict(self.levels)}
+        return {key: value for key, value in found.items() if value}
 
 
 ANSWERS: Mapping[str, Variable] = {

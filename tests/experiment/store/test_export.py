@@ -63,6 +63,25 @@ def test_psych_ds_names_and_describes_everything(tmp_path: Path, toy_protocol: P
     assert (folder / "materials" / "protocol.toml").read_text(encoding="utf-8") == toy_protocol.text
 
 
+def test_the_table_has_a_dictionary_beside_it_in_the_words_of_the_standards(
+    tmp_path: Path, toy_protocol: Protocol, responses: Responses
+) -> None:
+    table = rows(export_csv(responses, tmp_path / "answers.csv"), ",")
+    columns = json.loads((tmp_path / "answers_columns.json").read_text(encoding="utf-8"))
+    assert list(columns) == list(table[0])
+    assert all(entry["Description"] for entry in columns.values())
+    assert (columns["response_s"]["Units"], columns["difference_frames"]["Units"]) == ("s", "frames")
+    for name, entry in columns.items():
+        assert not entry.get("Levels") or {row[name] for row in table} <= set(entry["Levels"]), name
+    sidecar = json.loads(
+        next(export(toy_protocol, responses, "bids", tmp_path / "bids").glob("sub-*/beh/*.json")).read_text()
+    )
+    assert {entry.pop("Type") for entry in columns.values()} == {"text", "number", "boolean", "time"}
+    assert {name: columns[name] for name in columns if name not in ("participant", "study")} == {
+        name: entry for name, entry in sidecar.items() if name in columns
+    }
+
+
 @pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t=", "\r", " =", "\ufeff=", "＝"])
 @pytest.mark.parametrize("kind", ["csv", "psych-ds", "bids"])
 def test_no_text_in_any_export_begins_like_a_formula(
