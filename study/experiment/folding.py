@@ -20,27 +20,18 @@ from study.tasks.trial import Trial
 
 @dataclass(frozen=True)
 class Folded:
-    """What the procedures of a session say so far.
-
-    Parameters
-    ----------
-    procedures
-        Of each study.
-    trials
-        All that are known, by number, in the order of the studies.
-    given
-        The answers of each study to its trials that are finished, practice apart: one a trial, in their order.
-    unknown
-        How many trials of each study may come beside those that are known.
-    breaks
-        Trials that a break follows, of those that are not known beforehand.
-    """
+    """What the procedures of a session say so far."""
 
     procedures: Mapping[str, Procedure]
+    """Of each study."""
     trials: Mapping[int, Trial]
+    """All that are known, by number, in the order of the studies."""
     given: Mapping[str, tuple[Answer, ...]]
+    """The answers of each study to its trials that are finished, practice apart: one a trial, in their order."""
     unknown: Mapping[str, int]
+    """How many trials of each study may come beside those that are known."""
     breaks: frozenset[int] = frozenset()
+    """Trials that a break follows, of those that are not known beforehand."""
 
     def trial(self, number: int) -> Trial:
         """A trial that is known, by its number."""

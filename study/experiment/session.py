@@ -135,7 +135,8 @@ def near(session: Session) -> tuple[list[Step], list[Step]]:
             if len(shown) > 2:
                 break
             of.append(step)
-    own, after, *_ = (*shown.values(), [], [])
+    none: list[Step] = []
+    own, after, *_ = (*shown.values(), none, none)
     if own and not (after and after[0].study == own[0].study):
         study, folded = own[0].study, session.folded
         candidates = folded.procedures[study].candidates(folded.given[study])

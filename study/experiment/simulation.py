@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
-from typing import Protocol as Shape
+from typing import TYPE_CHECKING, Any
 
 from study.errors import SessionError
 from study.experiment.observers import knowing, person, respond, shown_well, truth
@@ -21,23 +20,10 @@ from study.experiment.store.answers import has_event, record_answer, record_even
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
 from study.tasks.observer import ObserverSettings, default_observer
-from study.tasks.trial import Pair
 
-
-class StimulusSource(Shape):
-    """What a simulation needs to know of the stimuli: a `StimulusSet` or the manifest of a results folder."""
-
-    @property
-    def pairs(self) -> tuple[Pair, ...]:
-        """All pairs, in the protocol's order."""
-
-    @property
-    def library(self) -> str:
-        """Name of the motion library."""
-
-    @property
-    def synthetic(self) -> bool:
-        """Whether its motions are synthetic."""
+if TYPE_CHECKING:
+    from study.experiment.stimuli.manifest import Manifest
+    from study.experiment.stimuli.stimulus import StimulusSet
 
 
 @dataclass(frozen=True)
@@ -52,7 +38,7 @@ class SimulationSummary:
 
 def simulate(
     protocol: Protocol,
-    stimuli: StimulusSource,
+    stimuli: StimulusSet | Manifest,
     responses: Responses,
     participants: int,
     seed: int = 0,
@@ -108,7 +94,7 @@ def simulate(
 
 
 def _open(
-    protocol: Protocol, stimuli: StimulusSource, responses: Responses, plan: Plan, known: Mapping[str, Any]
+    protocol: Protocol, stimuli: StimulusSet | Manifest, responses: Responses, plan: Plan, known: Mapping[str, Any]
 ) -> SessionRecord:
     """A simulated participant's session: new, resumed, or already finished."""
     stored = find_session(responses, plan.participant)

@@ -19,65 +19,40 @@ from study.tasks.registry import right_answer, task_of
 from study.tasks.trial import PLACES, Trial
 
 Kind = Literal[
-    "consent",
-    "form",
-    "instructions",
-    "stimulus",
-    "gap",
-    "answer",
-    "feedback",
-    "pause",
-    "break",
-    "debrief",
-    "done",
+    "consent", "form", "instructions", "stimulus", "gap", "answer", "feedback", "pause", "break", "debrief", "done"
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What to do now.
-
-    Parameters
-    ----------
-    kind
-        `stimulus` plays one to its end; `gap` and `pause` wait; `answer` asks; `form` is filled in; the others are
-        read. Passing over `consent` means agreeing.
-    study
-        Name of the study; empty before the first and after the last.
-    text
-        What the participant reads.
-    stimulus
-        Id of the stimulus to play; with `instructions`, of the example that can be played.
-    slot
-        Which slot of the trial the stimulus fills, from 1; 0 outside stimuli.
-    duration_s
-        How long a gap, pause or answer window lasts; None for as long as it takes.
-    trial, attempt
-        The trial's number in the plan (0 outside trials), and which showing of it this is, from 1.
-    item
-        The rating item that is asked.
-    legal
-        The answers that count.
-    low, middle, high
-        Words at the ends and in the middle of a rating scale.
-    role
-        What the trial is for: `trial`, `practice` or `check`; empty outside trials.
-    """
+    """What to do now."""
 
     kind: Kind
+    """`stimulus` plays one to its end; `gap` and `pause` wait; `answer` asks; `form` is filled in; the others are read.
+    Passing over `consent` means agreeing."""
     study: str = ""
+    """Name of the study; empty before the first and after the last."""
     text: str = ""
+    """What the participant reads."""
     stimulus: str = ""
+    """Id of the stimulus to play; with `instructions`, of the example that can be played."""
     slot: int = 0
+    """Which slot of the trial the stimulus fills, from 1; 0 outside stimuli."""
     duration_s: float | None = None
+    """How long a gap, pause or answer window lasts; None for as long as it takes."""
     trial: int = 0
     attempt: int = 0
+    """The trial's number in the plan (0 outside trials), and which showing of it this is, from 1."""
     item: str = ""
+    """The rating item that is asked."""
     legal: tuple[str, ...] = ()
+    """The answers that count."""
     low: str = ""
     middle: str = ""
     high: str = ""
+    """Words at the ends and in the middle of a rating scale."""
     role: str = ""
+    """What the trial is for: `trial`, `practice` or `check`; empty outside trials."""
 
     @property
     def place(self) -> str:

@@ -12,9 +12,8 @@ CHOICE = Shortcut("comparison", lambda apart, _: share_of_more(apart), chance=0.
 """Somebody who chooses the stimulus that seems to have more of a property."""
 
 
-def both_methods(asked: Asked, for_practice: bool) -> tuple[Condition, ...]:
+def both_methods(asked: Asked, _for_practice: bool) -> tuple[Condition, ...]:
     """Both methods of a study, as one pair."""
-    del for_practice
     return (Condition("", (asked.reference, asked.comparison or asked.reference), (0, 0)),)
 
 

@@ -6,14 +6,13 @@ of `same-different`; there is no criterion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from study.models.oddity import CHANCE, HALFWAY, oddity_correct
 from study.models.population import probability_odd_found
-from study.tasks.answer import Answer
 from study.tasks.levels import level_conditions, level_practice, level_problems, levels_in_words
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.task import Asked, Problem, Shortcut, Task
@@ -34,11 +33,6 @@ def _problems(asked: Asked) -> Iterator[Problem]:
         )
 
 
-def _no_columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
-    del trial, answer
-    return {}
-
-
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
     chance = float(probability_odd_found(who.settings.same_different, float(trial.difference_frames or 0)))
     wrong = [place for place in legal if place != _right(trial)]
@@ -46,11 +40,10 @@ def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Gener
     return answer, max((chance - CHANCE) / (1 - CHANCE), 0.0)
 
 
-def _truth(settings: ObserverSettings, asked: Asked, level: float) -> dict[str, Any]:
+def _truth(settings: ObserverSettings, _asked: Asked, _level: float) -> dict[str, Any]:
     """The differences at which participants without lapses are right halfway between chance and always."""
     from scipy.optimize import brentq
 
-    del asked, level
     observer = settings.same_different
     nodes, weights = np.polynomial.hermite_e.hermegauss(31)
     sensitivity = np.exp(observer.log_sensitivity_sd * nodes)
@@ -85,7 +78,7 @@ ODDITY = Task(
     welcome="welcome_triples",
     legal=lambda _: PLACES[:3],
     right=_right,
-    columns=_no_columns,
+    columns=lambda _trial, _answer: {},
     problems=_problems,
     conditions=level_conditions,
     practice=level_practice,

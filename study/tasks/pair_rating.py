@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from study.models.choice import lean
 from study.models.ordinal import mean_score
-from study.tasks.answer import Answer
 from study.tasks.methods import CHOICE, any_practice, both_methods, two_methods
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.rating import points, rated_point, scale_in_words, scale_problems
@@ -22,11 +21,6 @@ def _problems(asked: Asked) -> Iterator[Problem]:
     yield from scale_problems(asked)
 
 
-def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
-    del answer
-    return {"a_first": trial.a_first}
-
-
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
     reference, comparison = trial.methods
     apart = lean(who.settings.preference, comparison, reference)
@@ -34,8 +28,7 @@ def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Gener
     return rated_point(who, higher if trial.a_first else -higher, legal, rng)
 
 
-def _truth(settings: ObserverSettings, asked: Asked, level: float) -> dict[str, Any]:
-    del level
+def _truth(settings: ObserverSettings, asked: Asked, _level: float) -> dict[str, Any]:
     apart = lean(settings.preference, asked.comparison or asked.reference, asked.reference)
     return {"mean_score": round(mean_score(settings.rating, apart, asked.scale_points), 6)}
 
@@ -55,7 +48,7 @@ PAIR_RATING = Task(
     welcome="welcome_pairs",
     legal=points,
     right=lambda _: None,
-    columns=_columns,
+    columns=lambda trial, _answer: {"a_first": trial.a_first},
     problems=_problems,
     conditions=both_methods,
     practice=any_practice,

@@ -27,8 +27,7 @@ def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Gener
     return (first if rng.random() < chance else second), abs(2 * chance - 1)
 
 
-def _truth(settings: ObserverSettings, asked: Asked, level: float) -> dict[str, Any]:
-    del level
+def _truth(settings: ObserverSettings, asked: Asked, _level: float) -> dict[str, Any]:
     share = preference_probability(settings.preference, asked.reference, asked.comparison or asked.reference)
     return {"favouring_a": round(share, 6)}
 

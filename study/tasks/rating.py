@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from study.counting import counted
-from study.tasks.answer import Answer
 from study.tasks.methods import against, any_practice
-from study.tasks.observer import ObserverSettings, Person
+from study.tasks.observer import Person
 from study.tasks.task import Asked, Condition, Problem, Task
 from study.tasks.trial import Trial
 
@@ -55,24 +53,14 @@ def _problems(asked: Asked) -> Iterator[Problem]:
         )
 
 
-def _conditions(asked: Asked, for_practice: bool) -> tuple[Condition, ...]:
-    del for_practice
+def _conditions(asked: Asked, _for_practice: bool) -> tuple[Condition, ...]:
     methods = (asked.reference,) if asked.comparison is None else (asked.reference, asked.comparison)
     return tuple(Condition(method, (method,), (0,)) for method in methods)
-
-
-def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
-    del trial, answer
-    return {}
 
 
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
     utility = who.settings.preference.utility.get(trial.methods[0], 0.0)
     return rated_point(who, who.settings.rating.utility_weight * utility + who.leniency, legal, rng)
-
-
-def _no_truth(settings: ObserverSettings, asked: Asked, level: float) -> None:
-    del settings, asked, level
 
 
 RATING = Task(
@@ -90,12 +78,12 @@ RATING = Task(
     welcome="welcome_films",
     legal=points,
     right=lambda _: None,
-    columns=_columns,
+    columns=lambda _trial, _answer: {},
     problems=_problems,
     conditions=_conditions,
     practice=any_practice,
     judge=_judge,
-    truth=_no_truth,
+    truth=lambda _settings, _asked, _level: None,
     in_words=lambda asked, blends: f"rated {scale_in_words(asked, blends)}",
     shortcut=None,
 )

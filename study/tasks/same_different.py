@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from study.models.differencing import best_correct
 from study.models.population import SameDifferentObserver, crossing, population_different, probability_different
-from study.tasks.answer import Answer
 from study.tasks.levels import level_conditions, level_practice, level_problems, levels_in_words
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.task import Asked, Shortcut, Task
@@ -20,13 +19,7 @@ def _right(trial: Trial) -> str:
     return "different" if trial.difference_frames else "same"
 
 
-def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
-    del answer
-    return {"reference_first": trial.a_first}
-
-
-def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
-    del legal
+def _judge(who: Person, trial: Trial, _legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
     different = float(probability_different(who.settings.same_different, float(trial.difference_frames or 0)))
     return ("different" if rng.random() < different else "same"), abs(2 * different - 1)
 
@@ -73,7 +66,7 @@ SAME_DIFFERENT = Task(
     welcome="welcome_pairs",
     legal=lambda _: ("same", "different"),
     right=_right,
-    columns=_columns,
+    columns=lambda trial, _answer: {"reference_first": trial.a_first},
     problems=level_problems,
     conditions=level_conditions,
     practice=level_practice,

@@ -59,118 +59,79 @@ Problem = tuple[str, str]
 
 @dataclass(frozen=True)
 class Condition:
-    """The stimuli of one pair, before any is made.
-
-    Parameters
-    ----------
-    name
-        What tells the pair from the others of its transition, such as `+5`; empty where there is one alone.
-    methods
-        How the blend length of each stimulus is found.
-    added_frames
-        What is added to each of these lengths.
-    difference_frames
-        Comparison minus reference; None where methods are compared.
-    """
+    """The stimuli of one pair, before any is made."""
 
     name: str
+    """What tells the pair from the others of its transition, such as `+5`; empty where there is one alone."""
     methods: tuple[str, ...]
+    """How the blend length of each stimulus is found."""
     added_frames: tuple[int, ...]
+    """What is added to each of these lengths."""
     difference_frames: int | None = None
+    """Comparison minus reference; None where methods are compared."""
 
 
 @dataclass(frozen=True)
 class Shortcut:
-    """How somebody would answer who sees one property of a pair's stimuli alone, such as their duration.
-
-    Parameters
-    ----------
-    counts
-        What is counted: `right` answers, or answers for the `comparison`.
-    share
-        Their share, 0 to 1, given how much more of the property the comparison has than the reference, in standard
-        deviations of one percept: in each of the pairs that differ in what is judged, and in those that do not.
-    chance
-        That share where the property tells nothing.
-    needed
-        What people need at threshold; None where the protocol's threshold says it, or there is none.
-    """
+    """How somebody would answer who sees one property of a pair's stimuli alone, such as their duration."""
 
     counts: Literal["right", "comparison"]
+    """What is counted: `right` answers, or answers for the `comparison`."""
     share: Callable[[NDArray[np.float64], NDArray[np.float64]], float]
+    """Their share, 0 to 1, given how much more of the property the comparison has than the reference, in standard
+    deviations of one percept: in each of the pairs that differ in what is judged, and in those that do not."""
     chance: float
+    """That share where the property tells nothing."""
     needed: float | None = None
+    """What people need at threshold; None where the protocol's threshold says it, or there is none."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """One task: every question that the house asks.
-
-    Parameters
-    ----------
-    name
-        Unique. Analyses, report sections and power know it by this.
-    asked_as
-        What the protocol and the table of answers call it; `rating` is two tasks, by how many stimuli are shown.
-    decides
-        What is decided, as a clause: "whether two transitions are the same".
-    layout, kind
-        How its slots are shown, and what is answered.
-    orders
-        The orders in which a pair can be shown: for each slot, which of the pair's stimuli it shows.
-    timed
-        Whether the answer has a time limit.
-    tested
-        Whether its studies have a test that can be confirmatory.
-    keys
-        Keys of a study that only some tasks take, this one among them.
-    instructions, question, welcome
-        Names of its built-in words: what is read before a study, what is asked after each trial (empty where items
-        ask), and the welcome of a session that has no other kind of trial.
-    legal
-        The answers that count.
-    right
-        The right answer to a trial; None where none is right.
-    columns
-        Columns of the table of answers that it gives a meaning; without empty ones.
-    problems
-        What does not fit between the task and the other keys of a study.
-    conditions
-        The pairs of one transition, in order; those of practice where asked for.
-    practice
-        Pairs for so many practice trials, out of shuffled ones; fewer are repeated.
-    judge
-        How a simulated person answers: the answer, and how easy it was from 0 to 1.
-    truth
-        What an analysis of a simulated study should find, at a threshold; None where nothing is known.
-    in_words
-        What participants did, as a clause for a Methods section, given words for the methods.
-    shortcut
-        How somebody would answer who sees one property of the stimuli alone; None where single stimuli are shown.
-    """
+    """One task: every question that the house asks."""
 
     name: str
+    """Unique. Analyses, report sections and power know it by this."""
     asked_as: str
+    """What the protocol and the table of answers call it; `rating` is two tasks, by how many stimuli are shown."""
     decides: str
+    """What is decided, as a clause: "whether two transitions are the same"."""
     layout: Layout
     kind: Kind
+    """How its slots are shown, and what is answered."""
     orders: tuple[tuple[int, ...], ...]
+    """The orders in which a pair can be shown: for each slot, which of the pair's stimuli it shows."""
     timed: bool
+    """Whether the answer has a time limit."""
     tested: bool
+    """Whether its studies have a test that can be confirmatory."""
     keys: frozenset[str]
+    """Keys of a study that only some tasks take, this one among them."""
     instructions: str
     question: str
     welcome: str
+    """Names of its built-in words: what is read before a study, what is asked after each trial (empty where items ask),
+    and the welcome of a session that has no other kind of trial."""
     legal: Callable[[Asked], tuple[str, ...]]
+    """The answers that count."""
     right: Callable[[Trial], str | None]
+    """The right answer to a trial; None where none is right."""
     columns: Callable[[Trial, Answer], Mapping[str, Any]]
+    """Columns of the table of answers that it gives a meaning; without empty ones."""
     problems: Callable[[Asked], Iterator[Problem]]
+    """What does not fit between the task and the other keys of a study."""
     conditions: Callable[[Asked, bool], tuple[Condition, ...]]
+    """The pairs of one transition, in order; those of practice where asked for."""
     practice: Callable[[Sequence[Pair], int], list[Pair]]
+    """Pairs for so many practice trials, out of shuffled ones; fewer are repeated."""
     judge: Callable[[Person, Trial, Sequence[str], np.random.Generator], tuple[str, float]]
+    """How a simulated person answers: the answer, and how easy it was from 0 to 1."""
     truth: Callable[[ObserverSettings, Asked, float], dict[str, Any] | None]
+    """What an analysis of a simulated study should find, at a threshold; None where nothing is known."""
     in_words: Callable[[Asked, Callable[[str], str]], str]
+    """What participants did, as a clause for a Methods section, given words for the methods."""
     shortcut: Shortcut | None
+    """How somebody would answer who sees one property of the stimuli alone; None where single stimuli are shown."""
 
     @property
     def slots(self) -> int:

@@ -18,63 +18,45 @@ PLACES = ("first", "second", "third")
 
 @dataclass(frozen=True)
 class Pair:
-    """Stimuli that are compared, mostly two, or one to rate.
-
-    Parameters
-    ----------
-    name
-        Unique in the protocol: `jnd/walking/+5`.
-    study, task, motion, category
-        The study, its task, the transition's name and its type of motion.
-    stimuli
-        Stimulus ids: reference and comparison (same-different), methods a and b (preference, rating of a pair), or the
-        one that is rated.
-    methods
-        How the blend length of each was found.
-    difference_frames
-        Comparison minus reference, signed; None where two methods are compared.
-    """
+    """Stimuli that are compared, mostly two, or one to rate."""
 
     name: str
+    """Unique in the protocol: `jnd/walking/+5`."""
     study: str
     task: str
     motion: str
     category: str
+    """The study, its task, the transition's name and its type of motion."""
     stimuli: tuple[str, ...]
+    """Stimulus ids: reference and comparison (same-different), methods a and b (preference, rating of a pair), or the
+    one that is rated."""
     methods: tuple[str, ...]
+    """How the blend length of each was found."""
     difference_frames: int | None = None
+    """Comparison minus reference, signed; None where two methods are compared."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One trial: what is shown in each slot, and what the answer will mean.
-
-    Parameters
-    ----------
-    trial, repeat
-        Number of the trial in the session, and which repeat of the pair it is, both from 1.
-    stimuli
-        Stimulus ids, slot by slot.
-    members
-        Which of the pair's stimuli each slot shows, from 0: `(1, 0)` shows the comparison first.
-    methods
-        Those of the pair, in the pair's order.
-    role
-        `trial`, `practice` (counts for nothing) or `check` (asks for `expected`, whatever is shown).
-    """
+    """One trial: what is shown in each slot, and what the answer will mean."""
 
     trial: int
     study: str
     task: str
     repeat: int
+    """Number of the trial in the session, and which repeat of the pair it is, both from 1."""
     pair: str
     motion: str
     category: str
     stimuli: tuple[str, ...]
+    """Stimulus ids, slot by slot."""
     members: tuple[int, ...]
+    """Which of the pair's stimuli each slot shows, from 0: `(1, 0)` shows the comparison first."""
     methods: tuple[str, ...]
+    """Those of the pair, in the pair's order."""
     difference_frames: int | None
     role: str = "trial"
+    """`trial`, `practice` (counts for nothing) or `check` (asks for `expected`, whatever is shown)."""
     expected: str = ""
 
     @property

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.clips import clips_options, find_entry, load_clip
-from study.apps.cli.console import columns, emit, json_option, progress, say
+from study.apps.cli.console import FOLDER, FPS, columns, emit, json_option, progress, say
 from study.apps.cli.moments import moment
 
 if TYPE_CHECKING:
@@ -27,17 +27,11 @@ POINT = (("_frame", "d"), ("_s", ".2f"), ("_file_frame", ".5g"))
 @click.command()
 @click.argument("motions", nargs=-1, metavar="CLIPS...")
 @clips_options
-@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at.")
-@click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for advice.csv, advice.json, and a strip of each transition.",
-)
+@FPS
+@click.option("--out", type=FOLDER, help="Folder for advice.csv, advice.json, and a strip of each transition.")
 @click.option("--no-strips", is_flag=True, help="Write only the tables.")
 @json_option
-def advise(
-    motions: tuple[str, ...], library: str | None, fps: float, out: Path | None, no_strips: bool, as_json: bool
-) -> None:
+def advise(motions: tuple[str, ...], library: str | None, fps: float, out: Path | None, no_strips: bool) -> None:
     """A transition point and a blend length for each ordered pair of CLIPS, and its difference from ten frames.
 
     CLIPS are motion files, or names of motions in --library; the whole library if none is named. The method suits
@@ -92,7 +86,7 @@ def advise(
     result = {"fps": fps, "advice": rows, "problems": problems, "cyclic": cyclic}
     if out is not None:
         _write(out, result)
-    emit(result, as_json, "\n".join(_table(rows, fps, library)))
+    emit(result, "\n".join(_table(rows, fps, library)))
 
 
 def _one(source: Clip, destination: Clip, cyclic: tuple[bool, bool], out: Path | None) -> dict[str, Any]:

@@ -4,36 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
-from study.apps.cli.console import Command, library_option, say
+from study.apps.cli.console import is_given, kept_flag, library_option, say, together
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
     from study.motion.entries import Entry
     from study.motion.library import Library
 
-_AS_IS = "study.apps.cli.clips.as_is"
+as_is_option = kept_flag(
+    "--as-is", "Use motion files as they are, with their defects (such as an added T-pose), floor and position."
+)
 
 
-def as_is_option(command: Command) -> Command:
-    """Adds `--as-is` to a verb; it concerns every clip that the verb loads, so `load_clip` looks it up."""
-
-    def keep(context: click.Context, _: click.Parameter, as_is: bool) -> None:
-        context.meta[_AS_IS] = as_is
-
-    return click.option(
-        "--as-is",
-        is_flag=True,
-        expose_value=False,
-        callback=keep,
-        help="Use motion files as they are, with their defects (such as an added T-pose), floor and position.",
-    )(command)
-
-
-def clips_options(command: Command) -> Command:
-    """Adds `--library` and `--as-is` to a verb that loads clips."""
-    return library_option(as_is_option(command))
+clips_options = together(library_option, as_is_option)
+"""Of a verb that loads clips."""
 
 
 def find_entry(spec: str, library: str | Library | None) -> tuple[Library, Entry]:
@@ -54,10 +38,8 @@ def load_clip(spec: str, library: str | Library | None, fps: float | None, *, te
     """
     from study.motion.defects import TOLD
 
-    context = click.get_current_context(silent=True)
-    as_is = bool(context and context.meta.get(_AS_IS))
     opened, entry = find_entry(spec, library)
-    clip = opened.clip(entry, fps=fps, as_is=as_is)
+    clip = opened.clip(entry, fps=fps, as_is=is_given("--as-is"))
     for line in clip.history:
         if tell and line.startswith(TOLD):
             say(f"{spec}: {line}" + (" (--as-is keeps them)" if line.startswith(f"{TOLD}dropped") else ""))

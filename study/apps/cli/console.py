@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -14,39 +15,64 @@ from study.apps.cli.streams import show
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+FILE, READABLE = (click.Path(exists=there, dir_okay=False, path_type=Path) for there in (False, True))
+FOLDER, RESULTS = (click.Path(exists=there, file_okay=False, path_type=Path) for there in (False, True))
+"""Kinds of paths: to be written, and those that have to be there."""
 
-def json_option(command: Command) -> Command:
-    """Adds `--json` to a verb."""
-    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")(command)
-
-
-def library_option(command: Command) -> Command:
-    """Adds `--library` to a verb."""
-    return click.option(
-        "--library",
-        metavar="NAME|FOLDER",
-        default=None,
-        help="Where motions come from: 'synthetic' (default), or a folder of .bvh or .asf/.amc files such as CMU's.",
-    )(command)
+FPS = click.option(
+    "--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at."
+)
 
 
-def database_option(command: Command) -> Command:
-    """Adds `--database` to a verb."""
-    return click.option(
-        "--database",
-        metavar="FILE|URL",
-        envvar="SEGUE_DATABASE",
-        show_envvar=True,
-        help="Database of responses: a file, or postgresql+psycopg://USER@HOST/NAME (default: responses.sqlite in the "
-        "results folder).",
-    )(command)
+def kept_flag(name: str, words: str) -> Callable[[Command], Command]:
+    """Adds a flag to a verb that is not handed to it: `is_given` looks it up where it counts."""
+
+    def keep(context: click.Context, parameter: click.Parameter, given: bool) -> None:
+        context.meta[parameter.opts[0]] = given
+
+    return click.option(name, is_flag=True, expose_value=False, callback=keep, help=words)
 
 
-def emit(result: Mapping[str, Any], as_json: bool, text: str) -> None:
-    """Prints a verb's result: the mapping as JSON (numbers that are not finite become null), or the text."""
+def is_given(name: str) -> bool:
+    """Whether a flag of `kept_flag` was given to the verb that runs now."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(name))
+
+
+json_option = kept_flag("--json", "Print one JSON object on standard output.")
+
+
+library_option = click.option(
+    "--library",
+    metavar="NAME|FOLDER",
+    help="Where motions come from: 'synthetic' (default), or a folder of .bvh or .asf/.amc files such as CMU's.",
+)
+database_option = click.option(
+    "--database",
+    metavar="FILE|URL",
+    envvar="SEGUE_DATABASE",
+    show_envvar=True,
+    help="Database of responses: a file, or postgresql+psycopg://USER@HOST/NAME (default: responses.sqlite in the "
+    "results folder).",
+)
+
+
+def together(*options: Callable[[Any], Any]) -> Callable[[Command], Command]:
+    """Several options as one; help lists them in this order."""
+
+    def add(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+def emit(result: Mapping[str, Any], text: str) -> None:
+    """Prints a verb's result: with `--json` the mapping (numbers that are not finite become null), else the text."""
     from study.analysis.to_json import to_json
 
-    show(json.dumps(to_json(result), indent=2, allow_nan=False) if as_json else text, sys.stdout)
+    show(json.dumps(to_json(result), indent=2, allow_nan=False) if is_given("--json") else text, sys.stdout)
 
 
 def say(message: str) -> None:

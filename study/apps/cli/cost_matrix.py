@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from study.apps.cli.clips import clip_pair, clips_options
-from study.apps.cli.console import emit, json_option
+from study.apps.cli.console import FILE, FPS, emit, json_option
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
 
@@ -23,7 +23,7 @@ LABELS = {"joint": "cost, squared half angles and metres", "pointcloud": "mean s
 @click.argument("source", metavar="SRC")
 @click.argument("destination", metavar="DST")
 @clips_options
-@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at.")
+@FPS
 @click.option("--metric", type=click.Choice(list(LABELS)), default="joint", show_default=True)
 @click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)
 @click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of velocities.")
@@ -35,9 +35,7 @@ LABELS = {"joint": "cost, squared half angles and metres", "pointcloud": "mean s
     help="Which part of the root counts: its height, since a transition aligns position and facing; all of it; none.",
 )
 @click.option("--window", type=click.IntRange(min=1), help="Frames of a point cloud (default: a third of a second).")
-@click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), help="X.npy, or X.png (darker is a lower cost)."
-)
+@click.option("--out", type=FILE, help="X.npy, or X.png (darker is a lower cost).")
 @json_option
 def cost_matrix(
     source: str,
@@ -45,12 +43,9 @@ def cost_matrix(
     library: str | None,
     fps: float,
     metric: str,
-    weights: str,
-    nu: float,
-    root: str,
     window: int | None,
     out: Path | None,
-    as_json: bool,
+    **of_joints: Any,
 ) -> None:
     """The cost of a transition between all frames of SRC and DST (Wang & Bodenheimer 2003), and its minimum."""
     from study.transitions.cost_matrix import extremes, joint_blocks, pointcloud_blocks
@@ -61,7 +56,7 @@ def cost_matrix(
         raise click.UsageError("expected --window with --metric pointcloud; the joint cost compares single frames.")
     first, second = clip_pair(source, destination, library, fps)
     if metric == "joint":
-        blocks, shape = joint_blocks(first, second, weights=weights, nu=nu, root=root), (first.frames, second.frames)
+        blocks, shape = joint_blocks(first, second, **of_joints), (first.frames, second.frames)
     else:
         window = window or max(1, round(fps / 3))
         blocks = pointcloud_blocks(first, second, window=window)
@@ -77,9 +72,8 @@ def cost_matrix(
         found = _write_matrix(blocks, shape, out)
     else:
         found = _draw(blocks, shape, out, (f"{source}, frame", f"{destination}, frame"), LABELS[metric])
-    keys: dict[str, object] = {"metric": metric, "fps": fps}
-    keys |= {"weights": weights, "nu": nu, "root": root} if metric == "joint" else {"window": window}
-    result = {"min": found.min, "argmin": found.argmin, "max": found.max, "shape": found.shape, **keys}
+    result: dict[str, object] = {"min": found.min, "argmin": found.argmin, "max": found.max, "shape": found.shape}
+    result |= {"metric": metric, "fps": fps, **(of_joints if metric == "joint" else {"window": window})}
     result |= {**moment(first, found.argmin[0], "source"), **moment(second, found.argmin[1], "destination")}
     result["file"] = None if out is None else str(out)
     least = f"{in_words(first, found.argmin[0], source)} to {in_words(second, found.argmin[1], destination)}"
@@ -87,7 +81,7 @@ def cost_matrix(
         f"{found.shape[0]} x {found.shape[1]} costs at {fps:g} fps, from {found.min:.5g} to {found.max:.5g}; "
         f"least from {least}"
     )
-    emit(result, as_json, text if out is None else f"{out}: {text}")
+    emit(result, text if out is None else f"{out}: {text}")
 
 
 def _write_matrix(blocks: Iterable[Block], shape: tuple[int, int], out: Path) -> Extremes:
@@ -95,31 +89,29 @@ def _write_matrix(blocks: Iterable[Block], shape: tuple[int, int], out: Path) ->
     import numpy as np
 
     from study.files import whole_file
-    from study.transitions.cost_matrix import extremes
 
     with whole_file(out) as unfinished, unfinished.open("wb") as file:
         header = {"descr": np.lib.format.dtype_to_descr(np.dtype("<f4")), "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(file, header)
-
-        def kept() -> Iterator[Block]:
-            for rows, block in blocks:
-                file.write(block.astype("<f4").tobytes())
-                yield rows, block
-
-        return extremes(kept())
+        return _extremes(blocks, lambda _, block: file.write(block.astype("<f4").tobytes()))
 
 
 def _draw(blocks: Iterable[Block], shape: tuple[int, int], out: Path, names: tuple[str, str], label: str) -> Extremes:
     from study.report.costs import Reducer, cost_picture
-    from study.transitions.cost_matrix import extremes
 
     reducer = Reducer(shape)
+    found = _extremes(blocks, reducer.add)
+    cost_picture(reducer.small, out, least=found.argmin, span=shape, names=names, label=label)
+    return found
+
+
+def _extremes(blocks: Iterable[Block], keep: Callable[..., object]) -> Extremes:
+    """The extremes of blocks that are kept as they pass."""
+    from study.transitions.cost_matrix import extremes
 
     def kept() -> Iterator[Block]:
         for rows, block in blocks:
-            reducer.add(rows, block)
+            keep(rows, block)
             yield rows, block
 
-    found = extremes(kept())
-    cost_picture(reducer.small, out, least=found.argmin, span=shape, names=names, label=label)
-    return found
+    return extremes(kept())

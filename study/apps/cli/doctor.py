@@ -10,7 +10,7 @@ from study.apps.cli.console import emit, json_option
 @click.command()
 @click.option("--quiet", is_flag=True, help="Print nothing; the exit status says whether stimuli can be rendered.")
 @json_option
-def doctor(quiet: bool, as_json: bool) -> None:
+def doctor(quiet: bool) -> None:
     """What this machine has for rendering stimuli, and what to install. Exit status 2 if something is missing."""
     from renderer.context import describe
 
@@ -23,6 +23,6 @@ def doctor(quiet: bool, as_json: bool) -> None:
             *(f"advice:   {sentence}" for sentence in found["advice"]),
             "Stimuli can be rendered." if able else "Stimuli can't be rendered until the above is mended.",
         ]
-        emit({**found, "able": able}, as_json, "\n".join(lines))
+        emit({**found, "able": able}, "\n".join(lines))
     if not able:
         raise click.exceptions.Exit(2)

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from study.apps.cli.console import database_option, emit, json_option
+from study.apps.cli.console import RESULTS, database_option, emit, json_option
 from study.counting import counted
 
 
 @click.command()
-@click.argument("results", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("results", type=RESULTS)
 @click.option(
     "--to",
     "kind",
@@ -27,19 +27,19 @@ from study.counting import counted
 )
 @database_option
 @json_option
-def export(results: Path, kind: str, out: Path | None, database: str | None, as_json: bool) -> None:
+def export(results: Path, kind: str, out: Path | None, database: str | None) -> None:
     """Export all responses for other programs and for archives."""
     from study.experiment.folder import PROTOCOL
     from study.experiment.protocol.whole import load_protocol
     from study.experiment.store.export import export as export_folder
-    from study.experiment.store.frames import export_csv
+    from study.experiment.store.frames import dictionary_beside, export_csv
     from study.experiment.store.responses import open_answers
 
     with open_answers(results, database) as responses:
         if kind == "csv":
             place = export_csv(responses, out or results / "answers.csv")
-            emit({"file": str(place)}, as_json, str(place))
+            emit({"file": str(place), "dictionary": str(dictionary_beside(place))}, str(place))
             return
         place = export_folder(load_protocol(results / PROTOCOL), responses, kind, out or results / kind)
     files = sum(1 for path in place.rglob("*") if path.is_file())
-    emit({"folder": str(place), "files": files}, as_json, f"{place}: {counted(files, 'file')}")
+    emit({"folder": str(place), "files": files}, f"{place}: {counted(files, 'file')}")

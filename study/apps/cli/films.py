@@ -2,40 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import click
 
+from study.apps.cli.console import together
 
-def film_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds `--style`, `--view`, `--camera` and `--size` to a verb."""
-    for decorate in (
-        click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Of the film, in pixels."),
-        click.option(
-            "--camera",
-            type=click.Choice(["track", "pan", "fixed"]),
-            default="track",
-            show_default=True,
-            help="Follows the figure; stands still and turns; does nothing.",
-        ),
-        click.option(
-            "--view",
-            type=click.Choice(["front", "side", "three-quarter"]),
-            default="three-quarter",
-            show_default=True,
-            help="From where, relative to the way the figure goes.",
-        ),
-        click.option(
-            "--style",
-            type=click.Choice(["mannequin", "stick", "points"]),
-            default="mannequin",
-            show_default=True,
-            help="How the figure is drawn.",
-        ),
-    ):
-        command = decorate(command)
-    return command
+film_options = together(
+    click.option(
+        "--style",
+        type=click.Choice(["mannequin", "stick", "points"]),
+        default="mannequin",
+        show_default=True,
+        help="How the figure is drawn.",
+    ),
+    click.option(
+        "--view",
+        type=click.Choice(["front", "side", "three-quarter"]),
+        default="three-quarter",
+        show_default=True,
+        help="From where, relative to the way the figure goes.",
+    ),
+    click.option(
+        "--camera",
+        type=click.Choice(["track", "pan", "fixed"]),
+        default="track",
+        show_default=True,
+        help="Follows the figure; stands still and turns; does nothing.",
+    ),
+    click.option(
+        "--size",
+        default="1280x720",
+        show_default=True,
+        metavar="WxH",
+        callback=lambda _context, _parameter, text: film_size(text),
+        help="Of the film, in pixels.",
+    ),
+)
+"""What `drawing.draw_clip` takes: style, view, camera and size."""
 
 
 def film_size(text: str) -> tuple[int, int]:

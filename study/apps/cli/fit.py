@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.cli.console import emit, json_option
+from study.apps.cli.console import READABLE, emit, json_option
 from study.counting import counted
 from study.errors import AnalysisError
 
@@ -172,7 +172,7 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 
 
 @click.command()
-@click.argument("data", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("data", type=READABLE)
 @click.option("--task", type=click.Choice(list(FITS)), required=True)
 @click.option("--answer", required=True, help="Column of the response: right or wrong, yes or no, same or different, "
               "first or second (or the method chosen), a rating.")  # fmt: skip
@@ -203,7 +203,7 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 )
 @click.option("--decimal", type=click.Choice(["point", "comma"]), help="Detected by default.")
 @json_option
-def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
+def fit(data: Path, task: str, **options: Any) -> None:
     """Analyse data from another program (PsychoPy, jsPsych, Gorilla): CSV or JSON, with its columns named here.
 
     Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
@@ -223,7 +223,7 @@ def fit(data: Path, task: str, as_json: bool, **options: Any) -> None:
         f"{data}: {read.used} of {counted(read.rows, 'row')} used ({read.blank} without a stimulus, "
         f"{read.missed} without an answer), {counted(people, 'participant')}\n{found['answer']}"
     )
-    emit({"file": data.name, "task": task, **found, **counts}, as_json, text)
+    emit({"file": data.name, "task": task, **found, **counts}, text)
 
 
 def _refuse_others(task: str, options: dict[str, Any]) -> None:

@@ -13,7 +13,6 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TextIO
 
 import click
 
@@ -54,14 +53,12 @@ VERBS = {
 class Verbs(click.Group):
     """A group whose commands are imported on demand."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """All verbs, in order."""
-        del ctx
         return list(VERBS)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         """One verb, imported now."""
-        del ctx
         if cmd_name not in VERBS:
             return None
         module, _, name = VERBS[cmd_name].partition(":")
@@ -87,24 +84,12 @@ def segue() -> None:
     """Perceptual studies of motion transitions: from motion capture to thresholds, preferences and a report."""
 
 
-def _show_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
-    del category, filename, lineno, file, line
-    say(f"segue: warning: {message}")
-
-
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line on arguments (default: the process's own) and return the exit status."""
     streams = sys.stdout, sys.stderr
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = _show_warning
+            warnings.showwarning = lambda message, *_: say(f"segue: warning: {message}")
             given = list(sys.argv[1:] if arguments is None else arguments)
             # Without its standalone mode click returns the status of a verb that asks to exit.
             status = segue.main(given, prog_name="segue", standalone_mode=False)

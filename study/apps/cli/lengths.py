@@ -31,14 +31,7 @@ def show_lengths(
 
     weights, specification = options
     longest = None if chosen.blend_frames <= 2 * source.fps else chosen.blend_frames
-    curve = choose(
-        source,
-        destination,
-        *points,
-        longest=longest,
-        weights=weights,
-        specification=specification,
-    )
+    curve = choose(source, destination, *points, longest=longest, weights=weights, specification=specification)
     if curve.lengths is None or curve.costs is None:
         raise AssertionError("the geodesic method gives the cost of every length")
     joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])

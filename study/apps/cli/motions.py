@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.clips import clips_options, load_clip
-from study.apps.cli.console import emit, json_option, library_option, say
-from study.apps.cli.films import film_options, film_size
+from study.apps.cli.console import FILE, FOLDER, emit, json_option, library_option, say
+from study.apps.cli.films import film_options
 from study.counting import counted
 
 if TYPE_CHECKING:
-    from study.motion.skeleton import Skeleton
-
-if TYPE_CHECKING:
     from study.motion.library import FolderLibrary
+    from study.motion.skeleton import Skeleton
 
 
 @click.group()
@@ -30,7 +28,7 @@ def motions() -> None:
 @library_option
 @click.option("--write", is_flag=True, help="Write a first library.toml into the folder, for you to complete.")
 @json_option
-def list_motions(library: str | None, write: bool, as_json: bool) -> None:
+def list_motions(library: str | None, write: bool) -> None:
     """The motions of a library, by name."""
     from study.motion.library import FolderLibrary, open_library
     from study.motion.library_file import NAME, write_library_file
@@ -56,7 +54,7 @@ def list_motions(library: str | None, write: bool, as_json: bool) -> None:
         {"name": row.name, "kind": row.kind, "words": row.words, "file": opened.where(row) or None, "genre": row.genre}
         for row in rows
     ]
-    emit({**result, "motions": motions, "skipped": skipped}, as_json, "\n".join(lines))
+    emit({**result, "motions": motions, "skipped": skipped}, "\n".join(lines))
 
 
 def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
@@ -94,7 +92,7 @@ def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
 )
 @click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, if the file does not say it.")
 @json_option
-def inspect(file: str, metres_per_unit: float | None, fps: float | None, as_json: bool) -> None:
+def inspect(file: str, metres_per_unit: float | None, fps: float | None) -> None:
     """The content of a motion file, and its defects.
 
     The options, or the file's library.toml, supply what the file does not say.
@@ -128,7 +126,7 @@ def inspect(file: str, metres_per_unit: float | None, fps: float | None, as_json
         *(f"defect: {defect.message}" for defect in defects),
         "" if defects else _nothing_found(clip.skeleton),
     ]
-    emit(result, as_json, "\n".join(line for line in lines if line))
+    emit(result, "\n".join(line for line in lines if line))
 
 
 def _role_lines(skeleton: Skeleton) -> Iterator[str]:
@@ -151,48 +149,31 @@ def _nothing_found(skeleton: Skeleton) -> str:
 
 @motions.command()
 @click.argument("trials", nargs=-1, required=True, metavar="TRIAL...")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder to download into.")
+@click.option("--out", type=FOLDER, required=True, help="Folder to download into.")
 @json_option
-def download(trials: tuple[str, ...], out: Path, as_json: bool) -> None:
+def download(trials: tuple[str, ...], out: Path) -> None:
     """Download trials such as 16_35, or motions such as run, from the CMU Graphics Lab's official site."""
     from study.motion.library import CMU_ACKNOWLEDGEMENT, download_trial
 
     files = [download_trial(trial, out) for trial in trials]
     say(CMU_ACKNOWLEDGEMENT)
-    emit(
-        {"files": [str(file) for file in files], "acknowledgement": CMU_ACKNOWLEDGEMENT},
-        as_json,
-        "\n".join(map(str, files)),
-    )
+    emit({"files": [str(file) for file in files], "acknowledgement": CMU_ACKNOWLEDGEMENT}, "\n".join(map(str, files)))
 
 
 @click.command()
 @click.argument("clip", metavar="FILE|NAME")
 @clips_options
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.mp4, or X.png: a strip.")
+@click.option("--out", type=FILE, required=True, help="X.mp4, or X.png: a strip.")
 @click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video (default: that of the clip).")
 @film_options
 @click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Of the strip.")
 @click.option("--floor", is_flag=True, help="Draw the ground, with contact shadows.")
 @json_option
-def preview(
-    clip: str,
-    library: str | None,
-    out: Path,
-    fps: float | None,
-    style: str,
-    view: str,
-    camera: str,
-    size: str,
-    poses: int,
-    floor: bool,
-    as_json: bool,
-) -> None:
+def preview(clip: str, library: str | None, out: Path, fps: float | None, **look: Any) -> None:
     """One clip as a video, or as a strip of poses in one image."""
     from study.motion.drawing import draw_clip
 
-    wanted = film_size(size)
     shown = load_clip(clip, library, fps)
-    draw_clip(shown, out, size=wanted, view=view, camera=camera, style=style, poses=poses, floor=floor)
+    draw_clip(shown, out, **look)
     result = {"file": str(out), "frames": shown.frames, "fps": shown.fps, "history": list(shown.history)}
-    emit(result, as_json, f"{out}: {shown.name or clip}, {counted(shown.frames, 'frame')} at {shown.fps:g} fps")
+    emit(result, f"{out}: {shown.name or clip}, {counted(shown.frames, 'frame')} at {shown.fps:g} fps")

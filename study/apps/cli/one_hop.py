@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.clips import clips_options, find_entry, load_clip
-from study.apps.cli.console import emit, json_option, progress, say
+from study.apps.cli.console import FILE, READABLE, emit, json_option, progress, say
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from study.motion.clip import Clip
     from study.transitions.one_hop.problem import Settings, Switch
     from study.transitions.one_hop.table import OneHopTable
-
-TABLE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 @click.group("one-hop")
@@ -53,9 +51,7 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
 @one_hop.command()
 @click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
 @clips_options
-@click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.npz, or X.bin and X.json."
-)
+@click.option("--out", type=FILE, required=True, help="X.npz, or X.bin and X.json.")
 @click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frame rate to work at.")
 @click.option(
     "--pair", "pairs", type=(str, str), multiple=True, metavar="SRC DST", help="A transition to build (default: all)."
@@ -80,7 +76,7 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
 @click.option("--adaptive", is_flag=True, help="Each blend has a length of its own, up to 1 s.")
 @click.option("--on-beat", is_flag=True, help="Align beats with beats, estimated from the motions or given by --beats.")
 @click.option(
-    "--beats", type=(str, TABLE), multiple=True, metavar="CLIP FILE", help="Times of a clip's beats, seconds."
+    "--beats", type=(str, READABLE), multiple=True, metavar="CLIP FILE", help="Times of a clip's beats, seconds."
 )
 @click.option(
     "--near-direct", type=click.IntRange(min=0), help="The hop is DST itself, shifted by at most this many frames."
@@ -88,7 +84,7 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
 @click.option("--workers", type=click.IntRange(min=1), help="Threads (default: one a core).")
 @click.option("--memory-gb", type=click.FloatRange(min=0.05), default=2.0, show_default=True, help="Memory limit.")
 @json_option
-def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as_json: bool, **options: Any) -> None:
+def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **options: Any) -> None:
     """Find the best transition between CLIPs for every triggered frame, and write a table of them.
 
     Clips are motion files, or names of motions in --library. All of them may be hops. The same command
@@ -124,7 +120,7 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, as
     )
     if both.any():
         text += f"; mean cost {result['mean_cost']:.4g}, direct {result['mean_direct_cost']:.4g}"
-    emit(result, as_json, text)
+    emit(result, text)
 
 
 def switches_of(clips: tuple[Clip, ...], options: dict[str, Any]) -> tuple[Switch, ...]:
@@ -223,10 +219,10 @@ def beat_offsets(
 
 
 @one_hop.command()
-@click.argument("table", type=TABLE)
+@click.argument("table", type=READABLE)
 @click.option("--at", "places", type=(str, str, int), multiple=True, metavar="SRC DST FRAME", help="Show this entry.")
 @json_option
-def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -> None:
+def show(table: Path, places: tuple[tuple[str, str, int], ...]) -> None:
     """The content of a table, and single entries of it."""
     from study.transitions.one_hop.table import COLUMNS, header, read_table
 
@@ -258,11 +254,11 @@ def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -
                 f"{entry.offset}, stay {entry.stay_hop}; cost {said['cost']:.4g}, direct {said['direct_cost']:.4g}"
             )
         entries.append(said)
-    emit({**header(held), "shown": entries}, as_json, "\n".join(lines))
+    emit({**header(held), "shown": entries}, "\n".join(lines))
 
 
 @one_hop.command()
-@click.argument("table", type=TABLE)
+@click.argument("table", type=READABLE)
 @click.argument("clips", metavar="[CLIP...]", nargs=-1)
 @clips_options
 @click.option("--first", metavar="CLIP", help="The state to start in (default: the first clip).")
@@ -270,7 +266,7 @@ def show(table: Path, places: tuple[tuple[str, str, int], ...], as_json: bool) -
     "--trigger", "triggers", type=(int, str), multiple=True, metavar="FRAME DST", help="At this frame, change to DST."
 )
 @click.option("--method", type=click.Choice(["one-hop", "direct"]), default="one-hop", show_default=True)
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png.")
+@click.option("--out", type=FILE, required=True, help="X.bvh, X.mp4 or X.png.")
 @json_option
 def play(
     table: Path,
@@ -280,12 +276,13 @@ def play(
     triggers: tuple[tuple[int, str], ...],
     method: str,
     out: Path,
-    as_json: bool,
 ) -> None:
     """Play clips as the states of a state machine, with transitions from a table, and write the motion.
 
     CLIPs are those of the table, in its order (default: the motions of --library with the table's names).
     """
+    from dataclasses import asdict
+
     from study.motion.drawing import draw_clip
     from study.motion.readers.bvh_writing import write_bvh
     from study.transitions.one_hop.play import Trigger
@@ -304,18 +301,9 @@ def play(
         draw_played(played, out)
     else:
         draw_clip(played.clip, out)
-    segments = [
-        {
-            "kind": part.kind,
-            "clip": held.clips[part.clip],
-            "start": part.start,
-            "stop": part.stop,
-            "clip_start": part.clip_start,
-        }
-        for part in played.segments
-    ]
+    segments = [{**asdict(part), "clip": held.clips[part.clip]} for part in played.segments]
     lines = [
         f"{part['start']:6} {part['kind']:6} {part['clip']} from its frame {part['clip_start']}" for part in segments
     ]
     result = {"file": str(out), "frames": played.clip.frames, "method": method, "segments": segments}
-    emit(result, as_json, "\n".join([f"{out}: {counted(played.clip.frames, 'frame')}", *lines]))
+    emit(result, "\n".join([f"{out}: {counted(played.clip.frames, 'frame')}", *lines]))

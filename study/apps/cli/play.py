@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.cli.console import database_option, emit, json_option, library_option, say
+from study.apps.cli.console import READABLE, database_option, emit, json_option, library_option, say
 from study.apps.cli.shared import OUT, check_database, load_for_people, prepare_stimuli, results_folder
 from study.counting import counted
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from renderer.window import Window
     from study.apps.player.loop import Outcome, Setting
     from study.apps.player.pages import Look
-    from study.apps.player.store import Store
+    from study.apps.player.store import ResponsesStore
     from study.experiment.plan import Plan
     from study.experiment.protocol.whole import Protocol
     from study.experiment.session import Session
@@ -44,7 +44,7 @@ CENTIMETRES = click.FloatRange(1, 1000)
 @click.option("--actual-size", is_flag=True, help="Show stimuli in their own pixels instead of as `[screen]` states.")
 @click.option("--screen-cm", type=CENTIMETRES, help="Width of the screen in cm, measured (default: as it reports).")
 @click.option("--distance-cm", type=CENTIMETRES, help="Viewing distance in cm (default: the protocol's).")
-@click.option("--font", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Font for other scripts.")
+@click.option("--font", type=READABLE, help="Font for other scripts.")
 @json_option
 def play(
     protocol: str,
@@ -61,7 +61,6 @@ def play(
     screen_cm: float | None,
     distance_cm: float | None,
     font: Path | None,
-    as_json: bool,
 ) -> None:
     """A session in a window: stimuli drawn live, every flip timed, every response stored before the next trial.
 
@@ -86,11 +85,7 @@ def play(
         outcome, window = _sit(responses, loaded, stimuli, plan, place)
     where = {"folder": str(folder), "database": responses.place}
     result = {**asdict(outcome), "participant": participant, **where, "window": window}
-    emit(
-        result,
-        as_json,
-        f"{participant}: {outcome.end}; {counted(outcome.answers, 'answer')} stored now, in {responses.place}",
-    )
+    emit(result, f"{participant}: {outcome.end}; {counted(outcome.answers, 'answer')} stored now, in {responses.place}")
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -157,7 +152,7 @@ def _sit(
         return play(window, session, stimuli.stimulus, store, look, setting=place.setting, say=say), window.describe()
 
 
-def _leave_a_lost_display(store: Store) -> None:
+def _leave_a_lost_display(store: ResponsesStore) -> None:
     """Nothing can be shown or asked any more: say so, and end at once."""
     with suppress(Exception):  # what can be written down is
         store.event("display lost")

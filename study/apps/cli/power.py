@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.analysis.to_json import to_json
-from study.apps.cli.console import emit, json_option, library_option, progress
+from study.apps.cli.console import FOLDER, emit, json_option, library_option, progress
 from study.counting import counted
 from study.errors import AnalysisError
 
@@ -84,18 +84,12 @@ def _sizes(text: str) -> list[int]:
     "--sessions", is_flag=True, help="Simulate whole sessions and the whole analysis: slow, with the same result."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
+@click.option("--out", type=FOLDER,
               help="Results folder for power_STUDY.json and .csv, which its report shows.")  # fmt: skip
 @library_option
 @json_option
 def power(
-    protocol: str,
-    name: str | None,
-    participants: str,
-    library: str | None,
-    out: Path | None,
-    as_json: bool,
-    **options: Any,
+    protocol: str, name: str | None, participants: str, library: str | None, out: Path | None, **options: Any
 ) -> None:
     """How many participants a protocol needs for given effects, by simulation."""
     from study.analysis.exclusions import rules_of
@@ -144,7 +138,7 @@ def power(
     )
     if out is not None:
         _write(out, result)
-    emit(to_json(result), as_json, _in_words(result))
+    emit(to_json(result), _in_words(result))
 
 
 def _write(folder: Path, result: PlannedStudy) -> None:

@@ -27,11 +27,7 @@ from study.apps.cli.shared import (
 @database_option
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0 for all.")
 @click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=8000,
-    show_default=True,
-    help="Port; Port; Port; Port; Port; 0 for any free one.",
+    "--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="Port; 0 for any free one."
 )
 @click.option(
     "--participants", type=click.IntRange(min=1), help="Most participants; places of drop-outs become available again."

@@ -8,20 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.cli.console import progress, say
+from study.apps.cli.console import FOLDER, progress, say
 
 if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol
     from study.experiment.stimuli.manifest import Manifest
     from study.experiment.stimuli.stimulus import StimulusSet
 
-RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
-OUT = click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=None,
-    help="Results folder (default: results/<name of the protocol>).",
-)
+OUT = click.option("--out", type=FOLDER, default=None, help="Results folder (default: results/<name of the protocol>).")
 WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes (default: one a core).")
 
 

@@ -8,17 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.cli.console import database_option, emit, json_option, library_option, progress, say
-from study.apps.cli.shared import (
-    OUT,
-    RESULTS,
-    WORKERS,
-    check_database,
-    load,
-    prepare_stimuli,
-    render_stimuli,
-    results_folder,
-)
+from study.apps.cli.console import FOLDER, RESULTS, database_option, emit, json_option, library_option, progress, say
+from study.apps.cli.shared import OUT, WORKERS, check_database, load, prepare_stimuli, render_stimuli, results_folder
 from study.apps.cli.shown import shortcut_lines, table_of, trials_between
 from study.counting import counted
 
@@ -81,7 +72,7 @@ def analyse_results(folder: Path, database: str | None = None) -> Analysis:
 @library_option
 @click.option("--texts", is_flag=True, help="Also print everything that participants read.")
 @json_option
-def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> None:
+def check(protocol: str, library: str | None, texts: bool) -> None:
     """Check a protocol before running it: what will be shown, every error, and any text you have still to write.
 
     Exit status 2 if something can't be shown.
@@ -111,7 +102,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
     result |= {"trials": found.trials, "fewest_trials": found.fewest_trials, "films": found.films, "fps": checked.fps}
     result |= {"audit": [asdict(one) for one in found.audits], "shortcuts": [asdict(one) for one in found.shortcuts]}
     result |= {"shown": [asdict(row) for row in found.rows]} | ({"texts": read} if texts else {})
-    emit(result, as_json, "\n".join(lines))
+    emit(result, "\n".join(lines))
     if found.problems:
         raise click.exceptions.Exit(2)
 
@@ -122,7 +113,7 @@ def check(protocol: str, library: str | None, texts: bool, as_json: bool) -> Non
 @OUT
 @WORKERS
 @json_option
-def render(protocol: str, library: str | None, out: Path | None, workers: int | None, as_json: bool) -> None:
+def render(protocol: str, library: str | None, out: Path | None, workers: int | None) -> None:
     """Render all stimuli of a protocol; existing ones are reused, so an interrupted run resumes."""
     from study.experiment.stimuli.rendering import rendered_already
     from study.motion.library import open_library
@@ -139,7 +130,7 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
         f"{summary['folder']}: {counted(summary['videos'], 'video')}, {counted(summary['frames'], 'frame')}, "
         f"{summary['seconds']:.0f} s of motion; {summary['rendered']} rendered now, {summary['reused']} reused"
     )
-    emit(summary, as_json, text)
+    emit(summary, text)
 
 
 @click.command()
@@ -168,7 +159,6 @@ def simulate(
     library: str | None,
     out: Path | None,
     database: str | None,
-    as_json: bool,
     **goes_wrong: float,
 ) -> None:
     """Sessions of simulated observers, always marked as simulated. Needs no videos, only the record of the stimuli."""
@@ -190,36 +180,32 @@ def simulate(
         f"{summary['folder']}: {counted(summary['participants'], 'simulated participant')}, "
         f"{counted(summary['answers'], 'answer')} made now, {summary['found']} found"
     )
-    emit(summary, as_json, text)
+    emit(summary, text)
 
 
 @click.command()
 @click.argument("results", type=RESULTS)
 @database_option
 @json_option
-def analyse(results: Path, database: str | None, as_json: bool) -> None:
+def analyse(results: Path, database: str | None) -> None:
     """Thresholds, preferences and ratings of a results folder."""
     from study.analysis.analyse import analysis_json
 
     analysis = analyse_results(results, database)
-    emit(analysis_json(analysis), as_json, "\n".join(analysis.sentences()))
+    emit(analysis_json(analysis), "\n".join(analysis.sentences()))
 
 
 @click.command()
 @click.argument("results", type=RESULTS)
-@click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the page, tables and figures (default: the results folder).",
-)
+@click.option("--out", type=FOLDER, help="Folder for the page, tables and figures (default: the results folder).")
 @database_option
 @json_option
-def report(results: Path, out: Path | None, database: str | None, as_json: bool) -> None:
+def report(results: Path, out: Path | None, database: str | None) -> None:
     """Write the report: one self-contained HTML page, and its tables as CSV and JSON."""
     from study.report.document import write_report
 
     page = write_report(results, out=out, database=database)
-    emit({"report": str(page)}, as_json, str(page))
+    emit({"report": str(page)}, str(page))
 
 
 @click.command()
@@ -227,7 +213,7 @@ def report(results: Path, out: Path | None, database: str | None, as_json: bool)
 @WORKERS
 @click.option("--participants", type=click.IntRange(min=1), default=12, show_default=True, help="Simulated.")
 @json_option
-def demo(out: Path | None, workers: int | None, participants: int, as_json: bool) -> None:
+def demo(out: Path | None, workers: int | None, participants: int) -> None:
     """A small study from end to end, without screen or network: stimuli, simulated observers, analysis, report."""
     from study.analysis.analyse import analysis_json
     from study.report.document import write_report
@@ -249,6 +235,5 @@ def demo(out: Path | None, workers: int | None, participants: int, as_json: bool
     ]
     emit(
         {"render": rendered, "simulate": simulated, "analysis": analysis_json(analysis), "report": str(page)},
-        as_json,
         "\n".join(lines),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +11,8 @@ import click
 from click.core import ParameterSource
 
 from study.apps.cli.clips import clip_pair, clips_options
-from study.apps.cli.console import emit, json_option
-from study.apps.cli.films import film_options, film_size
+from study.apps.cli.console import FILE, FPS, emit, json_option, together
+from study.apps.cli.films import film_options
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
 from study.transitions.methods.makes.blends import Slerp
@@ -32,52 +32,33 @@ SWITCHES = {name: make for name, make in MAKES.items() if issubclass(make, Switc
 """Makes that switch to the destination at the start frame."""
 
 
-def clip_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds the two clips, the frames that a transition joins, and the frame rate to a verb."""
-    for decorate in (
-        click.option(
-            "--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at."
-        ),
-        click.option("--end", type=click.IntRange(min=0), required=True, help="Last blended frame, in DST."),
-        click.option("--start", type=click.IntRange(min=0), required=True, help="First blended frame, in SRC."),
-        clips_options,
-        click.argument("destination", metavar="DST"),
-        click.argument("source", metavar="SRC"),
-    ):
-        command = decorate(command)
-    return command
+clip_options = together(
+    click.argument("source", metavar="SRC"),
+    click.argument("destination", metavar="DST"),
+    clips_options,
+    click.option("--start", type=click.IntRange(min=0), required=True, help="First blended frame, in SRC."),
+    click.option("--end", type=click.IntRange(min=0), required=True, help="Last blended frame, in DST."),
+    FPS,
+)
+"""The two clips, the frames that a transition joins, and the frame rate."""
 
-
-def weights_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds `--weights` to a verb."""
-    return click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)(
-        command
-    )
-
-
-def specification_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds `--specification` to a verb."""
-    return click.option(
-        "--specification",
-        type=click.Choice(["start-end", "centre", "left"]),
-        default="start-end",
-        show_default=True,
-        help="--start and --end are the blend's first and last frame, both its middle, or both its first.",
-    )(command)
+specification_option = click.option(
+    "--specification",
+    type=click.Choice(["start-end", "centre", "left"]),
+    default="start-end",
+    show_default=True,
+    help="--start and --end are the blend's first and last frame, both its middle, or both its first.",
+)
 
 
 @click.command("blend-length")
 @clip_options
 @click.option("--method", type=click.Choice(list(LENGTHS)), default="geodesic", show_default=True)
 @click.option("--fixed-frames", type=click.IntRange(min=1), help="For --method fixed (default: 0.33 s).")
-@weights_option
+@click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)
 @specification_option
 @click.option("--printed-sum", is_flag=True, help="With timewarp: the undivided sum as printed in Eqs. 5 and 6.")
-@click.option(
-    "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="X.png: the costs as an image; X.csv: as numbers.",
-)
+@click.option("--out", type=FILE, help="X.png: the costs as an image; X.csv: as numbers.")
 @json_option
 def blend_length(
     source: str,
@@ -92,7 +73,6 @@ def blend_length(
     specification: str,
     printed_sum: bool,
     out: Path | None,
-    as_json: bool,
 ) -> None:
     """How long to blend from frame --start of SRC to frame --end of DST (Wang & Bodenheimer 2004).
 
@@ -141,7 +121,7 @@ def blend_length(
     lines += ["", "differences between the two frames, half angles:"]
     lines += [f"  {role:12} {value:.4f}" for role, value in differences.items()]
     result |= {**keys, "differences": differences, "file": None if out is None else str(out)}
-    emit(result, as_json, "\n".join(lines))
+    emit(result, "\n".join(lines))
 
 
 def _check_two_windows(method: str, specification: str) -> None:
@@ -168,9 +148,7 @@ def _check_two_windows(method: str, specification: str) -> None:
     type=click.Choice(["m", "cm", "mm", "in"]),
     help="Length unit of X.bvh (default: that of SRC). Its frame rate is that of SRC unless --fps is given.",
 )
-@click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="X.bvh, X.mp4 or X.png (a strip)."
-)
+@click.option("--out", type=FILE, required=True, help="X.bvh, X.mp4 or X.png (a strip).")
 @film_options
 @json_option
 def transition(
@@ -190,11 +168,7 @@ def transition(
     keep_slide: bool,
     unit: str | None,
     out: Path,
-    style: str,
-    view: str,
-    camera: str,
-    size: str,
-    as_json: bool,
+    **look: Any,
 ) -> None:
     """Blend from frame --start of SRC to frame --end of DST and write the result.
 
@@ -210,7 +184,6 @@ def transition(
 
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
-    wanted = film_size(size)
     first, second = clip_pair(source, destination, library, fps)
     switch = switch_of(make, halflife, method, specification, joints)
     joined, found = join(
@@ -233,7 +206,7 @@ def transition(
     if out.suffix.lower() == ".bvh":
         write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
     else:
-        draw_clip(joined.clip, out, size=wanted, style=style, view=view, camera=camera, blended=blended)
+        draw_clip(joined.clip, out, blended=blended, **look)
     rate = joined.clip.fps
     result = {
         "file": str(out),
@@ -257,7 +230,7 @@ def transition(
         f"{out}: {counted(joined.clip.frames, 'frame')} ({joined.clip.seconds:.3f} s at {rate:g} fps), "
         f"{joined.blend_frames} of them blended ({joined.blend_frames / rate:.3f} s), {where}; {result['note']}"
     ) + "".join(f"; {what}" for what in (flaws.told() if flaws else ()))
-    emit(result, as_json, text)
+    emit(result, text)
 
 
 def join(

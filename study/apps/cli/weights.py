@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.clips import as_is_option, clip_pair, clips_options, load_clip
-from study.apps.cli.console import emit, json_option, progress, say
+from study.apps.cli.console import FILE, FPS, READABLE, emit, json_option, progress, say
 from study.counting import counted, noun
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ ANSWERS = {"g": "good", "b": "bad", "s": "skip", "q": "quit"}
 @click.command()
 @click.argument("motions", nargs=-1, required=True, metavar="SRC DST [SRC DST]...")
 @clips_options
-@click.option("--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at.")
+@FPS
 @click.option("--best", type=click.IntRange(min=0), default=2, show_default=True, help="Best cuts by each metric.")
 @click.option("--worst", type=click.IntRange(min=0), default=1, show_default=True, help="Worst cuts by each metric.")
 @click.option("--random", "at_random", type=click.IntRange(min=0), default=2, show_default=True, help="Random cuts.")
@@ -32,7 +32,7 @@ ANSWERS = {"g": "good", "b": "bad", "s": "skip", "q": "quit"}
 @click.option("--show", is_flag=True, help="Open each cut in the system's own viewer.")
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     required=True,
     help="CSV file to append to; cuts that it has are not asked again. The cuts are drawn into a folder beside it.",
 )
@@ -41,14 +41,11 @@ def label(
     motions: tuple[str, ...],
     library: str | None,
     fps: float,
-    best: int,
-    worst: int,
-    at_random: int,
     seed: int,
     strips: bool,
     show: bool,
     out: Path,
-    as_json: bool,
+    **counts: int,
 ) -> None:
     """Judge cuts between motions as good or bad (Wang & Bodenheimer 2003, section 3).
 
@@ -70,7 +67,7 @@ def label(
         first, second = clip_pair(source, destination, library, fps)
         second = first if source == destination else second
         rng = np.random.default_rng([seed, number])
-        found = candidates(first, second, rng, best=best, worst=worst, at_random=at_random)
+        found = candidates(first, second, rng, **counts)
         todo = [c for c in found if (source, destination, c.source_frame, c.destination_frame) not in known]
         for at, candidate in enumerate(todo):
             said = None if stopped else _ask(first, second, candidate, out, strips, show, f"{at + 1} of {len(todo)}")
@@ -78,25 +75,13 @@ def label(
                 stopped = True
                 left += 1
                 continue
-            where = library or "synthetic"
-            append_label(
-                out,
-                Label(
-                    source,
-                    destination,
-                    candidate.source_frame,
-                    candidate.destination_frame,
-                    said,
-                    fps,
-                    where,
-                    candidate.found,
-                ),
-            )
+            frames, where = (candidate.source_frame, candidate.destination_frame), library or "synthetic"
+            append_label(out, Label(source, destination, *frames, said, fps, where, candidate.found))
             asked[said] += 1
     text = f"{out}: {asked['good']} good, {asked['bad']} bad, {asked['skip']} skipped"
     if left:
         text += f"; {left} {noun(left, 'is', 'are')} left: the same command resumes"
-    emit({"file": str(out), **asked, "left": left, "known": len(known)}, as_json, text)
+    emit({"file": str(out), **asked, "left": left, "known": len(known)}, text)
 
 
 def _ask(
@@ -135,7 +120,7 @@ def _drawn(source: Clip, destination: Clip, candidate: Candidate, folder: Path, 
 
 
 @click.command("fit-weights")
-@click.argument("table", metavar="TRANSITIONS.csv", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("table", metavar="TRANSITIONS.csv", type=READABLE)
 @click.option("--library", metavar="NAME|FOLDER", help="Library of the motions (default: that of the table).")
 @as_is_option
 @click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of velocities.")
@@ -143,12 +128,7 @@ def _drawn(source: Clip, destination: Clip, candidate: Candidate, folder: Path, 
 @click.option("--no-cross-validation", is_flag=True, help="Fit only, without cross-validation.")
 @json_option
 def fit_weights(
-    table: Path,
-    library: str | None,
-    nu: float,
-    transfer: tuple[str, str] | None,
-    no_cross_validation: bool,
-    as_json: bool,
+    table: Path, library: str | None, nu: float, transfer: tuple[str, str] | None, no_cross_validation: bool
 ) -> None:
     """Joint weights from labelled transitions (Wang & Bodenheimer 2003, sections 3 and 4.1).
 
@@ -199,7 +179,7 @@ def fit_weights(
                 f"from {transfer[0]} to {transfer[1]} it stays where it is in {checked.transfer_same} of {len(cuts)} "
                 f"cases, and moves by {counted(max(checked.transfer), 'frame')} at most"
             )
-    emit(result, as_json, "\n".join(lines))
+    emit(result, "\n".join(lines))
 
 
 def _cuts(labels: list[Label], library: str | None) -> list[LabelledCut]:
@@ -217,12 +197,6 @@ def _cuts(labels: list[Label], library: str | None) -> list[LabelledCut]:
         return clips[key]
 
     return [
-        LabelledCut(
-            clip(one.source, one),
-            clip(one.destination, one),
-            one.source_frame,
-            one.destination_frame,
-            float(one.label == "bad"),
-        )
+        LabelledCut(clip(one.source, one), clip(one.destination, one), *one.cut[2:], float(one.label == "bad"))
         for one in labels
     ]

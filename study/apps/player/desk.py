@@ -7,19 +7,21 @@ focus and sizes are logged; a page is drawn again where the window changed.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Typed
 from study.apps.player import screens
-from study.apps.player.display import Display
 from study.apps.player.pages import Button, DrawnPage, Look, Page, moved
 from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing
-from study.apps.player.store import Store
 from study.errors import SessionError
 from study.experiment.form import LONGEST_TEXT, field_value
 from study.experiment.protocol.texts import FormField
 from study.experiment.session import Session, current
+
+if TYPE_CHECKING:
+    from renderer.window import Window
+    from study.apps.player.store import ResponsesStore
 
 _KEPT_PAGES = 6
 
@@ -35,7 +37,7 @@ class Stopped(Exception):  # noqa: N818 - not an error: the participant leaves
 class Desk:
     """A window with pages on it, and what was shown and went wrong in the present trial."""
 
-    def __init__(self, window: Display, session: Session, store: Store, look: Look) -> None:
+    def __init__(self, window: Window, session: Session, store: ResponsesStore, look: Look) -> None:
         self.window, self.session, self.store, self.look = window, session, store, look
         self.protocol = session.protocol
         self.pages: dict[tuple[Page, tuple[int, int]], tuple[DrawnPage, Any]] = {}

@@ -12,25 +12,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from renderer.events import Focus, Resized
 from study.apps.player import screens
 from study.apps.player.calm import calm, settled
 from study.apps.player.desk import Desk, Stopped
-from study.apps.player.display import Display
 from study.apps.player.pages import Look
 from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, find_rate, frame_at
-from study.apps.player.store import Store
 from study.experiment.picture_size import Sight, seen_degrees, wanted_px
 from study.experiment.session import Session, advanced, answered, current, filled, missed, progress, restarted
-from study.experiment.steps import Step
+from study.experiment.steps import Kind, Step
 from study.experiment.stimuli.stimulus import Stimulus
 from study.experiment.store.answers import Presentation
 from study.tasks.registry import task_of
 from study.tasks.task import Layout
 from study.tasks.trial import PLACES
+
+if TYPE_CHECKING:
+    from renderer.window import Window
+    from study.apps.player.store import ResponsesStore
 
 
 @dataclass(frozen=True)
@@ -57,10 +59,10 @@ class Setting:
 
 
 def play(
-    window: Display,
+    window: Window,
     session: Session,
     stimulus: Callable[[str], Stimulus],
-    store: Store,
+    store: ResponsesStore,
     look: Look,
     *,
     setting: Setting | None = None,
@@ -94,10 +96,10 @@ class _Player(Desk):
 
     def __init__(
         self,
-        window: Display,
+        window: Window,
         session: Session,
         stimulus: Callable[[str], Stimulus],
-        store: Store,
+        store: ResponsesStore,
         look: Look,
         setting: Setting,
         say: Callable[[str], None],
@@ -120,7 +122,7 @@ class _Player(Desk):
             if not any(step.kind == "consent" for step in self.session.steps):
                 self.store.begin()
             while (step := current(self.session)).kind != "done":
-                self._do(step)
+                STEPS.get(step.kind, _Player._read)(self, step)
             self.store.event("finished")
             self.read_until(screens.last_page(self.protocol, self.protocol.texts.finished))
         except Stopped as stopped:
@@ -147,20 +149,6 @@ class _Player(Desk):
                 page = screens.reading_page(self.protocol, step, (0, 1))
             draw_page(page, self.window.size, self.look, must_fit=True)
 
-    def _do(self, step: Step) -> None:
-        if step.kind == "consent":
-            self._consent(step)
-        elif step.kind == "form":
-            self._form()
-        elif step.kind == "stimulus":
-            self._stimulus_step(step)
-        elif step.kind in ("gap", "pause"):
-            self._blank(step)
-        elif step.kind == "answer":
-            self._answer(step)
-        else:
-            self._read(step)
-
     def _read(self, step: Step) -> None:
         page = screens.reading_page(self.protocol, step, progress(self.session))
         while self.read_until(page) == "example":
@@ -178,7 +166,7 @@ class _Player(Desk):
 
     # The form, one question at a time
 
-    def _form(self) -> None:
+    def _form(self, _: Step) -> None:
         fields, values, number = self.protocol.form, dict[str, str](), 0
         while number < len(fields):
             name = fields[number].name
@@ -199,7 +187,7 @@ class _Player(Desk):
             if self.window.settle(self.look.ground):
                 self._note_display()
             self._monitor = self.window.monitor
-            self._prepare(step)
+            self._prepare(self.session)
             if not self.window.focused:
                 self.read_until(screens.away_page(self.protocol))
                 self._blank_for(0.3)
@@ -214,9 +202,9 @@ class _Player(Desk):
         self.showings.append(showing)
         self.session = advanced(self.session)
 
-    def _prepare(self, step: Step) -> None:
+    def _prepare(self, session: Session) -> None:
         """Lay out all that a trial shows, so that nothing has to be computed between its stimuli."""
-        steps = self.session.steps[self.session.position :]
+        step, steps = current(session), session.steps[session.position :]
         own = [one for one in steps if (one.trial, one.attempt) == (step.trial, step.attempt)]
         wanted = [one.stimulus for one in own if one.stimulus]
         for identifier in [name for name in self._drawings if name not in wanted]:
@@ -224,7 +212,7 @@ class _Player(Desk):
         for identifier in wanted:
             self._drawing(identifier)
         asked = next(one for one in own if one.kind == "answer")
-        self.drawn(screens.answer_page(self.protocol, asked, progress(self.session)))
+        self.drawn(screens.answer_page(self.protocol, asked, progress(session)))
 
     def _drawing(self, identifier: str) -> Any:
         if identifier not in self._drawings:
@@ -295,9 +283,7 @@ class _Player(Desk):
 
     def _blank(self, step: Step) -> None:
         """A gap or a pause: the empty ground for its time. The next trial is laid out while it lasts."""
-        if self._blank_for(step.duration_s or 0.0, prepare=step.kind == "pause"):
-            self.session = advanced(self.session)
-        elif step.kind == "gap":
+        if not self._blank_for(step.duration_s or 0.0, prepare=step.kind == "pause") and step.kind == "gap":
             self._start_again()
         else:
             self.session = advanced(self.session)
@@ -309,9 +295,9 @@ class _Player(Desk):
         window.clear(self.look.ground)
         end_s = self.flip_away() + duration_s - 0.5 * window.pacing.period_s
         if prepare:
-            following = self.session.steps[self.session.position + 1]
-            if following.slot == 1:
-                self._prepare_next(following)
+            following = advanced(self.session)
+            if current(following).slot == 1:
+                self._prepare(following)
         while (left := end_s - window.now()) > 0:
             events = window.wait(left)
             if self.notice(events):
@@ -321,12 +307,6 @@ class _Player(Desk):
                 window.clear(self.look.ground)
                 window.flip()
         return True
-
-    def _prepare_next(self, step: Step) -> None:
-        before = self.session
-        self.session = advanced(before)
-        self._prepare(step)
-        self.session = before
 
     def _answer(self, step: Step) -> None:
         """Ask, and store the answer with how its stimuli were shown before anything else."""
@@ -383,6 +363,16 @@ class _Player(Desk):
             )
         return rows
 
+
+STEPS: Mapping[Kind, Callable[[_Player, Step], None]] = {
+    "consent": _Player._consent,
+    "form": _Player._form,
+    "stimulus": _Player._stimulus_step,
+    "gap": _Player._blank,
+    "pause": _Player._blank,
+    "answer": _Player._answer,
+}
+"""What is done at each kind of step; all others are read."""
 
 LAYOUTS: Mapping[Layout, Callable[[_Player, Step], None]] = {"one after another": _Player.in_turn}
 """How the slots of a trial are shown: from a slot's step on, past all that it showed."""

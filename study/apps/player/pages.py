@@ -28,25 +28,17 @@ class Button:
 
 @dataclass(frozen=True)
 class ButtonStyle:
-    """How the buttons of a page look; lengths in heights of the text.
-
-    Parameters
-    ----------
-    least
-        The least width of a button.
-    margin
-        What is left of a button beside its words, on both sides together.
-    gap, gap_of_many
-        What is left between buttons, and where there are ten or more.
-    one_row
-        Whether they stand in one row however narrow that makes them, not one below another where the row is too long.
-    """
+    """How the buttons of a page look; lengths in heights of the text."""
 
     least: float
+    """The least width of a button."""
     margin: float
+    """What is left of a button beside its words, on both sides together."""
     gap: float
     gap_of_many: float
+    """What is left between buttons, and where there are ten or more."""
     one_row: bool
+    """Whether they stand in one row however narrow that makes them, not one below another where the row is too long."""
 
 
 WORDS = ButtonStyle(least=7.0, margin=2.0, gap=1.6, gap_of_many=1.6, one_row=False)
@@ -55,50 +47,34 @@ POINTS = ButtonStyle(least=2.6, margin=1.2, gap=0.7, gap_of_many=0.4, one_row=Tr
 
 @dataclass(frozen=True)
 class Page:
-    """One thing to read or to decide.
-
-    Parameters
-    ----------
-    text
-        Paragraphs; empty lines part them.
-    question
-        What is asked, set larger, under the text.
-    buttons
-        From left to right.
-    style
-        How the buttons look: words to choose from, or the points of a scale.
-    low, middle, high
-        Words at the ends and in the middle of a row of buttons that is a scale.
-    note
-        A few words at the top, such as that this is practice.
-    progress
-        What is done and how much there is; None for no bar.
-    progress_words
-        That in words, over the bar.
-    entry
-        What was typed so far into a field; None where there is none.
-    hint
-        Small print under the field or the question.
-    chosen
-        Which button the arrow keys stand on; -1 for none.
-    back
-        A small button in the corner that leads to the page before; None where there is no way back.
-    """
+    """One thing to read or to decide."""
 
     text: str = ""
+    """Paragraphs; empty lines part them."""
     question: str = ""
+    """What is asked, set larger, under the text."""
     buttons: tuple[Button, ...] = ()
+    """From left to right."""
     style: ButtonStyle = WORDS
+    """How the buttons look: words to choose from, or the points of a scale."""
     low: str = ""
     middle: str = ""
     high: str = ""
+    """Words at the ends and in the middle of a row of buttons that is a scale."""
     note: str = ""
+    """A few words at the top, such as that this is practice."""
     progress: tuple[int, int] | None = None
+    """What is done and how much there is; None for no bar."""
     progress_words: str = ""
+    """That in words, over the bar."""
     entry: str | None = None
+    """What was typed so far into a field; None where there is none."""
     hint: str = ""
+    """Small print under the field or the question."""
     chosen: int = -1
+    """Which button the arrow keys stand on; -1 for none."""
     back: Button | None = None
+    """A small button in the corner that leads to the page before; None where there is no way back."""
 
     @property
     def choices(self) -> tuple[Button, ...]:

@@ -6,8 +6,8 @@ from the window's, so a page looks the same on a laptop and on a large screen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -57,6 +57,14 @@ def draw_page(page: Page, size: tuple[int, int], look: Look, *, must_fit: bool =
 _ROW_GAP = 0.5
 
 
+class _Part(NamedTuple):
+    """What stands below another part of a page: the gap above it in ems, its height in pixels, and what draws it."""
+
+    gap: float
+    high: float
+    draw: Callable[[ImageDraw, float], None]
+
+
 class _Sheet:
     """A page at one size of text: measured first, then drawn from the top down, as blocks that stand in its middle."""
 
@@ -71,34 +79,34 @@ class _Sheet:
         self.stacked = False
         self.rows = self._button_rows(size[0] * 0.92)
         self.parts = self._parts()
-        self.height = sum(high for _, high in self.parts) + self._gaps()
+        self.height = sum(part.high for part in self.parts) + em * sum(part.gap for part in self.parts[1:])
+        self.boxes: list[Box] = []
 
     def _font(self, share: float) -> Face:
         return Face(self.look.fonts, max(6, round(self.em * share)))
 
-    def _parts(self) -> list[tuple[str, float]]:
-        em, parts = self.em, list[tuple[str, float]]()
+    def _parts(self) -> list[_Part]:
+        page, em = self.page, self.em
+        parts: list[_Part] = []
+
+        def lines(gap: float, words: Sequence[str], share: float, lead: float, ink: float) -> None:
+            high = sum(lead * em if line else 0.5 * lead * em for line in words)
+            parts.append(_Part(gap, high, lambda pen, top: self._lines(pen, words, top, share, lead, ink)))
+
         if self.text:
-            parts.append(("text", sum(1.5 * em if line else 0.75 * em for line in self.text)))
+            lines(1.2, self.text, 1.0, 1.5, 0.92)
         if self.question:
-            parts.append(("question", 1.9 * em * len(self.question)))
-        if self.page.entry is not None:
-            parts.append(("entry", 2.4 * em))
-        if self.page.hint:
-            parts.append(("hint", 1.25 * em * len(self.hint)))
+            lines(1.4, self.question, 1.3, 1.9, 1.0)
+        if page.entry is not None:
+            parts.append(_Part(1.2, 2.4 * em, self._draw_entry))
+        if page.hint:
+            lines(0.5, self.hint, 0.82, 1.25, 0.62)
         if self.rows:
             gap = _ROW_GAP * em
-            parts.append(("buttons", (self._button_height() + gap) * len(self.rows) - gap))
-        if self.page.low or self.page.middle or self.page.high:
-            parts.append(("ends", 1.2 * em))
+            parts.append(_Part(2.0, (self._button_height() + gap) * len(self.rows) - gap, self._draw_buttons))
+        if page.low or page.middle or page.high:
+            parts.append(_Part(0.5, 1.2 * em, self._draw_ends))
         return parts
-
-    def _gaps(self) -> float:
-        return self.em * sum(self._gap(name) for name, _ in self.parts[1:])
-
-    @staticmethod
-    def _gap(name: str) -> float:
-        return {"question": 1.4, "buttons": 2.0, "ends": 0.5, "hint": 0.5}.get(name, 1.2)
 
     def _button_height(self) -> float:
         if self.stacked:
@@ -134,25 +142,12 @@ class _Sheet:
         """Draw it all; returns the places of the buttons."""
         self._draw_note(pen)
         self._draw_progress(pen)
-        back = [self._draw_back(pen)] if self.page.back is not None else []
         top = max(self.size[1] * 0.08, (self.size[1] - self.height) * 0.46)
-        boxes: list[Box] = []
-        for index, (name, high) in enumerate(self.parts):
-            top += self.em * self._gap(name) if index else 0.0
-            if name == "text":
-                self._lines(pen, self.text, top, 1.0, 1.5, 0.92)
-            elif name == "question":
-                self._lines(pen, self.question, top, 1.3, 1.9, 1.0)
-            elif name == "entry":
-                self._draw_entry(pen, top)
-            elif name == "hint":
-                self._lines(pen, self.hint, top, 0.82, 1.25, 0.62)
-            elif name == "buttons":
-                boxes = self._draw_buttons(pen, top)
-            else:
-                self._draw_ends(pen, top, boxes)
-            top += high
-        return [*boxes, *back]
+        for index, part in enumerate(self.parts):
+            top += self.em * part.gap if index else 0.0
+            part.draw(pen, top)
+            top += part.high
+        return [*self.boxes, self._draw_back(pen)] if self.page.back is not None else self.boxes
 
     def _middle(self, pen: ImageDraw, words: str, y: float, share: float, ink: float, x: float | None = None) -> None:
         place = (self.size[0] / 2 if x is None else x, y)
@@ -176,17 +171,15 @@ class _Sheet:
                 font.draw(pen, ((self.size[0] + side * widest) / 2, at), line, self.look.mix(ink), anchor)
             y += lead * self.em
 
-    def _draw_buttons(self, pen: ImageDraw, top: float) -> list[Box]:
-        boxes: list[Box] = []
+    def _draw_buttons(self, pen: ImageDraw, top: float) -> None:
         high, gap = self._button_height(), self._button_gap
         for row in self.rows:
             left = (self.size[0] - sum(wide for _, wide in row) - gap * (len(row) - 1)) / 2
             for number, wide in row:
-                boxes.append((left, top, left + wide, top + high))
-                self._draw_button(pen, self.page.buttons[number], boxes[-1], number == self.page.chosen)
+                self.boxes.append((left, top, left + wide, top + high))
+                self._draw_button(pen, self.page.buttons[number], self.boxes[-1], number == self.page.chosen)
                 left += wide + gap
             top += high + _ROW_GAP * self.em
-        return boxes
 
     def _draw_button(self, pen: ImageDraw, button: Button, box: Box, chosen: bool) -> None:
         em, (left, top, right, bottom) = self.em, box
@@ -215,9 +208,9 @@ class _Sheet:
         pen.rounded_rectangle(cap, radius=0.2 * em, outline=self.look.mix(0.32), width=max(1, round(em * 0.05)))
         self._middle(pen, words, y, 0.68, 0.66, x)
 
-    def _draw_ends(self, pen: ImageDraw, top: float, boxes: Sequence[Box]) -> None:
+    def _draw_ends(self, pen: ImageDraw, top: float) -> None:
         """Words under the ends and the middle of a scale."""
-        left, right = min(box[0] for box in boxes), max(box[2] for box in boxes)
+        left, right = min(box[0] for box in self.boxes), max(box[2] for box in self.boxes)
         y, font, ink = top + 0.6 * self.em, self._font(0.85), self.look.mix(0.75)
         ends = [font.getlength(words) for words in (self.page.low, self.page.high)]
         wide = sum(ends) + 2 * self.em

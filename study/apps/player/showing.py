@@ -28,20 +28,14 @@ def frame_at(flip_s: float, onset_s: float, fps: float, period_s: float) -> int:
 
 @dataclass(frozen=True)
 class Rate:
-    """How a display of one rate shows motions of another; made by `find_rate`.
-
-    Parameters
-    ----------
-    fps
-        Frames per second as they are shown: the study's, or the display's divided by a whole number where that is
-        nearly the same (29.97 for 30 on 59.94 Hz), so that every frame is shown equally long.
-    shortest_flips, longest_flips
-        Number of flips for which a frame is shown.
-    """
+    """How a display of one rate shows motions of another; made by `find_rate`."""
 
     fps: float
+    """Frames per second as they are shown: the study's, or the display's divided by a whole number where that is nearly
+    the same (29.97 for 30 on 59.94 Hz), so that every frame is shown equally long."""
     shortest_flips: int
     longest_flips: int
+    """Number of flips for which a frame is shown."""
 
     @property
     def even(self) -> bool:
@@ -73,34 +67,23 @@ def find_rate(fps: float, refresh_hz: float) -> Rate:
 
 @dataclass(frozen=True)
 class Showing:
-    """What was presented of one stimulus.
-
-    Parameters
-    ----------
-    stimulus
-        Its id.
-    fps
-        Frames per second of the stimulus.
-    period_s
-        Seconds between flips.
-    frames, flips_s
-        For every flip the frame that it showed and its time.
-    frames_in_all
-        Frames of the stimulus.
-    ended_s
-        The flip that took the last frame away; None before there was one.
-    faults
-        What else went wrong: focus lost, resized.
-    """
+    """What was presented of one stimulus."""
 
     stimulus: str
+    """Its id."""
     fps: float
+    """Frames per second of the stimulus."""
     period_s: float
+    """Seconds between flips."""
     frames: tuple[int, ...]
     flips_s: tuple[float, ...]
+    """For every flip the frame that it showed and its time."""
     frames_in_all: int
+    """Frames of the stimulus."""
     ended_s: float | None = None
+    """The flip that took the last frame away; None before there was one."""
     faults: tuple[str, ...] = ()
+    """What else went wrong: focus lost, resized."""
 
     @property
     def presented(self) -> tuple[tuple[int, float], ...]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
-from typing import Protocol as Shape
 
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol
@@ -26,22 +25,6 @@ from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
 from study.tasks.answer import Answer
 from study.tasks.trial import Trial
-
-
-class Store(Shape):
-    """What the player needs of a store; a test brings a list."""
-
-    def begin(self) -> None:
-        """The participant takes part."""
-
-    def answer(self, trial: Trial, answer: Answer, shown: Sequence[Presentation]) -> None:
-        """Commit an answer, with how its stimuli were shown."""
-
-    def form(self, values: Mapping[str, str]) -> None:
-        """Commit the form."""
-
-    def event(self, kind: str, detail: Mapping[str, Any] | None = None) -> None:
-        """Commit what happened otherwise."""
 
 
 class ResponsesStore:

@@ -33,13 +33,7 @@ from study.experiment.session import Session, advanced, answered, current, fille
 from study.experiment.steps import Step
 from study.experiment.stimuli.manifest import Manifest
 from study.experiment.store import participants as people
-from study.experiment.store.answers import (
-    answer_rows,
-    event_counts,
-    event_row,
-    record_form,
-    stored_answers,
-)
+from study.experiment.store.answers import answer_rows, event_counts, event_row, record_form, stored_answers
 from study.experiment.store.databases import AWAY, in_words
 from study.experiment.store.participants import Participant
 from study.experiment.store.responses import Responses
@@ -178,16 +172,14 @@ class Host:
                 return {"kind": "taken"}, ""
             self._forget(known.session_id)
             await asyncio.to_thread(people.give_token, self.responses, known, token)
-            live = await self.live_session(token)
-            assert live is not None  # its token was stored just now
-            return live, token
-        name = parameters.get("participant", "")
-        name = name if NAME.fullmatch(name) else f"web-{secrets.token_hex(5)}"
-        found = await asyncio.to_thread(self._arrive, people.Newcomer(name, token, parameters, who))
-        if isinstance(found, str):
-            return {"kind": found}, ""
+        else:
+            name = parameters.get("participant", "")
+            name = name if NAME.fullmatch(name) else f"web-{secrets.token_hex(5)}"
+            found = await asyncio.to_thread(self._arrive, people.Newcomer(name, token, parameters, who))
+            if isinstance(found, str):
+                return {"kind": found}, ""
         live = await self.live_session(token)
-        assert live is not None  # it was stored just now
+        assert live is not None  # its token was stored just now
         return live, token
 
     def _arrive(self, newcomer: people.Newcomer) -> Participant | str:
@@ -372,12 +364,11 @@ class Host:
         recent, self.recent = self.recent, set()
         try:
             await asyncio.to_thread(people.seen, self.responses, recent, clock=self.clock)
-        except AWAY as error:
+        except BaseException as error:
             self.recent |= recent
+            if not isinstance(error, AWAY):
+                raise
             self.database_away(error)
-        except BaseException:
-            self.recent |= recent
-            raise
 
     def database_away(self, error: Exception) -> None:
         """Log it, but not for each of the messages that meet it."""

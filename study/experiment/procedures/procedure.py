@@ -44,60 +44,40 @@ class Procedure(Shape):
 
 @dataclass(frozen=True)
 class Draw:
-    """What a plan gives to a procedure.
-
-    Parameters
-    ----------
-    study
-        Its name.
-    pairs
-        All that its trials may show, in the protocol's order, which matters: a draw counts on it.
-    arrangements
-        Which member of a pair each slot shows: all that the task has.
-    order
-        How they are drawn: `both`, `random`, `balanced`, `by-group`; of stimuli that are shown one by one: `random`,
-        `by-group`.
-    repeats
-        How often the whole set is shown.
-    group
-        The participant's, for `by-group`.
-    """
+    """What a plan gives to a procedure."""
 
     study: str
+    """Its name."""
     pairs: tuple[Pair, ...]
+    """All that its trials may show, in the protocol's order, which matters: a draw counts on it."""
     arrangements: tuple[Members, ...]
+    """Which member of a pair each slot shows: all that the task has."""
     order: str
+    """How they are drawn: `both`, `random`, `balanced`, `by-group`; of stimuli that are shown one by one: `random`,
+    `by-group`."""
     repeats: int
+    """How often the whole set is shown."""
     group: int
+    """The participant's, for `by-group`."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """What a plan keeps of a study whose trials depend on the answers.
-
-    Parameters
-    ----------
-    study
-        Its name.
-    first, most
-        Number of its first trial, and how many numbers are kept for it.
-    settings
-        Of the procedure.
-    pairs
-        All that may be shown.
-    arrangements
-        Which member of a pair each slot shows: a trial draws one of these.
-    repeats
-        How often the whole set is shown.
-    """
+    """What a plan keeps of a study whose trials depend on the answers."""
 
     study: str
+    """Its name."""
     first: int
     most: int
+    """Number of its first trial, and how many numbers are kept for it."""
     settings: Adaptive
+    """Of the procedure."""
     pairs: tuple[Pair, ...]
+    """All that may be shown."""
     arrangements: tuple[Members, ...]
+    """Which member of a pair each slot shows: a trial draws one of these."""
     repeats: int
+    """How often the whole set is shown."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,6 @@ def _refusals(checks: Iterable[Callable[[], None]]) -> Iterator[KeyMismatchError
 
 
 def _check_unique(protocol: Content, kind: str) -> None:
-    """Refuse duplicate names."""
     names = [part.name for part in getattr(protocol, kind)]
     if (index := repeated(names)) is not None:
         message = f"expected each name in {kind} once, found {names[index]!r} twice; rename one"
@@ -177,7 +176,6 @@ def _check_practice(protocol: Content, study: StudySpec, index: int) -> None:
 
 
 def _check_points_of(protocol: Content, study: StudySpec) -> None:
-    """Check the points of all transitions of a study."""
     places = {transition.name: index for index, transition in enumerate(protocol.transitions)}
     for transition in (*protocol.transitions_of(study), *protocol.practice_of(study)):
         _check_points(protocol, study, transition, places[transition.name])

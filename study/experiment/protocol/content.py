@@ -14,7 +14,7 @@ from study.errors import ProtocolError
 from study.experiment.protocol.methods import OwnMethod
 from study.experiment.protocol.stimuli import Points, Screen, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
-from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Part, Slug, Texts
+from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Listed, Part, Slug, Texts
 from study.models.up_down import UpDown
 from study.tasks.registry import task_of
 from study.transitions.methods.method import Method
@@ -45,9 +45,7 @@ class Content(Part):
     )
     touch: bool = Field(default=True, description="Whether tablets and telephones are admitted.")
     consent: Consent = Field(default=Consent(), description="What participants agree to.")
-    form: Annotated[tuple[FormField, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="Questions about the participant, one `[[form]]` each."
-    )
+    form: Listed[FormField] = Field(default=(), description="Questions about the participant, one `[[form]]` each.")
     keys: Keys = Field(default=Keys(), description="Keys that answer.")
     texts: Texts = Field(default=Texts(), description="What participants read.")
     analysis: AnalysisSettings = Field(default=AnalysisSettings(), description="Decisions about the analysis.")
@@ -57,9 +55,7 @@ class Content(Part):
     studies: Annotated[tuple[StudySpec, ...], Field(strict=False, min_length=1, max_length=100)] = Field(
         description="The studies of the session, one `[[studies]]` each, in order."
     )
-    methods: Annotated[tuple[OwnMethod, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="Your own methods, one `[[methods]]` each."
-    )
+    methods: Listed[OwnMethod] = Field(default=(), description="Your own methods, one `[[methods]]` each.")
 
     def study(self, name: str) -> StudySpec:
         """A study by name."""

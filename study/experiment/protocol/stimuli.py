@@ -216,8 +216,7 @@ class Points(Part):
         description="Part of the source clip from which its point is drawn, as two fractions of its length.",
     )
     destination_within: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(
-        default=None,
-        description="The same for the destination; [0.0, 0.4] of a turning motion keeps the turn visible.",
+        default=None, description="The same for the destination; [0.0, 0.4] of a turning motion keeps the turn visible."
     )
 
     @model_validator(mode="after")

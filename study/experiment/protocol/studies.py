@@ -17,7 +17,7 @@ from study.experiment.procedures.registry import PROCEDURES
 from study.experiment.protocol.errors import KeyMismatchError, refuse_all
 from study.experiment.protocol.settings import member_of, settings_in
 from study.experiment.protocol.stimuli import Points
-from study.experiment.protocol.texts import MOST_PARTS, Part, Slug, known_slots
+from study.experiment.protocol.texts import Listed, Part, Slug, known_slots
 from study.tasks.registry import NAMES, problems_of
 from study.tasks.task import Order, Show
 from study.transitions.methods.registry import METHODS
@@ -42,7 +42,7 @@ class Item(Part):
 class OneHop(Part):
     """How the method `one-hop` finds its hops (Koyama and Goto 2019)."""
 
-    hops: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+    hops: Listed[str] = Field(
         default=(), description="Motions that may be hops; by default those of the study's transitions."
     )
     stay_s: float = Field(
@@ -71,9 +71,7 @@ class StudySpec(Part):
     name: Slug = Field(description="Name in plans, responses and reports; unique.")
     title: str = Field(default="", description="Heading for reports; by default the name.")
     task: TaskName = Field(description="What the participant decides.")
-    transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="Names of the transitions shown; by default all."
-    )
+    transitions: Listed[str] = Field(default=(), description="Names of the transitions shown; by default all.")
     reference: str = Field(
         default="geodesic",
         description="Method behind the reference (same-different), method a (preference), or what is rated: "
@@ -87,7 +85,7 @@ class StudySpec(Part):
         description="Rating: each transition by itself (`single`, the default), or both methods' "
         "transitions as a `pair`, with items that compare the second with the first.",
     )
-    differences_frames: Annotated[tuple[Difference, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+    differences_frames: Listed[Difference] = Field(
         default=(),
         description="Same-different, oddity: comparison minus reference blend length, a pair each; 0 shows one twice, "
         "in same-different studies. [frames]",
@@ -122,7 +120,7 @@ class StudySpec(Part):
     practice: int = Field(
         default=0, ge=0, le=100, description="Trials with feedback before the study, which are not analysed. [trials]"
     )
-    practice_transitions: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+    practice_transitions: Listed[str] = Field(
         default=(),
         description="Transitions for practice and the example only, so that neither shows the study's stimuli; "
         "by default the study's own.",
@@ -137,9 +135,7 @@ class StudySpec(Part):
         default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
     )
     scale_points: int = Field(default=5, ge=2, le=11, description="Points of the rating scale, counted from 0.")
-    items: Annotated[tuple[Item, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="Questions of a rating study."
-    )
+    items: Listed[Item] = Field(default=(), description="Questions of a rating study.")
     points: Points = Field(default=Points(), description="Conditions for this study's transition points.")
 
     @model_validator(mode="before")
@@ -234,7 +230,7 @@ class AnalysisSettings(Part):
         lt=50,
         description="Equivalence margin of a preference around 50%; 10 is 40 to 60%. [points]",
     )
-    confirmatory: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
+    confirmatory: Listed[str] = Field(
         default=(),
         description="Studies whose tests are adjusted together (Holm) and decide; by default those with a "
         "preference. Tests of the others explore.",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -24,6 +24,10 @@ LONGEST_TEXT = 20_000
 """Letters of one text."""
 MOST_PARTS = 1000
 """How long a list may be: of transitions, of a study's names and levels, of questions and choices."""
+
+Each = TypeVar("Each")
+Listed = Annotated[tuple[Each, ...], Field(strict=False, max_length=MOST_PARTS)]
+"""A list in brackets, or of tables."""
 
 
 class Part(BaseModel):
@@ -79,13 +83,10 @@ class FormField(Part):
 
     name: Slug = Field(description="Name in tables; unique in the form.")
     label: str = Field(
-        min_length=1,
-        description="What the participant reads; age, gender, vision and animation have a built-in one.",
+        min_length=1, description="What the participant reads; age, gender, vision and animation have a built-in one."
     )
     kind: Literal["text", "number", "choice"] = Field(default="text", description="Type of answer.")
-    choices: Annotated[tuple[str, ...], Field(strict=False, max_length=MOST_PARTS)] = Field(
-        default=(), description="The choices; for `choice` only."
-    )
+    choices: Listed[str] = Field(default=(), description="The choices; for `choice` only.")
     least: float | None = Field(default=None, description="Smallest valid number; for `number` only.")
     most: float | None = Field(default=None, description="Largest valid number; for `number` only.")
     required: bool = Field(default=False, description="Whether an answer is required.")
@@ -263,25 +264,19 @@ class Texts(Part):
             known_slots(getattr(self, key), key)
         for key, needed in _NEEDED_SLOTS.items():
             found = set(re.findall(r"\{(\w*)\}", getattr(self, key)))
-            for slot in needed - found:
-                raise KeyMismatchError(f"expected {{{slot}}} in it, {_MEANINGS[slot]}; add it", key)
-            for slot in found - needed:
+            for slot in needed.keys() - found:
+                raise KeyMismatchError(f"expected {{{slot}}} in it, {needed[slot]}; add it", key)
+            for slot in found - needed.keys():
                 known = ", ".join(f"{{{each}}}" for each in sorted(needed))
                 raise KeyMismatchError(f"expected {known} in braces, found {{{slot}}}; change or remove it", key)
         return self
 
 
 _NEEDED_SLOTS = {
-    "attention_check": {"answer"},
-    "practice_wrong": {"answer"},
-    "progress": {"done", "total"},
-    "press": {"key"},
-    "distance_keep": {"cm"},
+    "attention_check": {"answer": "which says what to answer"},
+    "practice_wrong": {"answer": "which says what to answer"},
+    "progress": {"done": "the number of trials done", "total": "the number of all trials"},
+    "press": {"key": "which key it is"},
+    "distance_keep": {"cm": "the viewing distance"},
 }
-_MEANINGS = {
-    "answer": "which says what to answer",
-    "done": "the number of trials done",
-    "total": "the number of all trials",
-    "key": "which key it is",
-    "cm": "the viewing distance",
-}
+"""What a text has to have in braces, and what that is."""

@@ -26,14 +26,7 @@ from study.experiment.protocol.studies import StudySpec
 from study.files import read_text
 from study.toml_text import LARGEST_TEXT, parse_toml
 
-__all__ = [
-    "Protocol",
-    "StudySpec",
-    "find_protocol",
-    "load_protocol",
-    "parse_protocol",
-    "protocols_folder",
-]
+__all__ = ["Protocol", "StudySpec", "find_protocol", "load_protocol", "parse_protocol", "protocols_folder"]
 
 MOST_PROBLEMS = 50
 """So many are told at once."""

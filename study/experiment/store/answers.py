@@ -6,7 +6,7 @@ A stored session and an answer, a form or an event come in; rows go out, which a
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
@@ -28,33 +28,24 @@ from study.tasks.trial import Trial
 
 @dataclass(frozen=True)
 class Presentation:
-    """How one stimulus of a trial was really shown.
-
-    Parameters
-    ----------
-    place
-        The slot that it filled (`trial.PLACES`): `first`, `second`, ...
-    method
-        What timed it: `requestVideoFrameCallback`, `swap`, or the name of a fallback, which measured nothing.
-    frames_expected, frames_presented, longest_gap_frames
-        Frames of the stimulus, frames that were seen to be presented, and the longest time between two of them in
-        frames (1 is perfect); None where it was not measured.
-    shown_well
-        Whether no gap was above one and a half frames, and no frame was missing.
-    detail
-        Anything else, such as the times of all frames in milliseconds.
-    """
+    """How one stimulus of a trial was really shown."""
 
     trial: int
     attempt: int
     place: str
+    """The slot that it filled (`trial.PLACES`): `first`, `second`, ..."""
     stimulus: str
     method: str
+    """What timed it: `requestVideoFrameCallback`, `swap`, or the name of a fallback, which measured nothing."""
     frames_expected: int | None
     frames_presented: int | None
     longest_gap_frames: float | None
+    """Frames of the stimulus, frames that were seen to be presented, and the longest time between two of them in frames
+    (1 is perfect); None where it was not measured."""
     shown_well: bool
+    """Whether no gap was above one and a half frames, and no frame was missing."""
     detail: Mapping[str, Any] | None = None
+    """Anything else, such as the times of all frames in milliseconds."""
 
 
 def stored_answers(responses: Responses, session_id: int) -> tuple[Answer, ...]:

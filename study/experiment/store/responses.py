@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import sqlalchemy as sa
 
@@ -29,9 +29,6 @@ from study.experiment.store.databases import (
     unusable,
 )
 from study.experiment.store.migrations import migrate
-
-if TYPE_CHECKING:
-    pass
 
 Clock = Callable[[], datetime]
 
@@ -85,17 +82,15 @@ def open_responses(url_or_path: str | Path) -> Responses:
     try:
         refuse_damaged(engine, place)
         migrate(engine, place)
-    except sa.exc.DBAPIError as error:
+    except BaseException as error:
         engine.dispose()
+        if isinstance(error, UnicodeDecodeError):  # of what SQLite says about a damaged table
+            raise damaged(place, str(error)) from error
+        if not isinstance(error, sa.exc.DBAPIError):
+            raise
         if new and file is not None and file.exists() and not file.stat().st_size:
             file.unlink()  # nothing came to stand in it
         raise unusable(place, error) from error
-    except UnicodeDecodeError as error:  # of what SQLite says about a damaged table
-        engine.dispose()
-        raise damaged(place, str(error)) from error
-    except BaseException:
-        engine.dispose()
-        raise
     return Responses(engine, place)
 
 

@@ -17,17 +17,9 @@ import sqlalchemy as sa
 from study.errors import SessionError
 from study.experiment.plan import Plan, plan_from_json
 from study.experiment.protocol.whole import Protocol
-from study.experiment.store.databases import (
-    alone,
-    damaged,
-)
+from study.experiment.store.databases import alone, damaged
 from study.experiment.store.responses import Clock, Responses, rows_of, utc_now
-from study.experiment.store.tables import (
-    answers,
-    events,
-    sessions,
-    withdrawals,
-)
+from study.experiment.store.tables import answers, events, sessions, withdrawals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,23 +154,24 @@ def _refuse_other_plan(record: SessionRecord, plan: Plan, simulated: bool) -> No
 
 def find_session(responses: Responses, participant: str) -> SessionRecord | None:
     """A participant's session, or None; resuming starts from its stored plan."""
-    with responses.engine.connect() as connection:
-        found = connection.execute(sa.select(sessions).where(sessions.c.participant == participant)).one_or_none()
-    return None if found is None else _session_record(found._mapping, responses.place)
+    return next(iter(_records(responses, sessions.c.participant == participant)), None)
 
 
 def session_by_id(responses: Responses, session_id: int) -> SessionRecord:
     """A session by its number."""
-    with responses.engine.connect() as connection:
-        found = connection.execute(sa.select(sessions).where(sessions.c.id == session_id)).one_or_none()
-    if found is None:
+    found = _records(responses, sessions.c.id == session_id)
+    if not found:
         raise SessionError(f"{responses.place}: expected the number of a session, found {session_id}.")
-    return _session_record(found._mapping, responses.place)
+    return found[0]
 
 
 def all_sessions(responses: Responses) -> tuple[SessionRecord, ...]:
     """Every session, in the order in which they were started."""
-    rows = rows_of(responses, sa.select(sessions).order_by(sessions.c.id))
+    return _records(responses, sa.true())
+
+
+def _records(responses: Responses, condition: sa.ColumnElement[bool]) -> tuple[SessionRecord, ...]:
+    rows = rows_of(responses, sa.select(sessions).where(condition).order_by(sessions.c.id))
     return tuple(_session_record(row, responses.place) for row in rows)
 
 

@@ -17,13 +17,15 @@ ROOT = Path(__file__).parents[3]
 SEGUE = [sys.executable, "-m", "study.apps.cli"]
 
 PRINTS = """
-import sys
+import click
 from study.apps.cli.console import emit, say
 from study.apps.cli.streams import print_in_any_encoding
 print_in_any_encoding()
-emit({}, False, "k \N{MINUS SIGN} 7.7 \N{PLUS-MINUS SIGN} 1, \N{LEFT DOUBLE QUOTATION MARK}l\xe4uft\N{RIGHT DOUBLE QUOTATION MARK} \u6b69 \\udcff")
+emit({}, "k \N{MINUS SIGN} 7.7 \N{PLUS-MINUS SIGN} 1, \N{LEFT DOUBLE QUOTATION MARK}l\xe4uft\N{RIGHT DOUBLE QUOTATION MARK} \u6b69 \\udcff")
 say("\N{RIGHTWARDS ARROW} \u6b69")
-emit({"word": "l\xe4uft \u6b69"}, True, "")
+with click.Context(click.Command("verb")) as context:
+    context.meta["--json"] = True
+    emit({"word": "l\xe4uft \u6b69"}, "")
 """  # noqa: E501
 
 
