@@ -19,8 +19,12 @@ FULL_REACH = 0.995
 LARGEST_DROP_M = 0.03
 # Heel to buttock, radians from straight.
 LARGEST_BEND = 2.6
-# Sine of the bend under which a knee counts as nearly straight.
-_STRAIGHT = 0.1
+# Sine of the bend under which a knee bends about its usual axis rather than in the plane of the leg.
+_STRAIGHT = 0.35
+# Cosines between that plane's normal and the usual axis: a knee that bends aside is not overstretched, one against is,
+# if it bends little (radians): no knee is overstretched far.
+_ASIDE, _AGAINST = -0.5, -0.9
+_LITTLE, _FAR = 0.35, 0.6
 # An overstretched knee is brought round over a correction of this size.
 _COME_ROUND_M = 0.01
 _PASSES = 3
@@ -102,8 +106,10 @@ def _reach_one(
     change = np.clip(np.linalg.norm(shifts, axis=1) / _COME_ROUND_M, 0.0, 1.0)
     swing = bend = np.tile(quat.IDENTITY, (len(leg), 1))
     axis = quat.rotate(world[0], hinge)
+    against = _overstretched(thigh, shank, axis)
     for _ in range(_PASSES):
-        turn = _bend(thigh, shank, quat.rotate(swing, axis), np.linalg.norm(target, axis=1), before, change)
+        wanted = np.linalg.norm(target, axis=1)
+        turn = _bend(thigh, shank, quat.rotate(swing, axis), wanted, before, against, change)
         shank = quat.rotate(turn, shank)
         # The knee turns within the thigh, so its turns are kept as they are before the thigh swings.
         bend = quat.multiply(quat.conjugate(swing), quat.multiply(turn, quat.multiply(swing, bend)))
@@ -144,26 +150,41 @@ def knee_bend(clip: Clip, side: str, hinge: FloatArray) -> FloatArray:
 
 
 def _bend(
-    thigh: FloatArray, shank: FloatArray, axis: FloatArray, wanted: FloatArray, before: FloatArray, change: FloatArray
+    thigh: FloatArray,
+    shank: FloatArray,
+    axis: FloatArray,
+    wanted: FloatArray,
+    before: FloatArray,
+    against: FloatArray,
+    change: FloatArray,
 ) -> FloatArray:
     """The turn of the knee, `(frames, 4)`, after which the ankle is as far from the hip as wanted, or as the leg
     reaches.
 
     `thigh`, `shank` and the usual `axis` of the knee `(frames, 3)` are in the world. `before (frames,)` is how far the
-    ankle was, metres: what the leg did already it may go on doing.
+    ankle was, metres: what the leg did already it may go on doing. A knee that was overstretched (`against`) goes a
+    share `change` of its way.
     """
     a, b = np.linalg.norm(thigh, axis=1), np.linalg.norm(shank, axis=1)
     folded = np.sqrt(a**2 + b**2 + 2 * a * b * np.cos(LARGEST_BEND))
     wanted = np.clip(wanted, np.minimum(folded, before), np.maximum(FULL_REACH * (a + b), before))
     normal = np.cross(thigh, shank) / (a * b)[:, None]
-    forward = np.where(np.sum(normal * axis, axis=1) < 0.0, -1.0, 1.0)
-    bent = forward * np.arctan2(np.linalg.norm(normal, axis=1), np.sum(thigh * shank, axis=1) / (a * b))
+    bent = np.arctan2(np.linalg.norm(normal, axis=1), np.sum(thigh * shank, axis=1) / (a * b))
     goal = np.pi - np.arccos(np.clip((a**2 + b**2 - wanted**2) / (2 * a * b), -1.0, 1.0))
-    goal = np.where(bent < 0.0, bent + change * (goal - bent), goal)
+    forward = np.where(np.sum(normal * axis, axis=1) < 0.0, -1.0, 1.0)
+    turn = against * change * (goal - forward * bent) + (1.0 - against) * (goal - bent)
     # The plane of the leg where it is bent; the knee's usual axis where it is nearly straight and has no plane.
-    axis = normal * forward[:, None] + _STRAIGHT * axis
-    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    return quat.from_axis_angle(axis, goal - bent)
+    axis = normal * (against * forward + 1.0 - against)[:, None] + _STRAIGHT * axis
+    return quat.from_axis_angle(axis / np.linalg.norm(axis, axis=1, keepdims=True), turn)
+
+
+def _overstretched(thigh: FloatArray, shank: FloatArray, axis: FloatArray) -> FloatArray:
+    """How much each knee counts as overstretched, `(frames,)` from 0 to 1; vectors as `_bend` has them."""
+    normal = np.cross(thigh, shank)
+    length = np.linalg.norm(normal, axis=1)
+    bent = np.arctan2(length, np.sum(thigh * shank, axis=1))
+    along = np.sum(normal * axis, axis=1) / np.maximum(length, 1e-12)
+    return _smooth((along - _ASIDE) / (_AGAINST - _ASIDE)) * _smooth((_FAR - bent) / (_FAR - _LITTLE))
 
 
 def _between(here: FloatArray, there: FloatArray) -> FloatArray:
@@ -172,3 +193,9 @@ def _between(here: FloatArray, there: FloatArray) -> FloatArray:
     there = there / np.linalg.norm(there, axis=1, keepdims=True)
     dots = np.sum(here * there, axis=1, keepdims=True)
     return quat.normalise(np.concatenate([1.0 + dots, np.cross(here, there)], axis=1))
+
+
+def _smooth(share: FloatArray) -> FloatArray:
+    """From 0 at 0 to 1 at 1, smoothly."""
+    share = np.clip(share, 0.0, 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))

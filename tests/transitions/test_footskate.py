@@ -253,3 +253,47 @@ def test_a_straight_leg_bends_forward_at_the_knee(make_walk: Callable[..., Clip]
     np.testing.assert_allclose(
         joint_positions(done)[5:35, ankle], (joint_positions(still)[:, ankle] + shifts[:, 0])[5:35], atol=2e-3
     )
+
+
+@pytest.mark.parametrize("widest", [130.0, 170.0])
+def test_a_knee_that_comes_to_bend_aside_does_not_jump(slider: Clip, widest: float) -> None:
+    """The thigh turns about itself while the shank stays where it is, as in blends of figures that are built unlike."""
+    angles = np.radians(np.interp(np.arange(slider.frames), [0, 55, 85], [0.0, 0.0, widest]))
+    hip, knee = (slider.skeleton.role(f"{joint}.L") for joint in ("hip", "knee"))
+    along = slider.skeleton.offsets[knee] / np.linalg.norm(slider.skeleton.offsets[knee])
+    turn = quat.from_axis_angle(np.tile(along, (slider.frames, 1)), angles)
+    rotations = slider.rotations.copy()
+    rotations[:, hip] = quat.multiply(rotations[:, hip], turn)
+    rotations[:, knee] = quat.multiply(quat.conjugate(turn), rotations[:, knee])
+    turned = replace(slider, rotations=rotations)
+    np.testing.assert_allclose(joint_positions(turned), joint_positions(slider), atol=1e-12)
+    shifts = np.zeros((slider.frames, 2, 3))
+    shifts[:, 0, 1] = 0.06
+    done = reach(turned, shifts)
+    ankle = turned.skeleton.role("ankle.L")
+    np.testing.assert_allclose(
+        joint_positions(done)[:, ankle], joint_positions(turned)[:, ankle] + shifts[:, 0], atol=5e-3
+    )
+    moved = np.linalg.norm(np.diff(joint_positions(done)[:, knee], axis=0), axis=-1)
+    own = np.linalg.norm(np.diff(joint_positions(turned)[:, knee], axis=0), axis=-1)
+    assert moved.max() < own.max() + 0.03
+
+
+def test_an_overstretched_knee_comes_round_where_it_must_bend_further_and_not_at_once(slider: Clip) -> None:
+    rotations = slider.rotations.copy()
+    hip, knee = (slider.skeleton.role(f"{joint}.L") for joint in ("hip", "knee"))
+    rotations[30:, hip] = quat.from_axis_angle([1.0, 0.0, 0.0], 0.1)
+    rotations[30:, knee] = quat.from_axis_angle([1.0, 0.0, 0.0], -0.2)
+    overstretched = replace(slider, rotations=rotations)
+    np.testing.assert_allclose(knee_bend(overstretched, "L")[30:], -0.2, atol=1e-12)
+    shifts = np.zeros((slider.frames, 2, 3))
+    shifts[30:, 0, 1] = np.linspace(0.0, 0.06, 60)
+    done = reach(overstretched, shifts)
+    bend = knee_bend(done, "L")[30:]
+    assert np.abs(np.diff(bend)).max() < 0.15
+    assert bend[0] == pytest.approx(-0.2)
+    assert bend[-1] > 0.5
+    ankle = slider.skeleton.role("ankle.L")
+    missed = joint_positions(done)[30:, ankle] - joint_positions(overstretched)[30:, ankle] - shifts[30:, 0]
+    assert np.linalg.norm(missed, axis=1).max() < 0.02
+    np.testing.assert_allclose(missed[-20:], 0.0, atol=1e-3)
