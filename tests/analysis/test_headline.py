@@ -67,3 +67,12 @@ def test_thresholds_are_those_of_the_median_observer_or_of_the_group(same_differ
     alone = told(answers[answers["participant"] == "p00"])
     assert all("participant's" in one["statement"] for one in alone)
     assert {one["generalises_to"] for one in alone} == {"further responses of this participant"}
+
+
+def test_one_method_has_the_mean_of_its_ratings() -> None:
+    rows = [(f"p{person}", "rating", "cut", trial, str(person % 3 + 1)) for person in range(6) for trial in (1, 2)]
+    answers = pd.DataFrame(rows, columns=["participant", "task", "method_a", "trial", "answer"])
+    (one,) = told(answers)
+    assert (one["estimate"], one["p"], one["unit"]) == (2.0, None, "points of the scale, cut")
+    assert one["statement"] == "cut: mean 2.00 over 6 participants."
+    assert one["interval"]["low"] < 2 < one["interval"]["high"]

@@ -32,15 +32,27 @@ class Ratings:
 
     def sentences(self, alpha: float) -> list[str]:
         """Return the tests of each question in words, and the means."""
-        means = [
-            f"{': '.join(filter(None, (row.item, row.method)))}: mean {row.mean:.2f} over "
-            f"{counted(row.participants, 'participant')}"
-            for row in self.table
-        ]
+        means = [_mean_in_words(row) for row in self.table]
         return [*anova_sentences(self.questions, alpha), *means]
 
     def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
-        """Return each difference of two methods over participants, in each question."""
+        """Return each difference of two methods over participants, in each question; the means where there is none."""
+        if not self.questions:
+            return [
+                Headline(
+                    study=study,
+                    statement=f"{_mean_in_words(row)}.",
+                    estimate=row.mean,
+                    unit=f"points of the scale, {_what(row.item, row.method)}",
+                    interval=Interval(row.low, row.high, confidence),
+                    p=None,
+                    p_adjusted=None,
+                    test="none",
+                    generalises_to=holds_for(row.participants),
+                    note="; ".join(filter(None, (row.note, "one method: nothing to compare"))),
+                )
+                for row in self.table
+            ]
         return [
             Headline(
                 study=study,
@@ -110,6 +122,10 @@ def analyse_ratings(answers: pd.DataFrame, name: str, settings: Settings) -> Rat
             "scale_points"
         )
     return PairRatings(pair_ratings(answers, settings.scale_points[name], confidence))
+
+
+def _mean_in_words(row: MethodRating) -> str:
+    return f"{_what(row.item, row.method)}: mean {row.mean:.2f} over {counted(row.participants, 'participant')}"
 
 
 def _what(item: str, of: str) -> str:
