@@ -22,7 +22,7 @@ from study.motion import quaternions as quat
 from study.motion.clip import Clip, resample
 from study.motion.skeleton import Skeleton
 from study.transitions.batch import geodesic_lengths
-from study.transitions.blend_length import blend_length
+from study.transitions.blend_length import geodesic_length
 from study.transitions.timewarp import warp_costs
 from study.transitions.weights import joint_weights
 
@@ -96,7 +96,7 @@ def main() -> None:
     weights = joint_weights(source.skeleton)
     times: dict[str, list[float]] = {"blend_length": [], "one length at a time": [], "plain loops": []}
     for repeat in range(options.repeats + 1):
-        ours = milliseconds(lambda: blend_length(source, destination, i, j, longest=longest))
+        ours = milliseconds(lambda: geodesic_length(source, destination, i, j, longest=longest))
         first_try = milliseconds(lambda: vectorised_costs(source, destination, i, j, longest, weights))
         if repeat:  # the first round warms up
             times["blend_length"].append(ours)

@@ -28,7 +28,7 @@ from study.experiment.stimuli.films import Film, plan_all
 from study.experiment.stimuli.ways import Ways
 from study.motion.clip import Clip, retarget, trim
 from study.motion.library import open_library
-from study.transitions.blend_length import blend_length
+from study.transitions.blend_length import geodesic_length
 from study.transitions.flaws import Flaws, find_flaws
 from study.transitions.methods.makes.blends import Blended
 from study.transitions.methods.method import Motions, Place
@@ -100,7 +100,7 @@ def folder_stimuli(folder: str, pairs: int, fps: float, rng: np.random.Generator
             source, destination = clips[a], retarget(clips[b], clips[a].skeleton)
             start = int(rng.integers(round(0.3 * fps), source.frames - 5))
             end = int(rng.integers(5, destination.frames - round(0.5 * fps)))
-            geodesic = blend_length(source, destination, start, end).blend_frames
+            geodesic = geodesic_length(source, destination, start, end).blend_frames
             lengths = {"geodesic": geodesic, "fixed": round(fps / 3), "long": round(0.8 * fps)}
             place = Place("", (a, b), source, destination, start, end, Motions((), None, None, None, {}))
             for kind, frames in lengths.items():

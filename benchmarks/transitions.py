@@ -21,7 +21,7 @@ from study.motion import quaternions as quat
 from study.motion.clip import Clip, retarget
 from study.motion.library import Library, open_library
 from study.transitions.batch import geodesic_lengths
-from study.transitions.blend_length import blend_length
+from study.transitions.blend_length import geodesic_length
 from study.transitions.blending import blend, facing
 from study.transitions.footskate import plant_feet
 from study.transitions.timewarp import warp_length, warped_blend
@@ -92,7 +92,7 @@ def judged(clips: dict[str, Clip], rng: np.random.Generator) -> list[float]:
         start = int(rng.integers(2, source.frames - longest + 1))
         end = int(rng.integers(longest, destination.frames))
         try:
-            length = blend_length(source, destination, start, end, longest=longest).blend_frames
+            length = geodesic_length(source, destination, start, end, longest=longest).blend_frames
             warp = warp_length(source, destination, start, end, longest=longest)
             if length < 5 or end > destination.frames - 4:
                 continue

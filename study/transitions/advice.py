@@ -24,8 +24,9 @@ from study.errors import TransitionError
 from study.motion.clip import Clip, sample
 from study.motion.cycles import find_cycle
 from study.transitions.batch import geodesic_lengths, velocity_lengths
-from study.transitions.blend_length import FIXED_S, LONGEST_S, blend_length, default_frames
+from study.transitions.blend_length import FIXED_S, LONGEST_S, default_frames
 from study.transitions.distances import distance_matrix, frame_distance, on_joints_of
+from study.transitions.methods.lengths.wang2004 import Fixed, Geodesic, Velocity
 from study.transitions.weights import joint_weights
 
 # 2004 section 5.1: differences that are noticed, 7 frames longer or 8 frames shorter, at 30 fps.
@@ -50,7 +51,7 @@ class Advice:
     destination: str
     """Names of the clips."""
     method: str
-    """`"geodesic"` or `"velocity"`."""
+    """Name of the length: geodesic or velocity."""
     why: str
     """What it was chosen for."""
     start_frame: int
@@ -98,9 +99,8 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
     """
     destination = on_joints_of(source, destination)
     repeats = (is_cyclic(source), is_cyclic(destination)) if cyclic is None else cyclic
-    method = "geodesic" if any(repeats) else "velocity"
+    method, find = (Geodesic(), geodesic_lengths) if any(repeats) else (Velocity(), velocity_lengths)
     starts, ends = _points(source, destination)
-    find = geodesic_lengths if method == "geodesic" else velocity_lengths
     lengths, costs = find(source, destination, starts, ends)
     strain = costs * (1.0 + (own_time(source, destination) / (lengths + 1)) ** 2)
     low, high = (round(seconds * source.fps) for seconds in USUAL_S)
@@ -111,13 +111,12 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
         usual[:] = True
     best = int(np.flatnonzero(usual)[np.argmin(strain[usual])])
     start, end = int(starts[best]), int(ends[best])
-    chosen = blend_length(source, destination, start, end, method=method)
-    fixed = blend_length(source, destination, start, end, method="fixed")
+    chosen, fixed = (each.at(source, destination, start, end) for each in (method, Fixed()))
     length, default = chosen.blend_frames, default_frames(source.fps, FIXED_S)
     return Advice(
         source.name,
         destination.name,
-        method,
+        method.name,
         _why(repeats),
         start,
         end,

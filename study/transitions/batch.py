@@ -9,8 +9,6 @@ two clips.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,7 +16,7 @@ from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
-from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames, joint_speeds
+from study.transitions.blend_length import joint_speeds, length_range
 from study.transitions.distances import distance_matrix, joint_differences, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 
@@ -27,14 +25,7 @@ _BLOCK = 8_000_000
 
 
 def geodesic_lengths(
-    source: Clip,
-    destination: Clip,
-    start_frames: ArrayLike,
-    end_frames: ArrayLike,
-    *,
-    shortest: int | None = None,
-    longest: int | None = None,
-    weights: str | Mapping[str, float] = "wang2003",
+    source: Clip, destination: Clip, start_frames: ArrayLike, end_frames: ArrayLike
 ) -> tuple[IntArray, FloatArray]:
     """The geodesic blend length of many transitions between two clips.
 
@@ -44,8 +35,6 @@ def geodesic_lengths(
         Clips of one rig at one frame rate.
     start_frames, end_frames : (transitions,)
         Whole frame numbers, as `blend_length` takes them one at a time.
-    shortest, longest, weights
-        As in `blend_length`.
 
     Returns
     -------
@@ -60,8 +49,8 @@ def geodesic_lengths(
         Where the clips don't supply even the shortest blend at some of the frames; the message says how many.
     """
     destination = on_joints_of(source, destination)
-    starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames, shortest, longest)
-    sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
+    starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames)
+    sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton)))
     lengths = np.arange(low, longest_there.max(initial=low) + 1)
     best, cost = np.empty(len(starts), dtype=np.int64), np.empty(len(starts))
     block = max(1, _BLOCK // len(lengths))
@@ -79,24 +68,17 @@ def geodesic_lengths(
 
 
 def velocity_lengths(
-    source: Clip,
-    destination: Clip,
-    start_frames: ArrayLike,
-    end_frames: ArrayLike,
-    *,
-    shortest: int | None = None,
-    longest: int | None = None,
-    weights: str | Mapping[str, float] = "wang2003",
+    source: Clip, destination: Clip, start_frames: ArrayLike, end_frames: ArrayLike
 ) -> tuple[IntArray, FloatArray]:
     """The velocity method's blend length of many transitions between two clips, and what it costs by Eq. 1.
 
     Parameters, returns and errors are those of `geodesic_lengths`; lengths outside the range are clipped to it.
     """
     destination = on_joints_of(source, destination)
-    starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames, shortest, longest)
+    starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames)
     joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])
     speeds = [joint_speeds(clip, joints) for clip in (source, destination)]
-    sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton, weights)))
+    sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton)))
     lengths = np.empty(len(starts), dtype=np.int64)
     block = max(1, _BLOCK // (16 * len(joints)))
     for at in range(0, len(starts), block):
@@ -112,18 +94,10 @@ def velocity_lengths(
 
 
 def _transitions(
-    source: Clip,
-    destination: Clip,
-    start_frames: ArrayLike,
-    end_frames: ArrayLike,
-    shortest: int | None,
-    longest: int | None,
+    source: Clip, destination: Clip, start_frames: ArrayLike, end_frames: ArrayLike
 ) -> tuple[IntArray, IntArray, int, IntArray]:
     """The frames as arrays, the shortest length, and for each transition the longest that the clips supply; checked."""
-    low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
-    high = default_frames(source.fps, LONGEST_S) if longest is None else longest
-    if not 1 <= low <= high:
-        raise TransitionError(f"Expected 1 <= shortest <= longest blend length in frames, got {low} and {high}.")
+    low, high = length_range(source.fps, None)
     starts, ends = np.asarray(start_frames, dtype=np.int64), np.asarray(end_frames, dtype=np.int64)
     if starts.ndim != 1 or starts.shape != ends.shape:
         raise TransitionError(

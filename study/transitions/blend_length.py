@@ -8,7 +8,7 @@ the velocity method (Eqs. 3 and 4) for motions that don't repeat, and the fixed 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -22,8 +22,6 @@ from study.transitions.distances import frame_distance, half_angle_squares, join
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 from study.transitions.windows import check_frames, held, longest_available, shortfall, window
 
-METHODS = ("fixed", "geodesic", "velocity")
-
 # 2004: blends normally take 0.03 to 2 s, 1 to 60 frames at 30 fps; the fixed one 0.33 s, 10 frames.
 SHORTEST_S, LONGEST_S, FIXED_S = 1.0 / 30.0, 2.0, 1.0 / 3.0
 
@@ -32,8 +30,6 @@ SHORTEST_S, LONGEST_S, FIXED_S = 1.0 / 30.0, 2.0, 1.0 / 3.0
 class BlendLength:
     """A blend length and what it rests on."""
 
-    method: str
-    """`"fixed"`, `"geodesic"` or `"velocity"`."""
     blend_frames: int
     blend_s: float
     """The length, in frames of the clips and in seconds."""
@@ -41,13 +37,9 @@ class BlendLength:
     """2004 Eq. 1 at this length; NaN where the clips don't supply the frames to know it."""
     lengths: IntArray | None = None
     costs: FloatArray | None = None
-    """The candidate lengths in frames and the cost of each (Figure 3); None except for the geodesic method."""
+    """The candidate lengths in frames and the cost of each (Figure 3); None except by geodesic distance."""
     joint: str | None = None
     """The role with the largest joint difference, by which the velocity method goes."""
-    differences: Mapping[str, float] = field(default_factory=dict)
-    """Half angle between start and end frame for each major joint (2004 Table 1), by role."""
-    joint_speed: float | None = None
-    """The mean half-angle speed of that joint, radians a second (the `|v|` of Eq. 4)."""
     unclipped_s: float | None = None
     """What Eq. 4 gave, before it was held to the shortest and longest length."""
     note: str = ""
@@ -64,20 +56,32 @@ def default_frames(fps: float, seconds: float) -> int:
     return max(1, round(seconds * fps))
 
 
-def blend_length(
+def length_range(fps: float, longest: int | None) -> tuple[int, int]:
+    """The shortest and the longest length to consider, frames: 0.03 and 2 s (1 and 60 frames at 30 fps) unless given.
+
+    Raises
+    ------
+    TransitionError
+        Where the longest is below the shortest.
+    """
+    low = default_frames(fps, SHORTEST_S)
+    high = default_frames(fps, LONGEST_S) if longest is None else longest
+    if high < low:
+        raise TransitionError(f"Expected a longest blend of at least {counted(low, 'frame')}, got {high}.")
+    return low, high
+
+
+def geodesic_length(
     source: Clip,
     destination: Clip,
     start_frame: int,
     end_frame: int,
     *,
-    method: str = "geodesic",
-    fixed_frames: int | None = None,
-    shortest: int | None = None,
     longest: int | None = None,
     weights: str | Mapping[str, float] = "wang2003",
     specification: str = "start-end",
 ) -> BlendLength:
-    """The blend length for a transition, by one of the methods of Wang & Bodenheimer 2004.
+    """The length whose window costs least by geodesic distance (2004 Eqs. 1, 2); of equals the shortest.
 
     Lengths that the clips don't supply at these frames are not considered; the note says so.
 
@@ -87,12 +91,8 @@ def blend_length(
         Clips of one rig at one frame rate.
     start_frame, end_frame
         The frame of the source at which the blend starts, and the frame of the destination at which it ends.
-    method
-        `"fixed"`, `"geodesic"` (Eqs. 1, 2) or `"velocity"` (Eqs. 3, 4).
-    fixed_frames
-        The fixed length in frames; 0.33 s (10 frames at 30 fps) unless given.
-    shortest, longest
-        The range of lengths in frames; 0.03 to 2 s (1 to 60 frames at 30 fps) unless given.
+    longest
+        The longest length in frames; see `length_range`.
     weights
         As `joint_weights` takes them.
     specification
@@ -104,33 +104,74 @@ def blend_length(
         Where the clips don't supply even the shortest blend (the message counts the frames), differ in rig or frame
         rate, or an option is not known.
     MotionError
-        Where the rig lacks a joint that the weights or the velocity method need.
-
-    Examples
-    --------
-    >>> from study.motion.synthetic import synthesize
-    >>> walk, run = synthesize("walk", seconds=4.0), synthesize("run", seconds=4.0)
-    >>> blend_length(walk, run, 40, 80, method="fixed").blend_frames
-    10
+        Where the rig lacks a joint that the weights need.
     """
     destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
-    low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
-    high = default_frames(source.fps, LONGEST_S) if longest is None else longest
-    if not 1 <= low <= high:
-        raise TransitionError(f"Expected 1 <= shortest <= longest blend length in frames, got {low} and {high}.")
-    weight = joint_weights(source.skeleton, weights)
-    frames = (start_frame, end_frame)
-    if method == "geodesic":
-        return _geodesic(source, destination, frames, low, high, weight, specification)
-    if method == "velocity":
-        found = _velocity(source, destination, frames, low, high)
-    elif method == "fixed":
-        length = default_frames(source.fps, FIXED_S) if fixed_frames is None else fixed_frames
-        found = BlendLength("fixed", length, length / source.fps, np.nan)
-    else:
-        raise TransitionError(f"Expected a method of {', '.join(METHODS)}, got {method!r}.")
-    return _supplied(found, source, destination, frames, low, weight, specification)
+    low, high = length_range(source.fps, longest)
+    frames, weight = (start_frame, end_frame), joint_weights(source.skeleton, weights)
+    high, note = held(longest_available(source, destination, *frames, specification), low, high)
+    costs = geodesic_costs(source, destination, *frames, high, weight, specification)[low - 1 :]
+    best = low + int(np.argmin(costs))
+    return BlendLength(best, best / source.fps, float(costs[best - low]), np.arange(low, high + 1), costs, note=note)
+
+
+def velocity_length(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    *,
+    weights: str | Mapping[str, float] = "wang2003",
+    specification: str = "start-end",
+) -> BlendLength:
+    """The largest joint difference over that joint's speed (2004 Eqs. 3, 4), within 0.03 to 2 s.
+
+    Parameters and errors are those of `geodesic_length`; the weights serve the cost alone.
+
+    Notes
+    -----
+    `|v|` of Eq. 4 is the mean of the two speeds, since opposite velocities would cancel in a mean of vectors.
+    """
+    destination = on_joints_of(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    low, high = length_range(source.fps, None)
+    differences = major_joint_differences(source, destination, start_frame, end_frame)
+    role = max(differences, key=differences.__getitem__)
+    joint = source.skeleton.role(role)
+    speed = 0.5 * (joint_speed(source, start_frame, joint) + joint_speed(destination, end_frame, joint))
+    # A joint that differs but doesn't move would need infinite time; equal poses need none.
+    seconds = differences[role] / speed if speed > 0 else (np.inf if differences[role] > 0 else 0.0)
+    length = round(min(max(seconds * source.fps, low), high))
+    note = ""
+    if not low - 0.5 <= seconds * source.fps <= high + 0.5:
+        note = (
+            f"the velocity method gave {seconds:.3f} s ({seconds * source.fps:.1f} frames), outside {low} to {high} "
+            f"frames; clipped to {length}"
+        )
+    found = BlendLength(length, length / source.fps, np.nan, joint=role, unclipped_s=float(seconds), note=note)
+    return _supplied(found, source, destination, (start_frame, end_frame), weights, specification)
+
+
+def fixed_length(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    frames: int | None = None,
+    *,
+    weights: str | Mapping[str, float] = "wang2003",
+    specification: str = "start-end",
+) -> BlendLength:
+    """A length of so many frames, 0.33 s (10 at 30 fps) unless given, with its cost.
+
+    Parameters and errors are those of `geodesic_length`; the weights serve the cost alone.
+    """
+    destination = on_joints_of(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    length = default_frames(source.fps, FIXED_S) if frames is None else frames
+    found = BlendLength(length, length / source.fps, np.nan)
+    return _supplied(found, source, destination, (start_frame, end_frame), weights, specification)
 
 
 def geodesic_costs(
@@ -166,7 +207,7 @@ def joint_costs(
     Parameters
     ----------
     source, destination, start_frame, end_frame, specification
-        As in `blend_length`; both clips supply `longest` frames, or `TransitionError`.
+        As in `geodesic_length`; both clips supply `longest` frames, or `TransitionError`.
     longest
         The longest blend in frames.
     joints : (n,)
@@ -212,23 +253,6 @@ def _anti_diagonals(size: int) -> tuple[IntArray, IntArray]:
     return order[: size * (size + 1) // 2], np.arange(size) * (np.arange(size) + 1) // 2
 
 
-def _geodesic(
-    source: Clip,
-    destination: Clip,
-    frames: tuple[int, int],
-    low: int,
-    high: int,
-    weights: FloatArray,
-    specification: str,
-) -> BlendLength:
-    high, note = held(longest_available(source, destination, *frames, specification), low, high)
-    costs = geodesic_costs(source, destination, *frames, high, weights, specification)[low - 1 :]
-    best = low + int(np.argmin(costs))
-    return BlendLength(
-        "geodesic", best, best / source.fps, float(costs[best - low]), np.arange(low, high + 1), costs, note=note
-    )
-
-
 def major_joint_differences(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> dict[str, float]:
     """Half angle between start and end frame for each major joint, by role (2004 Eq. 3 and Table 1)."""
     joints = [source.skeleton.role(role) for role in MAJOR_ROLES]
@@ -254,63 +278,26 @@ def joint_speed(clip: Clip, frame: int, joint: int) -> float:
     return float(joint_speeds(trim(clip, near.start, near.stop), np.array([joint]))[frame - near.start, 0])
 
 
-def _velocity(source: Clip, destination: Clip, frames: tuple[int, int], low: int, high: int) -> BlendLength:
-    """2004 Eq. 4; `|v|` is the mean of the two speeds, since opposite velocities would cancel in a mean of vectors."""
-    differences = major_joint_differences(source, destination, *frames)
-    role = max(differences, key=differences.__getitem__)
-    joint = source.skeleton.role(role)
-    speed = 0.5 * (joint_speed(source, frames[0], joint) + joint_speed(destination, frames[1], joint))
-    # A joint that differs but doesn't move would need infinite time; equal poses need none.
-    seconds = differences[role] / speed if speed > 0 else (np.inf if differences[role] > 0 else 0.0)
-    length = round(min(max(seconds * source.fps, low), high))
-    note = ""
-    if not low - 0.5 <= seconds * source.fps <= high + 0.5:
-        note = (
-            f"the velocity method gave {seconds:.3f} s ({seconds * source.fps:.1f} frames), outside {low} to {high} "
-            f"frames; clipped to {length}"
-        )
-    return BlendLength(
-        "velocity",
-        length,
-        length / source.fps,
-        np.nan,
-        joint=role,
-        differences=differences,
-        joint_speed=speed,
-        unclipped_s=float(seconds),
-        note=note,
-    )
-
-
 def _supplied(
     found: BlendLength,
     source: Clip,
     destination: Clip,
     frames: tuple[int, int],
-    shortest: int,
-    weights: FloatArray,
+    weights: str | Mapping[str, float],
     specification: str,
 ) -> BlendLength:
     """The length with its cost, held to what the clips supply or refused."""
-    asked = found.blend_frames
+    asked, shortest = found.blend_frames, default_frames(source.fps, SHORTEST_S)
     available = longest_available(source, destination, *frames, specification)
     length, note = held(available, min(shortest, asked), asked)
     span = window(*frames, length, specification)
     if lacking := shortfall(source, destination, span):
         raise TransitionError(
-            f"Expected clips with frames for the {found.method} blend of {counted(length, 'frame')} at source frame "
-            f"{frames[0]} and destination frame {frames[1]}, but {lacking}. Choose other frames, or use longer clips."
+            f"Expected clips with frames for a blend of {counted(length, 'frame')} at source frame {frames[0]} and "
+            f"destination frame {frames[1]}, but {lacking}. Choose other frames, or use longer clips."
         )
     a = source.rotations[span.source_start : span.source_stop]
     b = destination.rotations[span.destination_start : span.destination_stop]
-    return BlendLength(
-        found.method,
-        length,
-        length / source.fps,
-        float(np.mean(frame_distance(a, b, weights))),
-        joint=found.joint,
-        differences=found.differences,
-        joint_speed=found.joint_speed,
-        unclipped_s=found.unclipped_s,
-        note="; ".join(filter(None, (found.note, note))),
-    )
+    cost = float(np.mean(frame_distance(a, b, joint_weights(source.skeleton, weights))))
+    notes = "; ".join(filter(None, (found.note, note)))
+    return replace(found, blend_frames=length, blend_s=length / source.fps, cost=cost, note=notes)

@@ -21,7 +21,7 @@ from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, retarget, sample
-from study.transitions.blend_length import LONGEST_S, SHORTEST_S, default_frames
+from study.transitions.blend_length import length_range
 from study.transitions.blending import Stretch, Transition, blend_weights, join, joint_shares
 from study.transitions.distances import half_angle_squares, on_joints_of
 from study.transitions.weights import joint_weights
@@ -63,7 +63,6 @@ def warp_length(
     start_frame: int,
     end_frame: int,
     *,
-    shortest: int | None = None,
     longest: int | None = None,
     weights: str | Mapping[str, float] = "wang2003",
     average: bool = True,
@@ -73,8 +72,8 @@ def warp_length(
 
     Parameters
     ----------
-    source, destination, start_frame, end_frame, shortest, longest, weights
-        As in `study.transitions.blend_length.blend_length`; the range holds for both lengths.
+    source, destination, start_frame, end_frame, longest, weights
+        As in `study.transitions.blend_length.geodesic_length`; the range holds for both lengths.
     average
         Divide each sum by its number of terms, as Eq. 1 does, so that equal lengths cost what the geodesic method
         says. Eqs. 5 and 6 print the sum itself (False), which favours short blends for being short.
@@ -89,10 +88,7 @@ def warp_length(
     """
     destination = on_joints_of(source, destination)
     check_frames(source, destination, start_frame, end_frame)
-    low = default_frames(source.fps, SHORTEST_S) if shortest is None else shortest
-    high = default_frames(source.fps, LONGEST_S) if longest is None else longest
-    if not 1 <= low <= high:
-        raise TransitionError(f"Expected 1 <= shortest <= longest blend length in frames, got {low} and {high}.")
+    low, high = length_range(source.fps, longest)
     # A warped window also looks at the frame before its first.
     high, note = held(min(source.frames - start_frame, end_frame) if start_frame else 0, low, high)
     weight = joint_weights(source.skeleton, weights)

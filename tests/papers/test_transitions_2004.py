@@ -8,7 +8,16 @@ import pytest
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.skeleton import Skeleton
-from study.transitions.blend_length import FIXED_S, LONGEST_S, SHORTEST_S, blend_length, default_frames
+from study.transitions.blend_length import (
+    FIXED_S,
+    LONGEST_S,
+    SHORTEST_S,
+    default_frames,
+    geodesic_length,
+    joint_speed,
+    major_joint_differences,
+    velocity_length,
+)
 from study.transitions.weights import joint_weights
 from study.transitions.windows import window
 
@@ -57,11 +66,12 @@ def test_2004_table_1_the_right_shoulder_has_the_largest_difference() -> None:
     rest[:, shoulder] = spin
     posed[:, shoulder] = quat.multiply(posed[:, shoulder], spin)
     clips = [Clip(RIG, np.zeros((40, 3)), rotations, 30.0) for rotations in (rest, posed)]
-    found = blend_length(*clips, 20, 20, method="velocity")
-    assert list(found.differences) == list(table)
-    assert found.differences == pytest.approx(table, rel=1e-12)
+    found = velocity_length(*clips, 20, 20)
+    differences = major_joint_differences(*clips, 20, 20)
+    assert list(differences) == list(table)
+    assert differences == pytest.approx(table, rel=1e-12)
     assert found.joint == "shoulder.R"
-    assert found.joint_speed == pytest.approx(1.0)
+    assert [joint_speed(clip, 20, shoulder) for clip in clips] == pytest.approx([1.0, 1.0])
     assert found.unclipped_s == pytest.approx(0.3029)
     assert found.blend_frames == 9
 
@@ -84,7 +94,7 @@ def test_2004_eqs_1_and_2_by_hand() -> None:
     rotations = np.tile(quat.IDENTITY, (100, 14, 1))
     rotations[:, hip] = quat.from_axis_angle([1.0, 0.0, 0.0], step * np.arange(100))
     clip = Clip(RIG, np.zeros((100, 3)), rotations, 30.0)
-    found = blend_length(clip, clip, 20, 60, shortest=1, longest=30)
+    found = geodesic_length(clip, clip, 20, 60, longest=30)
     # Frame i+t-1 meets frame j-b+t: j-i-b+1 frames apart for every t, by half of the angle.
     expected = [(0.5 * step * (60 - 20 - b + 1)) ** 2 for b in range(1, 31)]
     np.testing.assert_allclose(found.costs, expected, rtol=1e-12)

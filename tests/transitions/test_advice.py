@@ -10,7 +10,8 @@ from study.errors import TransitionError
 from study.motion.clip import Clip, sample
 from study.motion.library import open_library
 from study.transitions.advice import advise, is_cyclic, just_noticeable, own_time
-from study.transitions.blend_length import blend_length
+from study.transitions.blend_length import fixed_length, geodesic_length
+from study.transitions.methods.registry import LENGTHS
 
 # 2004 sections 4.3 and 4.4: what its studies two and three were about.
 CYCLIC = ("walk_slow", "walk", "walk_fast", "jog", "run", "run_fast", "stand_to_walk", "walk_to_stop")
@@ -55,10 +56,10 @@ def test_advice_is_the_methods_own_length_at_its_point(make_walk: Callable[..., 
     for cyclic, method in (((True, False), "geodesic"), ((False, False), "velocity")):
         found = advise(source, destination, cyclic=cyclic)
         assert found.method == method
-        own = blend_length(source, destination, found.start_frame, found.end_frame, method=method)
+        own = LENGTHS[method]().at(source, destination, found.start_frame, found.end_frame)
         assert found.blend_frames == own.blend_frames
         assert found.cost == pytest.approx(own.cost, abs=1e-12)
-        fixed = blend_length(source, destination, found.start_frame, found.end_frame, method="fixed")
+        fixed = fixed_length(source, destination, found.start_frame, found.end_frame)
         assert found.default_cost == pytest.approx(fixed.cost)
         assert found.difference_frames == found.blend_frames - 10
         assert found.jnd == pytest.approx(just_noticeable(found.difference_frames / 30))
@@ -71,14 +72,14 @@ def test_two_walks_out_of_phase_are_joined_in_phase(make_walk: Callable[..., Cli
     source, destination = make_walk(150), make_walk(150, phase=2.0)
     found = advise(source, destination)
     assert found.why == "both motions are cyclic"
-    assert found.cost < 0.02 * np.mean(blend_length(source, destination, 60, 89).costs)
+    assert found.cost < 0.02 * np.mean(geodesic_length(source, destination, 60, 89).costs)
 
 
 def test_short_clips_say_so(make_walk: Callable[..., Clip]) -> None:
     short = make_walk(45, name="short")
     found = advise(short, short, cyclic=(True, True))
     assert "the clips supply blends of up to 24 frames; 60 were asked for" in found.note
-    own = blend_length(short, short, found.start_frame, found.end_frame)
+    own = geodesic_length(short, short, found.start_frame, found.end_frame)
     assert (own.blend_frames, own.cost) == (found.blend_frames, found.cost)
     with pytest.raises(TransitionError, match="found 18 in tiny"):
         advise(make_walk(18, name="tiny"), make_walk(90), cyclic=(True, True))

@@ -9,7 +9,7 @@ import pytest
 from study.errors import TransitionError
 from study.motion.clip import Clip
 from study.transitions.batch import geodesic_lengths, velocity_lengths
-from study.transitions.blend_length import blend_length
+from study.transitions.blend_length import BlendLength, geodesic_length, velocity_length
 
 
 def test_many_at_once_are_what_they_are_one_by_one(make_walk: Callable[..., Clip]) -> None:
@@ -18,19 +18,10 @@ def test_many_at_once_are_what_they_are_one_by_one(make_walk: Callable[..., Clip
     starts, ends = rng.integers(0, 141, 60), rng.integers(59, 180, 60)
     lengths, costs = geodesic_lengths(source, destination, starts, ends)
     for i, j, length, cost in zip(starts, ends, lengths, costs, strict=True):
-        one = blend_length(source, destination, int(i), int(j))
+        one = geodesic_length(source, destination, int(i), int(j))
         assert one.costs is not None
         assert one.costs[length - 1] == pytest.approx(one.cost, abs=1e-13)
         assert cost == pytest.approx(one.cost, abs=1e-13)
-
-
-def test_a_range_of_lengths_is_kept(make_walk: Callable[..., Clip]) -> None:
-    walk, other = make_walk(100), make_walk(100, phase=2.0)
-    lengths, costs = geodesic_lengths(walk, other, [10, 20], [80, 90], shortest=5, longest=12)
-    for k, (i, j) in enumerate([(10, 80), (20, 90)]):
-        one = blend_length(walk, other, i, j, shortest=5, longest=12)
-        assert lengths[k] == one.blend_frames
-        assert costs[k] == pytest.approx(one.cost, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -49,31 +40,32 @@ def test_a_range_of_lengths_is_kept(make_walk: Callable[..., Clip]) -> None:
 def test_frames_that_are_not_there_are_counted(
     make_walk: Callable[..., Clip], starts: list[int], ends: list[int], message: str
 ) -> None:
+    # At 1800 frames a second the shortest blend takes 60 frames.
     with pytest.raises(TransitionError, match=message):
-        geodesic_lengths(make_walk(100), make_walk(100), starts, ends, shortest=60)
+        geodesic_lengths(make_walk(100, 1800.0), make_walk(100, 1800.0), starts, ends)
 
 
 def test_velocity_lengths_are_those_found_one_by_one(make_walk: Callable[..., Clip]) -> None:
     source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
     rng = np.random.default_rng(2)
     starts, ends = rng.integers(0, 60, 40), rng.integers(29, 80, 40)
-    lengths, costs = velocity_lengths(source, destination, starts, ends, longest=30)
+    lengths, costs = velocity_lengths(source, destination, starts, ends)
     for i, j, length, cost in zip(starts, ends, lengths, costs, strict=True):
-        one = blend_length(source, destination, int(i), int(j), method="velocity", longest=30)
+        one = velocity_length(source, destination, int(i), int(j))
         assert length == one.blend_frames
         assert cost == pytest.approx(one.cost, abs=1e-12)
 
 
-@pytest.mark.parametrize(("method", "find"), [("geodesic", geodesic_lengths), ("velocity", velocity_lengths)])
+@pytest.mark.parametrize(("length", "find"), [(geodesic_length, geodesic_lengths), (velocity_length, velocity_lengths)])
 def test_near_the_ends_of_clips_lengths_are_held_as_they_are_one_by_one(
-    make_walk: Callable[..., Clip], method: str, find: Callable[..., Any]
+    make_walk: Callable[..., Clip], length: Callable[..., BlendLength], find: Callable[..., Any]
 ) -> None:
     source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
     rng = np.random.default_rng(7)
     starts, ends = rng.integers(0, 90, 80), rng.integers(0, 80, 80)
     starts[:2], ends[:2] = (89, 0), (0, 0)
     lengths, costs = find(source, destination, starts, ends)
-    for i, j, length, cost in zip(starts, ends, lengths, costs, strict=True):
-        one = blend_length(source, destination, int(i), int(j), method=method)
-        assert length == one.blend_frames <= min(90 - i, j + 1)
+    for i, j, frames, cost in zip(starts, ends, lengths, costs, strict=True):
+        one = length(source, destination, int(i), int(j))
+        assert frames == one.blend_frames <= min(90 - i, j + 1)
         assert cost == pytest.approx(one.cost, abs=1e-12)

@@ -11,7 +11,7 @@ import pytest
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, moved, resample, trim
 from study.motion.readers.registry import read_clip
-from study.transitions.blend_length import blend_length, joint_costs
+from study.transitions.blend_length import geodesic_length, joint_costs
 from study.transitions.blending import blend, cut, facing
 from study.transitions.flaws import find_flaws
 from study.transitions.footskate import plant_feet
@@ -43,7 +43,7 @@ def clips(mocap: Path) -> Any:
 
 def chosen(clips: Any, name: str) -> Any:
     source, destination, start, end = PAIRS[name]
-    length = blend_length(clips[source], clips[destination], start, end)
+    length = geodesic_length(clips[source], clips[destination], start, end)
     return clips[source], clips[destination], start, end, length.blend_frames
 
 
@@ -98,7 +98,7 @@ def test_the_feet_of_a_walk_bear_weight_in_turn(clips: Any) -> None:
 def test_walking_has_the_cost_curve_of_2004_figures_3_and_5(clips: Any) -> None:
     """One deep minimum a cycle, a little over a second apart, on which hips and knees agree."""
     source, destination, start, end = clips["16_15"], clips["16_16"], 35, 75
-    found = blend_length(source, destination, start, end)
+    found = geodesic_length(source, destination, start, end)
     assert found.costs is not None
     low = 1 + np.flatnonzero((found.costs[1:-1] < found.costs[:-2]) & (found.costs[1:-1] < found.costs[2:]))
     assert len(low) == 2
@@ -112,7 +112,7 @@ def test_walking_has_the_cost_curve_of_2004_figures_3_and_5(clips: Any) -> None:
 def test_a_warp_finds_a_pair_of_lengths_that_costs_no_more(clips: Any) -> None:
     for source, destination, start, end in PAIRS.values():
         pair = clips[source], clips[destination]
-        plain = blend_length(*pair, start, end, longest=20)
+        plain = geodesic_length(*pair, start, end, longest=20)
         warped = warp_length(*pair, start, end, longest=20)
         assert warped.cost <= plain.cost + 1e-12
 
@@ -120,7 +120,7 @@ def test_a_warp_finds_a_pair_of_lengths_that_costs_no_more(clips: Any) -> None:
 def test_turning_a_clip_on_the_floor_changes_no_length_and_no_pose(clips: Any) -> None:
     source, destination = clips["16_35"], clips["16_41"]
     turned = moved(destination, np.radians(170), np.array([4.0, 0.0, -2.0]))
-    lengths = [blend_length(source, clip, 12, 30).blend_frames for clip in (turned, destination)]
+    lengths = [geodesic_length(source, clip, 12, 30).blend_frames for clip in (turned, destination)]
     assert lengths[0] == lengths[1]
     np.testing.assert_allclose(
         joint_positions(blend(source, turned, 12, 30, 15).clip),

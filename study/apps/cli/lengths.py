@@ -23,15 +23,14 @@ def show_lengths(
     """The geodesic cost of each length, of all joints and of each (2004 Figures 2, 3, 5), as a picture or as CSV."""
     import numpy as np
 
-    from study.transitions.blend_length import blend_length as choose
-    from study.transitions.blend_length import joint_costs
+    from study.transitions.blend_length import geodesic_length, joint_costs
     from study.transitions.distances import frame_distance
     from study.transitions.weights import MAJOR_ROLES, joint_weights
     from study.transitions.windows import window
 
     weights, specification = options
     longest = None if chosen.blend_frames <= 2 * source.fps else chosen.blend_frames
-    curve = choose(source, destination, *points, longest=longest, weights=weights, specification=specification)
+    curve = geodesic_length(source, destination, *points, longest=longest, weights=weights, specification=specification)
     if curve.lengths is None or curve.costs is None:
         raise AssertionError("the geodesic method gives the cost of every length")
     joints = np.array([source.skeleton.role(role) for role in MAJOR_ROLES])

@@ -79,8 +79,7 @@ def blend_length(
     SRC and DST are motion files, or names of motions in --library.
     """
     from study.apps.cli.lengths import show_lengths, show_warped
-    from study.transitions.blend_length import blend_length as choose
-    from study.transitions.blend_length import major_joint_differences
+    from study.transitions.blend_length import BlendLength, major_joint_differences
     from study.transitions.timewarp import warp_length
 
     if out is not None and out.suffix.lower() not in (".png", ".csv"):
@@ -95,16 +94,9 @@ def blend_length(
         if out is not None:
             show_warped(found, fps, out, words)
     else:
-        found = choose(
-            first,
-            second,
-            start,
-            end,
-            method=method,
-            fixed_frames=fixed_frames,
-            weights=weights,
-            specification=specification,
-        )
+        length = LENGTHS[method].with_settings({"fixed_frames": fixed_frames})
+        found = length.at(first, second, start, end, weights=weights, specification=specification)
+        assert isinstance(found, BlendLength), "a length of one window"
         result = {"costs": found.costs, "joint": found.joint, "unclipped_s": found.unclipped_s}
         if out is not None:
             show_lengths(first, second, (start, end), found, out, (weights, specification), words)
@@ -249,7 +241,6 @@ def join(
 
     `shorter` has blends of joints' own, by role; `switch` takes the place of the blend.
     """
-    from study.transitions.blend_length import blend_length as choose
     from study.transitions.blending import blend
     from study.transitions.timewarp import warp_length, warped_blend
 
@@ -260,12 +251,13 @@ def join(
         warped = warp_length(source, destination, *points)
         return warped_blend(source, destination, *points, *warped.windows, weight=weight), warped
     chosen = None
-    if frames is None:
-        chosen = choose(source, destination, *points, method=method or "geodesic", specification=specification)
-        frames = chosen.blend_frames
+    if method is not None:
+        chosen = LENGTHS[method].at(source, destination, *points, specification=specification)
+    count = frames if chosen is None else chosen.blend_frames
+    assert count is not None, "either a method or a length is given"
     if switch is not None:
-        return switched(switch, source, destination, points, frames, source.fps), chosen
-    made = blend(source, destination, *points, frames, weight=weight, specification=specification, joint_frames=shorter)
+        return switched(switch, source, destination, points, count, source.fps), chosen
+    made = blend(source, destination, *points, count, weight=weight, specification=specification, joint_frames=shorter)
     return made, chosen
 
 

@@ -210,8 +210,13 @@ class Length(MethodPart):
     draws: ClassVar[int] = CANDIDATES
 
     @abstractmethod
-    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> BlendLength | WarpLength:
-        """The length at two points; `TransitionError` where the clips do not supply it."""
+    def at(
+        self, source: Clip, destination: Clip, start_frame: int, end_frame: int, **options: Any
+    ) -> BlendLength | WarpLength:
+        """The length at two points; `TransitionError` where the clips do not supply it.
+
+        `options` are those of the function that finds it: `weights` of joints, and for one window `specification`.
+        """
 
     def room(self, fps: float, longest_frames: int | None) -> Room:
         """What it needs around its points, where no blend beyond a length is wanted."""

@@ -16,7 +16,7 @@ from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.stimuli.stimulus import StimulusSet
 from study.motion.clip import Clip
-from study.transitions.blend_length import blend_length
+from study.transitions.blend_length import geodesic_length
 
 
 def changed(*pairs: tuple[str, str], base: str = TOY_PROTOCOL) -> Any:
@@ -192,7 +192,7 @@ def test_lengths_are_those_of_the_methods(prepared: StimulusSet, toys: ToyLibrar
             for use in (record.source, record.destination)
         ]
         assert [clip.frames for clip in clips] == [record.source.frames, record.destination.frames]
-        found = blend_length(*clips, record.source.frame, record.destination.frame, method="geodesic")
+        found = geodesic_length(*clips, record.source.frame, record.destination.frame)
         assert found.blend_frames == record.optimal_frames
         assert 4 <= found.blend_frames <= 30
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study.transitions.methods.method import Length, Room
 
@@ -19,12 +19,12 @@ class NoLength(Length):
     windows = 0
     follows = False
 
-    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> BlendLength:
+    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int, **options: Any) -> BlendLength:
         """No frames, at no known cost."""
         from study.transitions.blend_length import BlendLength
 
-        del source, destination, start_frame, end_frame
-        return BlendLength(self.name, 0, 0.0, float("nan"))
+        del source, destination, start_frame, end_frame, options
+        return BlendLength(0, 0.0, float("nan"))
 
     def room(self, fps: float, longest_frames: int | None) -> Room:
         """The points themselves."""

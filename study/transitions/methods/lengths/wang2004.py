@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from annotated_types import Ge, Le
 
@@ -24,18 +24,25 @@ class Geodesic(Length):
     words = "as long as the geodesic distance gives (2004)"
     sources = (WANG_2004,)
 
-    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> BlendLength:
+    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int, **options: Any) -> BlendLength:
         """The length at two points."""
-        from study.transitions.blend_length import blend_length
+        from study.transitions.blend_length import geodesic_length
 
-        return blend_length(source, destination, start_frame, end_frame, method=self.name)
+        return geodesic_length(source, destination, start_frame, end_frame, **options)
 
 
-class Velocity(Geodesic):
+class Velocity(Length):
     """The largest joint difference over that joint's speed (Eqs. 3, 4)."""
 
     name = "velocity"
     words = "as long as joint velocities give (2004)"
+    sources = (WANG_2004,)
+
+    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int, **options: Any) -> BlendLength:
+        """The length at two points."""
+        from study.transitions.blend_length import velocity_length
+
+        return velocity_length(source, destination, start_frame, end_frame, **options)
 
 
 @dataclass(frozen=True)
@@ -57,12 +64,11 @@ class Fixed(Length):
 
         return self.fixed_frames or default_frames(fps, FIXED_S)
 
-    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> BlendLength:
+    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int, **options: Any) -> BlendLength:
         """The length, held to what the clips supply."""
-        from study.transitions.blend_length import blend_length
+        from study.transitions.blend_length import fixed_length
 
-        frames = self.frames(source.fps)
-        return blend_length(source, destination, start_frame, end_frame, method=self.name, fixed_frames=frames)
+        return fixed_length(source, destination, start_frame, end_frame, self.frames(source.fps), **options)
 
     def room(self, fps: float, longest_frames: int | None) -> Room:
         """At least the length itself."""
@@ -89,11 +95,11 @@ class Timewarp(Length):
         2.0, "Length `timewarp`: the longer window has at most so many times the frames of the shorter one."
     )
 
-    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> WarpLength:
+    def at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int, **options: Any) -> WarpLength:
         """The pair of windows of least cost."""
         from study.transitions.timewarp import warp_length
 
-        return warp_length(source, destination, start_frame, end_frame, steepest=self.steepest)
+        return warp_length(source, destination, start_frame, end_frame, steepest=self.steepest, **options)
 
     def room(self, fps: float, longest_frames: int | None) -> Room:
         """One frame more, since a warped pose may lie before the window's first; and the exit beside a longer blend."""
