@@ -50,14 +50,8 @@ class Scale:
 
 
 def find_scale(skeleton: Skeleton) -> Scale:
-    """The unit in which a rig's legs, or else its whole body, come out nearest to an adult's.
-
-    Parameters
-    ----------
-    skeleton
-        The rig, in the file's unit.
-    """
-    leg = skeleton.leg_length if {"hip.L", "hip.R", "ankle.L", "ankle.R"} <= skeleton.roles.keys() else 0.0
+    """The unit in which the legs of a rig, itself in the file's unit, or else its body come out as an adult's would."""
+    leg = skeleton.leg_length if skeleton.has("hip", "ankle") else 0.0
     if leg > _SMALLEST:
         size, usual, plausible, what = leg, _LEG_M, _PLAUSIBLE_LEG_M, "leg"
     else:

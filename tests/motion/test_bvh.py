@@ -14,11 +14,14 @@ from scipy.spatial.transform import Rotation
 from study.errors import MotionFileError, MotionWarning
 from study.motion import quaternions as quat
 from study.motion.clip import joint_positions
+from study.motion.readers import numbers
 from study.motion.readers.bvh import read_bvh
 from study.motion.readers.bvh_writing import write_bvh
 from study.motion.readers.frame_times import frame_rate
-from study.motion.readers.numbers import parse_words, split_words
+from study.motion.readers.numbers import parse_numbers
 from study.motion.units import CMU_UNIT
+
+Bvh = Callable[[str | bytes], Path]
 
 HIERARCHY = """HIERARCHY
 ROOT Hips
@@ -41,7 +44,7 @@ ROWS = "Frames: 2\nFrame Time: 0.0083333\n1 2 3 10 20 30 40 50 60\n1 2 4 11 21 3
 
 
 @pytest.fixture
-def bvh(tmp_path: Path) -> Callable[[str | bytes], Path]:
+def bvh(tmp_path: Path) -> Bvh:
     def write(text: str | bytes) -> Path:
         path = tmp_path / "clip.bvh"
         path.write_bytes(text.encode() if isinstance(text, str) else text)
@@ -56,7 +59,7 @@ def refusal(path: Path) -> str:
     return str(caught.value)
 
 
-def test_channels_turn_in_the_order_in_which_each_joint_lists_them(bvh: Callable[[str], Path]) -> None:
+def test_channels_turn_in_the_order_in_which_each_joint_lists_them(bvh: Bvh) -> None:
     clip = read_bvh(bvh(HIERARCHY + ROWS), metres_per_unit=1.0)
     assert clip.skeleton.names == ("Hips", "Left Arm")
     assert clip.fps == 120.0
@@ -69,7 +72,7 @@ def test_channels_turn_in_the_order_in_which_each_joint_lists_them(bvh: Callable
 
 
 @pytest.mark.parametrize("newline", ["\r\n", "\r"])
-def test_line_ends_marks_tabs_and_blank_lines_change_nothing(bvh: Callable[[str | bytes], Path], newline: str) -> None:
+def test_line_ends_marks_tabs_and_blank_lines_change_nothing(bvh: Bvh, newline: str) -> None:
     plain = read_bvh(bvh(HIERARCHY + ROWS))
     messy = HIERARCHY.replace("  ", "\t") + ROWS.replace(" 20", "\t 2.0E+1 ").replace(
         "Frame Time: ", "\n\nFrame Time:\t"
@@ -81,13 +84,13 @@ def test_line_ends_marks_tabs_and_blank_lines_change_nothing(bvh: Callable[[str 
         assert np.array_equal(clip.root_positions, plain.root_positions)
 
 
-def test_a_hierarchy_on_one_line_is_read(bvh: Callable[[str], Path]) -> None:
+def test_a_hierarchy_on_one_line_is_read(bvh: Bvh) -> None:
     clip = read_bvh(bvh(HIERARCHY.replace("\n", " ").replace("Left Arm", "Arm") + ROWS))
     assert clip.skeleton.names == ("Hips", "Arm")
     assert len(clip.skeleton.end_parents) == 1
 
 
-def test_position_channels_replace_the_offset_wherever_they_stand(bvh: Callable[[str], Path]) -> None:
+def test_position_channels_replace_the_offset_wherever_they_stand(bvh: Bvh) -> None:
     text = HIERARCHY.replace(
         "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation",
         "6 Zrotation Xposition Yrotation Yposition Xrotation Zposition",
@@ -99,7 +102,7 @@ def test_position_channels_replace_the_offset_wherever_they_stand(bvh: Callable[
     assert np.allclose(quat.to_matrix(clip.rotations[0, 0]), expected, rtol=0, atol=1e-12)
 
 
-def test_a_root_without_position_or_with_one_axis_stands_at_its_offset(bvh: Callable[[str], Path]) -> None:
+def test_a_root_without_position_or_with_one_axis_stands_at_its_offset(bvh: Bvh) -> None:
     text = HIERARCHY.replace("6 Xposition Yposition Zposition", "4 Yposition").replace("OFFSET 0 0 0", "OFFSET 7 8 9")
     clip = read_bvh(bvh(text + "Frames: 1\nFrame Time: 0.01\n5 0 0 0 0 0 0\n"), metres_per_unit=1.0)
     assert clip.root_positions.tolist() == [[7.0, 5.0, 9.0]]
@@ -108,7 +111,7 @@ def test_a_root_without_position_or_with_one_axis_stands_at_its_offset(bvh: Call
     assert clip.root_positions.tolist() == [[7.0, 8.0, 9.0]]
 
 
-def test_a_joint_that_keeps_its_place_gives_a_bone_of_that_length(bvh: Callable[[str], Path]) -> None:
+def test_a_joint_that_keeps_its_place_gives_a_bone_of_that_length(bvh: Bvh) -> None:
     text = HIERARCHY.replace(
         "3 Xrotation Yrotation Zrotation", "6 Xposition Yposition Zposition Xrotation Yrotation Zrotation"
     )
@@ -124,7 +127,7 @@ def test_a_joint_that_keeps_its_place_gives_a_bone_of_that_length(bvh: Callable[
     assert clip.skeleton.end_parents.tolist() == [0, 1]
 
 
-def test_a_joint_that_moves_in_its_parent_is_warned_of(bvh: Callable[[str], Path]) -> None:
+def test_a_joint_that_moves_in_its_parent_is_warned_of(bvh: Bvh) -> None:
     text = HIERARCHY.replace("3 Xrotation", "4 Xposition Xrotation").replace(
         "  JOINT", "  End Site { OFFSET 1 0 0 }\n  JOINT"
     )
@@ -137,7 +140,7 @@ def test_a_joint_that_moves_in_its_parent_is_warned_of(bvh: Callable[[str], Path
     assert clip.skeleton.offsets[1].tolist() == [0.1, 1.0, 0.0]
 
 
-def test_a_root_that_only_carries_a_moving_joint_is_folded_into_it(bvh: Callable[[str], Path]) -> None:
+def test_a_root_that_only_carries_a_moving_joint_is_folded_into_it(bvh: Bvh) -> None:
     text = HIERARCHY.replace("CHANNELS 3 ", "CHANNELS 6 Xposition Yposition Zposition ").replace(
         "OFFSET 0 0 0", "OFFSET 9 9 9"
     )
@@ -153,14 +156,14 @@ def test_a_root_that_only_carries_a_moving_joint_is_folded_into_it(bvh: Callable
     assert "folded into 'Left Arm'" in " ".join(clip.history)
 
 
-def test_the_rows_are_trusted_where_frames_disagrees(bvh: Callable[[str], Path]) -> None:
+def test_the_rows_are_trusted_where_frames_disagrees(bvh: Bvh) -> None:
     with pytest.warns(MotionWarning, match=r"says Frames: 7, but holds 2 rows"):
         clip = read_bvh(bvh(HIERARCHY + ROWS.replace("Frames: 2", "Frames: 7")))
     assert clip.frames == 2
     assert read_bvh(bvh(HIERARCHY + ROWS.replace("Frames: 2\n", ""))).frames == 2
 
 
-def test_joints_of_one_name_are_told_apart(bvh: Callable[[str], Path]) -> None:
+def test_joints_of_one_name_are_told_apart(bvh: Bvh) -> None:
     with pytest.warns(MotionWarning, match="two joints are called 'Hips'"):
         clip = read_bvh(bvh(HIERARCHY.replace("Left Arm", "Hips") + ROWS))
     assert clip.skeleton.names == ("Hips", "Hips_2")
@@ -199,9 +202,7 @@ def test_joints_of_one_name_are_told_apart(bvh: Callable[[str], Path]) -> None:
         ("Frames: 2", "Frames: two", ":17:9", "Expected the number of frames"),
     ],
 )
-def test_what_cannot_be_read_is_refused_with_its_place(
-    bvh: Callable[[str], Path], old: str, new: str, place: str, message: str
-) -> None:
+def test_what_cannot_be_read_is_refused_with_its_place(bvh: Bvh, old: str, new: str, place: str, message: str) -> None:
     text = HIERARCHY + ROWS
     assert old in text
     found = refusal(bvh(text.replace(old, new, 1)))
@@ -220,7 +221,7 @@ def test_what_cannot_be_read_is_refused_with_its_place(
         ((HIERARCHY + "Frames: 0\nFrame Time: 0.01\n").encode(), "Expected data rows after 'Frame Time:', found none"),
     ],
 )
-def test_files_that_hold_no_motion_are_refused(bvh: Callable[[bytes], Path], raw: bytes, message: str) -> None:
+def test_files_that_hold_no_motion_are_refused(bvh: Bvh, raw: bytes, message: str) -> None:
     assert message in refusal(bvh(raw))
 
 
@@ -228,36 +229,30 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     assert "No such file" in refusal(tmp_path / "none.bvh")
 
 
-def test_the_place_is_right_with_other_line_ends_and_a_mark(bvh: Callable[[bytes], Path]) -> None:
+def test_the_place_is_right_with_other_line_ends_and_a_mark(bvh: Bvh) -> None:
     text = (HIERARCHY + ROWS).replace("41 51 61", "41 5x 61")
     assert "clip.bvh:20:19: " in refusal(bvh(text.replace("\n", "\r\n").encode("utf-8-sig")))
     assert "clip.bvh:20:19: " in refusal(bvh(text.replace("\n", "\r").encode()))
 
 
-@pytest.mark.parametrize(
-    ("printed", "fps"),
-    [
-        ("0.0083333", 120.0),
-        (".0083333", 120.0),
-        ("8.33333e-03", 120.0),
-        ("0.008333333333333333", 120.0),
-        ("0.0083", 120.0),
-        ("0.033333", 30.0),
-        ("0.033", 30.0),
-        ("0.03333333333333333", 30.0),
-        ("0.041666666666666664", 24.0),
-        ("0.0333667", 30000 / 1001),
-        ("0.0417083", 24000 / 1001),
-        ("0.01666667", 60.0),
-        ("0.025000", 40.0),
-        ("0.04", 25.0),
-        ("0.0142857", 70.0),
-        ("0.0123", 81.0),
-        ("0.01234", 1 / 0.01234),
-        ("0.03125", 32.0),
-        ("0.0331", 1 / 0.0331),
-    ],
-)
+PRINTED = {
+    120.0: "0.0083333 .0083333 8.33333e-03 0.008333333333333333 0.0083",
+    60.0: "0.01666667",
+    30.0: "0.033333 0.033 0.03333333333333333",
+    24.0: "0.041666666666666664",
+    30000 / 1001: "0.0333667",
+    24000 / 1001: "0.0417083",
+    40.0: "0.025000",
+    25.0: "0.04",
+    70.0: "0.0142857",
+    81.0: "0.0123",
+    32.0: "0.03125",
+    1 / 0.01234: "0.01234",
+    1 / 0.0331: "0.0331",
+}
+
+
+@pytest.mark.parametrize(("printed", "fps"), [(each, fps) for fps, words in PRINTED.items() for each in words.split()])
 def test_a_printed_frame_time_means_the_rate_that_its_digits_allow(printed: str, fps: float) -> None:
     assert frame_rate(printed) == pytest.approx(fps, rel=1e-15)
 
@@ -268,44 +263,45 @@ def test_the_examples_in_the_docstrings_run() -> None:
     assert result.failed == 0
 
 
-def test_fast_numbers_are_the_doubles_that_float_gives() -> None:
+def test_fast_numbers_are_the_doubles_that_float_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(5)
     formats = ["%.4f", "%.6f", "%g", "%.10g", "%.15g", "%.17g", "%e", "%+.3f", "%.0f", "%.12f", "%.3E"]
-    values = np.concatenate([rng.uniform(-200, 200, 4000), rng.normal(0, 1e-3, 4000), rng.normal(0, 1e9, 4000)])
+    values = np.concatenate([rng.uniform(-200, 200, 4000), rng.normal(0, 1e-3, 4000), rng.normal(0, 1e8, 4000)])
     words = [formats[k % len(formats)] % value for k, value in enumerate(values)]
-    words += [".5", "-.5", "5.", "-0", "+1", "00012.50", "123456789012345", "1234567890123456", "1e-300", "1E5"]
-    assert parse_words(*split_words(" ".join(words).encode())).tolist() == [float(word) for word in words]
+    words += [".5", "-.5", "5.", "-0", "+1", "1E5", "00012.50", "123456789.012345", "12345.67890123456"]
+    words += ["1e-300", "2.2250738585072011e-308"]
+    for large in (0, 1_000_000):
+        monkeypatch.setattr(numbers, "_LARGE", large)
+        table = parse_numbers(" ".join(words).encode())
+        assert table is not None
+        assert table.tolist() == [[float(word) for word in words]]
 
 
-@pytest.mark.parametrize(
-    "word",
-    [
-        "-",
-        ".",
-        "-.",
-        "1.2.3",
-        "1-2",
-        "--1",
-        "1_0",
-        "nan",
-        "inf",
-        "1e",
-        "e5",
-        "0x10",
-        "1.2345678.9",
-        "1/2",
-        "1:",
-        "1..",
-        "+-1",
-        "1e+-5",
-        "1e1.5",
-    ],
+NO_NUMBERS = (
+    "- . -. 1.2.3 1-2 --1 1_0 nan NaN inf Infinity 1e e5 0x10 1.2345678.9 1/2 1: 1.. +-1 1e+-5 1e1.5 True 1e10 NA '1'"
 )
-def test_fast_numbers_know_what_is_none(word: str) -> None:
-    assert np.isnan(parse_words(*split_words(f"1.5 {word} 2.5".encode()))[1])
 
 
-def test_writing_and_reading_gives_the_same_motion(tmp_path: Path, bvh: Callable[[str], Path]) -> None:
+@pytest.mark.parametrize("word", NO_NUMBERS.split())
+def test_fast_numbers_know_what_is_none(monkeypatch: pytest.MonkeyPatch, word: str) -> None:
+    for large in (0, 1_000_000):
+        monkeypatch.setattr(numbers, "_LARGE", large)
+        assert parse_numbers(f"1.5 {word} 2.5".encode()) is None
+        assert parse_numbers(f"1.5 1 2.5\n1.5 {word} 2.5\n".encode()) is None
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_large_and_small_tables_are_read_alike(monkeypatch: pytest.MonkeyPatch, newline: str) -> None:
+    for large in (0, 1_000_000):
+        monkeypatch.setattr(numbers, "_LARGE", large)
+        table = parse_numbers(newline.join(["", " 1\t2 ", "", "3  4", "  "]).encode())
+        assert table is not None
+        assert table.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+        for ragged in ("1 2", "3"), ("1", "2 3"), ("1 2", "3 4 5"):
+            assert parse_numbers(newline.join(ragged).encode()) is None
+
+
+def test_writing_and_reading_gives_the_same_motion(tmp_path: Path, bvh: Bvh) -> None:
     clip = read_bvh(bvh(HIERARCHY + ROWS), metres_per_unit=1.0)
     path = tmp_path / "out.bvh"
     write_bvh(clip, path, metres_per_unit=0.01)
@@ -317,9 +313,7 @@ def test_writing_and_reading_gives_the_same_motion(tmp_path: Path, bvh: Callable
 
 
 @pytest.mark.parametrize("unit", [1.0, 0.01, 0.0254, CMU_UNIT])
-def test_a_file_is_written_in_the_unit_that_it_was_read_in(
-    tmp_path: Path, bvh: Callable[[str], Path], unit: float
-) -> None:
+def test_a_file_is_written_in_the_unit_that_it_was_read_in(tmp_path: Path, bvh: Bvh, unit: float) -> None:
     write_bvh(read_bvh(bvh(HIERARCHY + ROWS), metres_per_unit=unit), tmp_path / "out.bvh")
     assert "OFFSET 0 0.5 0" in (tmp_path / "out.bvh").read_text()
 
@@ -336,9 +330,7 @@ def test_a_file_is_written_in_the_unit_that_it_was_read_in(
         ("16", 60.0, "milliseconds"),
     ],
 )
-def test_a_frame_time_that_is_none_is_read_as_what_it_must_be(
-    bvh: Callable[[str], Path], stated: str, fps: float, words: str
-) -> None:
+def test_a_frame_time_that_is_none_is_read_as_what_it_must_be(bvh: Bvh, stated: str, fps: float, words: str) -> None:
     path = bvh(HIERARCHY + ROWS.replace("0.0083333", stated))
     with pytest.warns(MotionWarning, match=rf"Frame Time:', found {stated}; read as .*{words}, so at {fps:g} fps"):
         assert read_bvh(path).fps == fps
@@ -346,15 +338,13 @@ def test_a_frame_time_that_is_none_is_read_as_what_it_must_be(
 
 
 @pytest.mark.parametrize("stated", ["1", "2", "10", "20", "40"])
-def test_a_frame_time_that_may_be_anything_is_refused(bvh: Callable[[str], Path], stated: str) -> None:
+def test_a_frame_time_that_may_be_anything_is_refused(bvh: Bvh, stated: str) -> None:
     said = refusal(bvh(HIERARCHY + ROWS.replace("0.0083333", stated)))
     assert f"Expected the seconds between frames after 'Frame Time:', found {stated}" in said
     assert "`fps` in library.toml" in said
 
 
-def test_an_interrupted_write_leaves_the_old_file(
-    tmp_path: Path, bvh: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path, bvh: Bvh, monkeypatch: pytest.MonkeyPatch) -> None:
     clip = read_bvh(bvh(HIERARCHY + ROWS))
     path = tmp_path / "out.bvh"
     path.write_text("old")
@@ -369,7 +359,7 @@ def test_an_interrupted_write_leaves_the_old_file(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["clip.bvh", "out.bvh"]
 
 
-def test_a_folder_that_is_not_there_is_made(tmp_path: Path, bvh: Callable[[str], Path]) -> None:
+def test_a_folder_that_is_not_there_is_made(tmp_path: Path, bvh: Bvh) -> None:
     clip = read_bvh(bvh(HIERARCHY + ROWS))
     write_bvh(clip, tmp_path / "none" / "out.bvh")
     assert read_bvh(tmp_path / "none" / "out.bvh").frames == clip.frames

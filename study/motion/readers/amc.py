@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from study.arrays import FloatArray, IntArray
+from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import MotionFileError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, refuse_large, with_roles
 from study.motion.readers.asf import LINE, ROOT, Body, Bone, fixed_axes, read_asf
-from study.motion.readers.numbers import ByteArray, are_usable, parse_words, split_words
+from study.motion.readers.numbers import parse_numbers
 from study.motion.readers.source import Source, number, read_source, shown, whole_number
 from study.motion.skeleton import Skeleton
 from study.motion.units import INCH, find_scale
@@ -41,17 +41,13 @@ def read_amc(
 
     Parameters
     ----------
-    path
-        The `.amc` file.
+    path, fps, mapping
+        As `study.motion.readers.registry.read_clip` takes them.
     asf
         The skeleton; by default `16.asf` beside `16_15.amc`, else the only `.asf` in the folder.
     metres_per_unit
         Metres in a unit of the file. By default the ASF's `:units length` (0.45 for CMU) divides an inch, unless that
         gives a body of no human size: then the unit is found from its size.
-    fps
-        Frames per second, which AMC files don't state; by default 120, at which the CMU database was captured.
-    mapping
-        Joint names by role, as `study.motion.rigs.find_roles` takes them.
 
     Raises
     ------
@@ -108,44 +104,30 @@ def _read_amc_header(source: Source, degrees: bool) -> tuple[bool, int]:
     raise source.error(len(source.raw.rstrip()), "Expected frames, found the end of the file. Copy it again.")
 
 
-def _parse_regular(chunk: bytes, moving: dict[str, int]) -> dict[str, FloatArray] | None:
+def _parse_regular(frames: bytes, moving: dict[str, int]) -> dict[str, FloatArray] | None:
     """The fast way, for files whose frames all list the same bones in the same order; None for any other."""
-    data, starts, stops = split_words(chunk)
-    blocks, width = _first_frame(data, starts, stops, moving)
-    if len(blocks) != len(moving) or len(starts) % width:
+    words = frames.split()
+    blocks, width = _first_frame(words, moving)
+    if len(blocks) != len(moving) or len(words) % width:
         return None
-    starts, stops = starts.reshape(-1, width), stops.reshape(-1, width)
-    for name, column in blocks.items():
-        letters = np.frombuffer(name.encode(), dtype=np.uint8)
-        at = starts[:, column]
-        if not np.all(stops[:, column] - at == len(letters)):
+    for name, column in reversed(blocks.items()):
+        if set(words[column::width]) != {name.encode()}:
             return None
-        if not np.all(data[at[:, None] + np.arange(len(letters))] == letters):
-            return None
-    columns = np.setdiff1d(np.arange(width), list(blocks.values()))
-    # Some hundred frames at a time stay in the processor's cache.
-    pieces = [slice(first, first + 256) for first in range(0, len(starts), 256)]
-    table = np.concatenate(
-        [parse_words(data, starts[p][:, columns].ravel(), stops[p][:, columns].ravel()) for p in pieces]
-    )
-    table = table.reshape(-1, len(columns))
-    if not are_usable(table) or not np.array_equal(table[:, 0], np.arange(1, len(table) + 1)):
+        del words[column::width]
+        width -= 1
+    table = parse_numbers(b"\n".join(b" ".join(words[at : at + width]) for at in range(0, len(words), width)))
+    if table is None or not np.array_equal(table[:, 0], np.arange(1, len(table) + 1)):
         return None
-    values: dict[str, FloatArray] = {}
-    for name, column in blocks.items():
-        first = int(np.searchsorted(columns, column))
-        values[name] = table[:, first : first + moving[name]]
-    return values
+    parts = np.split(table[:, 1:], np.cumsum([moving[name] for name in blocks])[:-1], axis=1)
+    return dict(zip(blocks, parts, strict=True))
 
 
-def _first_frame(
-    data: ByteArray, starts: IntArray, stops: IntArray, moving: dict[str, int]
-) -> tuple[dict[str, int], int]:
-    """The position of each bone's name among a frame's words, and how many words a frame has, by the first frame."""
+def _first_frame(words: list[bytes], moving: dict[str, int]) -> tuple[dict[str, int], int]:
+    """The position of each bone's name among the first frame's words, in order, and how many words a frame has."""
     blocks: dict[str, int] = {}
     at = 1
-    while at < len(starts):
-        name = data[starts[at] : stops[at]].tobytes().decode("utf-8", "replace")
+    while at < len(words):
+        name = words[at].decode("utf-8", "replace")
         if name not in moving or name in blocks:
             break
         blocks[name] = at

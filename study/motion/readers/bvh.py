@@ -37,19 +37,7 @@ def read_bvh(
     fps: float | None = None,
     mapping: Mapping[str, str] | None = None,
 ) -> Clip:
-    """Read a BVH file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    metres_per_unit
-        Metres in a unit of the file; by default found from the size of the body (`study.motion.units`), and said
-        in the clip's history.
-    fps
-        Frames per second in place of what the file says; said in the clip's history where they differ.
-    mapping
-        Joint names by role, as `study.motion.rigs.find_roles` takes them.
+    """Read a BVH file; parameters as `study.motion.readers.registry.read_clip` takes them.
 
     Raises
     ------
