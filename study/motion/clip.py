@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from study.arrays import FloatArray
+from study.arrays import FloatArray, IntArray
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.rigs import find_roles
@@ -184,10 +184,7 @@ def joint_positions(clip: Clip, *, ends: bool = False) -> FloatArray:
 def with_roles(clip: Clip, mapping: Mapping[str, str] | None = None) -> Clip:
     """The clip with its joints' roles found again, also from its poses; `mapping` as `rigs.find_roles` takes it."""
     some = np.unique(np.linspace(0, clip.frames - 1, min(clip.frames, _POSES)).astype(np.int64))
-    poses = joint_positions(
-        replace(clip, root_positions=clip.root_positions[some], rotations=clip.rotations[some]), ends=True
-    )
-    rig = clip.skeleton
+    poses, rig = joint_positions(picked(clip, some), ends=True), clip.skeleton
     known = find_roles(
         rig.names, rig.parents, rig.offsets, rig.end_parents, rig.end_offsets, poses=poses, mapping=mapping
     )
@@ -262,6 +259,11 @@ def trim(clip: Clip, start: int, stop: int) -> Clip:
     )
 
 
+def picked(clip: Clip, frames: IntArray | Sequence[int] | slice) -> Clip:
+    """A clip of these frames alone, in their order."""
+    return replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
+
+
 def moved(clip: Clip, yaw: float, translation: FloatArray) -> Clip:
     """The whole clip turned about the vertical through the origin by `yaw` radians, then shifted `(3,)` metres."""
     turn = quat.yaw(yaw)
@@ -295,20 +297,18 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Clip:
         notes += [f"removed joints {_some([clip.skeleton.names[j] for j in left_out])}"] if left_out else []
         added = [name for name, there in zip(skeleton.names, has, strict=True) if not there]
         notes += [f"joints at rest {_some(added)}"] if added else []
-    same = all(np.array_equal(a, b) for a, b in zip(_lengths_of(clip.skeleton), _lengths_of(skeleton), strict=True))
+    same = all(
+        np.array_equal(getattr(clip.skeleton, name), getattr(skeleton, name)) for name in ("offsets", "end_offsets")
+    )
     if same and not notes:
         return replace(clip, skeleton=skeleton, rotations=rotations)
-    legs = all({"hip.L", "hip.R", "ankle.L", "ankle.R"} <= body.roles.keys() for body in (clip.skeleton, skeleton))
+    legs = clip.skeleton.has("hip", "ankle") and skeleton.has("hip", "ankle")
     scale = skeleton.leg_length / clip.skeleton.leg_length if legs else 1.0
     notes.insert(0, f"retargeted to another skeleton of the rig, root path times {scale:.3f}")
     history = (*clip.history, ", ".join(notes))
     return replace(
         clip, skeleton=skeleton, root_positions=clip.root_positions * scale, rotations=rotations, history=history
     )
-
-
-def _lengths_of(skeleton: Skeleton) -> tuple[FloatArray, FloatArray]:
-    return skeleton.offsets, skeleton.end_offsets
 
 
 def _some(names: Sequence[str]) -> str:

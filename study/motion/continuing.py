@@ -17,9 +17,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from study.arrays import BoolArray, FloatArray
+from study.arrays import BoolArray, FloatArray, runs
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, joint_positions, moved
+from study.motion.clip import Clip, joint_positions, moved, picked
 from study.motion.feet import heading, stance
 from study.motion.legs import knee_bend, knee_hinge, lowered, reach
 from study.motion.mirror import mirror
@@ -207,9 +207,8 @@ def _with_planted_feet(base: _Period, within: FloatArray) -> Clip:
 
 def _contacts(planted: BoolArray, shortest: int) -> list[tuple[int, int]]:
     """Stretches of planted rows, as slices count them; shorter gaps between them are closed, shorter ones dropped."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], planted.astype(np.int8), [0]])))
     contacts: list[tuple[int, int]] = []
-    for start, stop in edges.reshape(-1, 2).tolist():
+    for start, stop in runs(planted):
         if contacts and start - contacts[-1][1] < shortest:
             contacts[-1] = (contacts[-1][0], stop)
         else:
@@ -280,9 +279,7 @@ def _base_period(clip: Clip, period: float, isometry: _Isometry) -> _Period:
     """The last period, corrected so that it begins as the inverse of the isometry has the clip's end."""
     count = _slope_frames(clip.fps, int(clip.frames - period))
     ends: FloatArray = clip.frames - 1.0 - np.arange(count, dtype=np.float64)[::-1]
-    there = isometry.inverse().of(
-        replace(clip, root_positions=clip.root_positions[-count:], rotations=clip.rotations[-count:])
-    )
+    there = isometry.inverse().of(picked(clip, slice(-count, None)))
     here = smooth_sample(clip, ends - period)
     facing_there, facing_here = heading(there), heading(here)
     turned = facing_there - facing_here

@@ -18,7 +18,7 @@ import numpy as np
 from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import MotionError
-from study.motion.clip import Clip, joint_positions
+from study.motion.clip import Clip, joint_positions, picked
 from study.motion.continuing import carry_on, linger
 from study.motion.feet import heading
 
@@ -80,15 +80,12 @@ class Cycle:
 class Extension:
     """A continued clip: its frames `added_before` to `added_before + frames - 1` are the clip as it was.
 
-    `cycles_before` and `cycles_after` count whole gait cycles and fractions of them; 0 for standing. `note` says
-    all of it in words, for the manifest.
+    `note` says it in words, with the number of gait cycles, for the manifest.
     """
 
     clip: Clip
     added_before: int
     added_after: int
-    cycles_before: float
-    cycles_after: float
     note: str
 
 
@@ -106,8 +103,7 @@ def find_cycle(clip: Clip, at: End = "end") -> Cycle | None:
     if at not in ("start", "end"):
         raise MotionError(f"Expected 'start' or 'end' of the clip, got {at!r}.")
     clip = reversed_in_time(clip) if at == "start" else clip
-    needed = {f"{role}.{side}" for role in ("hip", "knee", "ankle") for side in "LR"}
-    if not needed <= set(clip.skeleton.roles):
+    if not clip.skeleton.has("hip", "knee", "ankle"):
         return None
     still = _still_frames(clip)
     if still >= max(3, round(_STILL_S * clip.fps)):
@@ -134,7 +130,7 @@ def extend(clip: Clip, *, frames_before: int = 0, frames_after: int = 0) -> Exte
     """
     if frames_before < 0 or frames_after < 0:
         raise MotionError(f"Expected numbers of frames from 0 to add, got {frames_before} and {frames_after}.")
-    result, notes, cycles = clip, [], {"start": 0.0, "end": 0.0}
+    result, notes = clip, []
     # The end first: what is added there is not used for the start.
     wanted: tuple[tuple[End, int], ...] = (("end", frames_after), ("start", frames_before))
     for at, frames in wanted:
@@ -145,17 +141,16 @@ def extend(clip: Clip, *, frames_before: int = 0, frames_after: int = 0) -> Exte
             raise MotionError(_refusal(clip, at, frames))
         added = _continuation(clip, cycle, frames)
         result = _joined(result, added, at)
-        cycles[at] = 0.0 if cycle.kind == "still" else frames / cycle.cycle_frames
         notes.append(_words(clip, cycle, frames))
     note = "; ".join(reversed(notes))
     if note:
         result = replace(result, history=(*clip.history, note))
-    return Extension(result, frames_before, frames_after, cycles["start"], cycles["end"], note)
+    return Extension(result, frames_before, frames_after, note)
 
 
 def reversed_in_time(clip: Clip) -> Clip:
     """The clip played backwards."""
-    return replace(clip, root_positions=clip.root_positions[::-1], rotations=clip.rotations[::-1])
+    return picked(clip, slice(None, None, -1))
 
 
 def _continuation(clip: Clip, cycle: Cycle, frames: int) -> Clip:

@@ -125,7 +125,7 @@ def _end_defects(found: Jumps) -> list[Defect]:
 def _is_t_pose(clip: Clip, frame: int) -> bool:
     """Whether both arms stretch out sideways, level and straight, and the legs stand straight."""
     roles = clip.skeleton.roles
-    if not all(f"{part}.{side}" in roles for part in ("hip", "ankle", "shoulder", "elbow", "wrist") for side in "LR"):
+    if not clip.skeleton.has("hip", "ankle", "shoulder", "elbow", "wrist"):
         return False
     pose = joint_positions(trim(clip, frame, frame + 1))[0]
 

@@ -42,7 +42,7 @@ def figure_for(
     """
     from renderer.figure import make_figure
 
-    height_m = skeleton.leg_length / LEG_SHARE if {"ankle.L", "ankle.R"} <= skeleton.roles.keys() else None
+    height_m = skeleton.leg_length / LEG_SHARE if skeleton.has("ankle") else None
     return make_figure(
         skeleton.bones,
         skeleton.sides,

@@ -61,16 +61,6 @@ class Entry:
     genre: str = ""
     """Times of its beats in seconds from the file's first frame, and what kind of dance it is."""
 
-    @property
-    def cyclic_start(self) -> bool:
-        """Whether the motion can be continued backwards from its start."""
-        return bool(self.start)
-
-    @property
-    def cyclic_end(self) -> bool:
-        """Whether the motion can be continued beyond its end."""
-        return bool(self.end)
-
 
 # -- From files to entries ------------------------------------------------------------------------------------------
 
@@ -269,8 +259,7 @@ def prepared(entry: Entry, *, as_is: bool = False) -> Clip:
         clip = clip.noting(told((*added, *defects), kept=as_is, first_frame=round(clip.start_s * clip.fps)))
     if entry.mirrored:
         clip = mirror(clip)
-    has_legs = {"hip.L", "hip.R", "ankle.L", "ankle.R"} <= set(clip.skeleton.roles)
-    if has_legs and not as_is:
+    if clip.skeleton.has("hip", "ankle") and not as_is:
         clip = grounded(faced(clip))
     return replace(clip, name=entry.name)
 

@@ -36,6 +36,14 @@ def foot_points(clip: Clip) -> tuple[FloatArray, FloatArray]:
     return feet[0], feet[1]
 
 
+def toes(clip: Clip) -> FloatArray:
+    """The joint of each foot's toes, `(frames, 2, 3)`, left then right, or the ankle where there is none; metres."""
+    roles = clip.skeleton.roles
+    found = [roles.get(f"toe.{side}", clip.skeleton.role(f"ankle.{side}")) for side in "LR"]
+    positions: FloatArray = joint_positions(clip)[:, found]
+    return positions
+
+
 def horizontal_speeds(points: FloatArray, fps: float) -> FloatArray:
     """Speed over the floor of points `(frames, ..., 3)`, m/s, `(frames, ...)`; zero for a single frame."""
     if len(points) < 2:

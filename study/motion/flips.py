@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.arrays import BoolArray, FloatArray, IntArray
+from study.arrays import FloatArray, IntArray, runs
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.skeleton import Skeleton
@@ -66,9 +66,8 @@ def leg_flips(clip: Clip, side: str, jumps: IntArray) -> LegFlips:
     for index, k in enumerate(jumps.tolist()):
         if flipped[index] == flipped[index + 1]:
             _spread(clip, hip, angles, k, float(turns[index]))
-    runs = _runs(angles != 0.0)
     size = float(np.max(2.0 * quat.half_angle_between(rotations[jumps, hip], rotations[jumps - 1, hip])))
-    return LegFlips(side, runs, angles, size)
+    return LegFlips(side, tuple(runs(angles != 0.0)), angles, size)
 
 
 def turn_back(clip: Clip, rotations: FloatArray, flips: LegFlips) -> None:
@@ -157,8 +156,3 @@ def _spread(clip: Clip, hip: int, angles: FloatArray, jump: int, turn: float) ->
     else:
         stop = min(jump + width, clip.frames)
         angles[jump:stop] += turn * np.arange(stop - jump, 0, -1) / (stop - jump)
-
-
-def _runs(mask: BoolArray) -> tuple[tuple[int, int], ...]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return tuple((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))

@@ -12,7 +12,7 @@ import numpy as np
 
 from study.arrays import FloatArray
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, global_rotations, joint_positions
+from study.motion.clip import Clip, global_rotations, joint_positions, picked
 
 # A leg may reach this share of its length, or as far as it reached before.
 FULL_REACH = 0.995
@@ -38,7 +38,7 @@ def reach(clip: Clip, shifts: FloatArray) -> Clip:
     rotations = clip.rotations.copy()
     frames = np.flatnonzero(np.any(shifts != 0.0, axis=(1, 2)))
     if len(frames):
-        part = replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
+        part = picked(clip, frames)
         positions, world = joint_positions(part), global_rotations(part)
         for foot, side in enumerate("LR"):
             leg = [clip.skeleton.role(f"{joint}.{side}") for joint in ("hip", "knee", "ankle")]

@@ -137,7 +137,7 @@ class Library(ABC):
 def _from_file(entry: Entry, fps: float | None, min_seconds: float | None, as_is: bool) -> Clip:
     """A captured motion from its file."""
     clip = prepared(entry, as_is=as_is)
-    if min_seconds is not None and clip.seconds < min_seconds and entry.cyclic_end:
+    if min_seconds is not None and clip.seconds < min_seconds and entry.end:
         clip = extend(clip, frames_after=ceil(min_seconds * clip.fps) - clip.frames).clip
     return clip if fps is None else resample(clip, fps)
 
@@ -182,20 +182,16 @@ class SyntheticLibrary(Library):
     acknowledgement = "The motions are synthetic: a program generated them, nobody was captured."
 
     def names(self) -> tuple[str, ...]:
-
-        return tuple(synthetic.NAMES)
+        return synthetic.NAMES
 
     def entry(self, name: str) -> Entry:
         if name not in self.names():
             raise MotionError(_unknown(name, self.names(), "the synthetic library"))
-
         about = synthetic.describe(name)
-        start: Boundary = "gait" if about.cyclic_start else ""
-        end: Boundary = "gait" if about.cyclic_end else ""
-        return Entry(name, about.kind, f"synthetic: {about.line}", start, end)
+        ends: tuple[Boundary, Boundary] = ("gait" if about.cyclic[0] else "", "gait" if about.cyclic[1] else "")
+        return Entry(name, about.kind, f"synthetic: {about.line}", *ends)
 
     def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
-
         return synthetic.synthesize(entry.name, seconds=min_seconds, fps=30.0 if fps is None else fps)
 
 

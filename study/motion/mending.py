@@ -1,15 +1,13 @@
-"""Clips without their defects: mended, cut to their longest clean run, or refused."""
+"""Clips without their defects."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
 from study.arrays import FloatArray
-from study.counting import counted
 from study.errors import MotionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, trim
@@ -17,70 +15,32 @@ from study.motion.defects import Defect, find_defects
 from study.motion.flips import turn_back
 from study.motion.jumps import Jumps, clusters, flipping_legs
 
-Policy = Literal["mend", "drop", "refuse", "keep"]
-
 # Joints of the fourth group are mended across any gap: they carry no weight in any cost and are hardly seen.
 _LONGEST_GAP_S = 0.3
 _BRIDGE_RAD_PER_S = 20.0
 
 
-def mend(clip: Clip, defects: Sequence[Defect] | None = None, *, policy: Policy = "mend") -> Clip:
-    """The clip with its defects dealt with; best before resampling, as single frames tell faults from fast motion.
+def mend(clip: Clip, defects: Sequence[Defect] | None = None) -> Clip:
+    """The clip mended; best before resampling, as single frames tell faults from fast motion.
 
-    Parameters
-    ----------
-    clip
-        The clip.
-    defects
-        The defects to deal with; by default all that `find_defects` finds.
-    policy
-        `"mend"`: cut off frames at the ends, turn flipped legs back, bridge short jumps by slerp, put the floor at
-        height 0. `"drop"`: keep the longest run of frames without a major defect. `"refuse"`: refuse a clip with major
-        defects. `"keep"`: change nothing.
+    Frames at the ends that are no part of the motion are cut off, flipped legs turned back, short jumps bridged by
+    slerp, and the floor is put at height 0. `defects` are those to deal with; without them, all that `find_defects`
+    finds.
 
     Raises
     ------
     MotionError
-        By `"refuse"`; by `"mend"` and `"drop"` where less than half of the clip could be kept.
+        Where less than half of the clip could be kept.
     """
-    if policy not in ("mend", "drop", "refuse", "keep"):
-        raise MotionError(f"Expected a policy out of mend, drop, refuse, keep, got {policy!r}.")
     defects = find_defects(clip) if defects is None else tuple(defects)
-    major = [d for d in defects if d.severity == "major"]
-    if policy == "keep" or not defects or (policy == "refuse" and not major):
+    if not defects:
         return clip
-    if policy == "refuse":
-        raise MotionError(
-            f"Expected a clip without defects, found {len(major)} in {clip.name or 'the clip'}: "
-            + "; ".join(d.message for d in major[:3])
-            + ("; ..." if len(major) > 3 else "")
-            + ". Mend them, drop their frames, or use another clip."
-        )
-    if policy == "drop":
-        return _longest_clean(clip, [(d.frame_start, d.frame_stop) for d in major])
     mended = _mend_all(clip, defects)
     # Turning a leg back can leave a step in its foot that stood hidden among larger ones.
     left = []
     if any(d.kind == "joint-flip" for d in defects):
         left = [d for d in find_defects(mended) if d.kind == "joint-jump" and d.severity == "major"]
     return _mend_all(mended, left) if left else mended
-
-
-def _longest_clean(clip: Clip, spans: Sequence[tuple[int, int]]) -> Clip:
-    """The longest run of frames outside the spans."""
-    clean = np.ones(clip.frames, dtype=bool)
-    for start, stop in spans:
-        # Of the two frames of a jump at an end, the one on the motion's side may stay.
-        clean[start:stop] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], clean, [False]]).astype(np.int8)))
-    runs = sorted(zip(edges[::2], edges[1::2], strict=True), key=lambda run: run[0] - run[1])
-    if not runs or 2 * (runs[0][1] - runs[0][0]) < clip.frames:
-        raise MotionError(
-            f"Expected at least half of {clip.name or 'the clip'} to be free of defects, found "
-            f"{int(runs[0][1] - runs[0][0]) if runs else 0} of {counted(clip.frames, 'frame')} in a row. "
-            "Mend it, or use another clip."
-        )
-    return trim(clip, int(runs[0][0]), int(runs[0][1]))
 
 
 def _mend_all(clip: Clip, defects: Sequence[Defect]) -> Clip:

@@ -103,7 +103,7 @@ def find_partners(skeleton: Skeleton) -> IntArray:
             )
         partners[joint] = other
     for part in ("hip", "shoulder"):
-        if {f"{part}.L", f"{part}.R"} <= skeleton.roles.keys():
+        if skeleton.has(part):
             left, right = (skeleton.roles[f"{part}.{side}"] for side in "LR")
             if partners[left] == left:
                 _pair_limbs(skeleton, left, right, partners)

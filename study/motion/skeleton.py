@@ -99,6 +99,12 @@ class Skeleton:
             )
         return self.roles[name]
 
+    def has(self, *parts: str) -> bool:
+        """Whether the rig has these roles; a part of the limbs, such as `hip`, stands for that of both sides."""
+        return all(
+            {part, f"{part}.L"} & self.roles.keys() and {part, f"{part}.R"} & self.roles.keys() for part in parts
+        )
+
     @cached_property
     def bones(self) -> IntArray:
         """Pairs `(bones, 2)` of indices into `joint_positions(..., ends=True)`: joints first, then end sites."""

@@ -61,8 +61,7 @@ class Tempo(NamedTuple):
 
 def wrong_tempo(clip: Clip) -> Tempo | None:
     """Whether the motion is too slow or too quick for a body on earth; None where it is not, or can't be determined."""
-    needed = {"pelvis", *(f"{part}.{side}" for part in ("hip", "ankle") for side in "LR")}
-    if clip.frames < 5 or not needed | {"knee.L", "knee.R"} <= set(clip.skeleton.roles):
+    if clip.frames < 5 or not clip.skeleton.has("pelvis", "hip", "knee", "ankle"):
         return None
     return _by_steps(clip) or _by_falls(clip)
 

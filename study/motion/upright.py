@@ -63,11 +63,11 @@ def _rest_positions(clip: Clip) -> FloatArray:
 
 
 def _axis_of_legs(clip: Clip, positions: FloatArray) -> str | None:
-    roles = clip.skeleton.roles
-    ends = [f"{part}.{side}" for part in ("hip", "ankle") for side in "LR"]
-    if not all(role in roles for role in ends):
+    if not clip.skeleton.has("hip", "ankle"):
         return None
-    hip_l, hip_r, ankle_l, ankle_r = (positions[:, roles[role]] for role in ends)
+    hip_l, hip_r, ankle_l, ankle_r = (
+        positions[:, clip.skeleton.role(f"{part}.{side}")] for part in ("hip", "ankle") for side in "LR"
+    )
     up = hip_l + hip_r - ankle_l - ankle_r
     up = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9)
     along = np.quantile(np.abs(up), 0.1, axis=0)

@@ -18,9 +18,9 @@ from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, trim
-from study.transitions.distances import frame_distance, half_angle_squares, joint_differences, on_joints_of
+from study.transitions.distances import frame_distance, half_angle_squares, joint_differences
 from study.transitions.weights import MAJOR_ROLES, joint_weights
-from study.transitions.windows import check_frames, held, longest_available, shortfall, window
+from study.transitions.windows import held, joined_at, longest_available, shortfall, window
 
 # 2004: blends normally take 0.03 to 2 s, 1 to 60 frames at 30 fps; the fixed one 0.33 s, 10 frames.
 SHORTEST_S, LONGEST_S, FIXED_S = 1.0 / 30.0, 2.0, 1.0 / 3.0
@@ -106,8 +106,7 @@ def geodesic_length(
     MotionError
         Where the rig lacks a joint that the weights need.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     low, high = length_range(source.fps, longest)
     frames, weight = (start_frame, end_frame), joint_weights(source.skeleton, weights)
     high, note = held(longest_available(source, destination, *frames, specification), low, high)
@@ -133,8 +132,7 @@ def velocity_length(
     -----
     `|v|` of Eq. 4 is the mean of the two speeds, since opposite velocities would cancel in a mean of vectors.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     low, high = length_range(source.fps, None)
     differences = major_joint_differences(source, destination, start_frame, end_frame)
     role = max(differences, key=differences.__getitem__)
@@ -167,8 +165,7 @@ def fixed_length(
 
     Parameters and errors are those of `geodesic_length`; the weights serve the cost alone.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     length = default_frames(source.fps, FIXED_S) if frames is None else frames
     found = BlendLength(length, length / source.fps, np.nan)
     return _supplied(found, source, destination, (start_frame, end_frame), weights, specification)

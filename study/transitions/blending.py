@@ -20,14 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.arrays import FloatArray, IntArray
+from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, joint_positions, moved, retarget
+from study.motion.clip import Clip, joint_positions, moved, picked, retarget
 from study.motion.skeleton import Skeleton
-from study.transitions.distances import on_joints_of
-from study.transitions.windows import check_frames, shortfall, window
+from study.transitions.windows import joined_at, shortfall, window
 
 WEIGHTS = ("linear", "sigmoid")
 
@@ -134,8 +133,7 @@ def blend(
     TransitionError
         Where the clips don't supply the frames (the message counts them), or differ in rig or frame rate.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     frames = window(start_frame, end_frame, blend_frames, specification)
     if lacking := shortfall(source, destination, frames):
         raise TransitionError(
@@ -182,8 +180,7 @@ def cut(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Tr
     The destination's frame `end_frame` stands where the source's frame `start_frame`, whose place it takes, stood,
     and faces as it faced. Cutting a clip to itself at one frame gives the clip.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     destination = retarget(destination, source.skeleton)
     turn = float(facing(picked(source, [start_frame]))[0] - facing(picked(destination, [end_frame]))[0])
     alignment = alignment_of(turn, source.root_positions[start_frame], destination.root_positions[end_frame])
@@ -209,11 +206,6 @@ def _margins(clip: Clip, start: int, blend_frames: int) -> Stretch:
     wanted = np.arange(start - 1, start + blend_frames + 1)
     inside = np.clip(wanted, 0, clip.frames - 1)
     return Stretch(picked(clip, inside), bool(wanted[0] >= 0), bool(wanted[-1] < clip.frames))
-
-
-def picked(clip: Clip, frames: IntArray | list[int]) -> Clip:
-    """A clip of these frames alone."""
-    return replace(clip, root_positions=clip.root_positions[frames], rotations=clip.rotations[frames])
 
 
 def join(

@@ -22,7 +22,7 @@ from study.motion.skeleton import Skeleton
 from study.transitions.blending import facing
 from study.transitions.cost_matrix import cost_matrix, velocities
 from study.transitions.distances import on_joints_of
-from study.transitions.windows import check_frames
+from study.transitions.windows import joined_at
 
 # Within one clip, frames nearer than this are no transition; seconds.
 _APART_S = 0.5
@@ -110,8 +110,7 @@ def cost_terms(cuts: Sequence[LabelledCut], groups: Sequence[Sequence[str]], nu:
 
 
 def _terms_of(cut: LabelledCut, groups: Sequence[Sequence[str]], nu: float) -> list[float]:
-    destination = on_joints_of(cut.source, cut.destination)
-    check_frames(cut.source, destination, cut.source_frame, cut.destination_frame)
+    destination = joined_at(cut.source, cut.destination, cut.source_frame, cut.destination_frame)
     (pose_a, speed_a), (pose_b, speed_b) = (
         _pose(cut.source, cut.source_frame),
         _pose(destination, cut.destination_frame),

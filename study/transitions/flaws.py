@@ -16,8 +16,8 @@ import numpy as np
 
 from study.arrays import BoolArray, FloatArray
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, joint_positions, retarget
-from study.motion.feet import foot_points
+from study.motion.clip import Clip, retarget
+from study.motion.feet import foot_points, toes
 
 _BAND_M = 0.03
 """A point of a foot is down within this height over its own lowest."""
@@ -125,11 +125,6 @@ class Flaws:
                 yield f"the largest {what} is {times:.1f} times the motions' own"
 
 
-def has_feet(clip: Clip) -> bool:
-    """Whether a clip has feet to be measured."""
-    return {"ankle.L", "ankle.R"} <= clip.skeleton.roles.keys()
-
-
 def find_flaws(clip: Clip, blend: tuple[int, int], motions: Sequence[Clip]) -> Flaws:
     """Measure a transition.
 
@@ -186,9 +181,7 @@ class _Measured:
         self.lows = [np.quantile(points[..., 1], 0.02, axis=0) for points in self.feet]
         self.lowest = np.stack([points[..., 1].min(axis=1) for points in self.feet], axis=1)
         self.speeds = [_slower(points, clip.fps) for points in self.feet]
-        roles = clip.skeleton.roles
-        toes = [roles.get(f"toe.{side}", clip.skeleton.role(f"ankle.{side}")) for side in "LR"]
-        self.toe_acceleration = _changes(joint_positions(clip)[:, toes]) * clip.fps**2
+        self.toe_acceleration = _changes(toes(clip)) * clip.fps**2
         self.root_change = _changes(clip.root_positions) * clip.fps
         turns = 2.0 * quat.log(quat.multiply(quat.conjugate(clip.rotations[:-1, 1:]), clip.rotations[1:, 1:]))
         self.joint_change = np.zeros(clip.frames)

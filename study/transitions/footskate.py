@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.arrays import BoolArray, FloatArray
+from study.arrays import FloatArray, runs
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions, retarget, trim
+from study.motion.feet import toes
 from study.motion.legs import reach
 from study.transitions.blending import Transition
-from study.transitions.support import Support, find_support, footwork, toes
+from study.transitions.support import Support, find_support, footwork
 
 RELEASE_S = 0.2
 """A correction may end so long after the blend."""
@@ -223,7 +224,7 @@ def _with_step(support: Support, way: FloatArray, feet: FloatArray, fps: float) 
     far = np.linalg.norm(support.excess[:-1][..., [0, 2]], axis=-1)
     held = support.held[:-1] > 0.5
     both, best = held[:, 0] & held[:, 1], (0.0, 0, 0, 0)
-    for start, stop in _runs(both):
+    for start, stop in runs(both):
         if slip[start:stop].sum(axis=0).max() > _SLIP_M:
             # Two feet that go apart share the slip; the one steps that the blend moves more.
             foot = int(np.argmax(far[start:stop].sum(axis=0)))
@@ -246,18 +247,12 @@ def _lift(support: Support, way: FloatArray, feet: FloatArray, foot: int) -> Flo
     lift = np.zeros(support.frames)
     loose = np.minimum(support.held[:-1, foot], support.held[1:, foot]) < 0.5
     moved = np.diff(way + feet[:, foot], axis=0, prepend=0.0) + support.excess[:-1, foot]
-    for start, stop in _runs(loose):
+    for start, stop in runs(loose):
         travel = float(np.linalg.norm(moved[start:stop].sum(axis=0)[[0, 2]]))
         apart = float(support.apart[start : stop + 1, foot].max())
         rise = np.sin(np.pi * (np.arange(stop - start) + 0.5) / (stop - start)) ** 2
         lift[start:stop] = apart * min(_LIFT_M, _LIFT_SHARE * travel) * rise
     return lift
-
-
-def _runs(flags: BoolArray) -> list[tuple[int, int]]:
-    """Stretches of true, as slices count them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _embedded(free: int, frames: int, *, stays: bool = False) -> FloatArray:

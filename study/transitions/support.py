@@ -17,8 +17,8 @@ import numpy as np
 
 from study.arrays import FloatArray, IntArray
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, joint_positions, sample, trim
-from study.motion.feet import foot_points
+from study.motion.clip import Clip, sample, trim
+from study.motion.feet import foot_points, toes
 from study.transitions.blending import Transition, facing
 
 # A point of a foot bears all its weight up to the first speed (m/s) and height over its lowest (m), none from the
@@ -90,14 +90,6 @@ def footwork(clip: Clip) -> Footwork:
         slowest.append(best)
     bends = [_bends(path) for path in (clip.root_positions, toes(clip))]
     return Footwork(points, np.stack(weights, axis=1), np.stack(slowest, axis=1), facing(clip), *bends)
-
-
-def toes(clip: Clip) -> FloatArray:
-    """The joint of each foot's toes, `(frames, 2, 3)`, left then right, or the ankle where there is none; metres."""
-    roles = clip.skeleton.roles
-    found = [roles.get(f"toe.{side}", clip.skeleton.role(f"ankle.{side}")) for side in "LR"]
-    positions: FloatArray = joint_positions(clip)[:, found]
-    return positions
 
 
 def _bends(path: FloatArray) -> FloatArray:

@@ -23,19 +23,17 @@ from study.arrays import FloatArray
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, retarget
+from study.motion.clip import Clip, picked, retarget
 from study.transitions.blending import (
     Transition,
     alignment_of,
     assemble,
     blend_weights,
     facing,
-    picked,
     slerp_one_way,
     steps_of,
 )
-from study.transitions.distances import on_joints_of
-from study.transitions.windows import Window, check_frames, shortfall, window
+from study.transitions.windows import Window, joined_at, shortfall, window
 
 Decay = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """What is left of offsets `(..., n)` with rates `(..., n)` a second after times `(t,)`, seconds: `(t, ..., n)`."""
@@ -284,8 +282,7 @@ class _Seam:
 def _seam(
     source: Clip, destination: Clip, start_frame: int, end_frame: int, blend_frames: int, placed_frames: int
 ) -> _Seam:
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     first = window(start_frame, end_frame, placed_frames).destination_start
     # One frame of each before the switch says how fast it moves.
     lacking = shortfall(source, destination, Window(start_frame - 1, first - 1, 1))

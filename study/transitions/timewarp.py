@@ -23,9 +23,9 @@ from study.errors import TransitionError
 from study.motion.clip import Clip, retarget, sample
 from study.transitions.blend_length import length_range
 from study.transitions.blending import Stretch, Transition, blend_weights, join, joint_shares
-from study.transitions.distances import half_angle_squares, on_joints_of
+from study.transitions.distances import half_angle_squares
 from study.transitions.weights import joint_weights
-from study.transitions.windows import check_frames, held
+from study.transitions.windows import held, joined_at
 
 STEEPEST = 2.0
 """The slope of a warp lies between one over this and this."""
@@ -86,8 +86,7 @@ def warp_length(
     TransitionError
         Where the clips don't supply the frames, or differ in rig or frame rate.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     low, high = length_range(source.fps, longest)
     # A warped window also looks at the frame before its first.
     high, note = held(min(source.frames - start_frame, end_frame) if start_frame else 0, low, high)
@@ -269,8 +268,7 @@ def warped_blend(
     Transition
         With equal lengths, the same as `blend`.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     if min(source_frames, destination_frames) < 1:
         raise TransitionError(
             f"Expected at least 1 frame of each clip in a blend, got {source_frames} and {destination_frames}."

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
+from study.transitions.distances import on_joints_of
 
 SPECIFICATIONS = ("start-end", "centre", "left")
 
@@ -51,8 +52,15 @@ def window(start_frame: int, end_frame: int, blend_frames: int, specification: s
     raise TransitionError(f"Expected a specification of {', '.join(SPECIFICATIONS)}, got {specification!r}.")
 
 
-def check_frames(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> None:
-    """`TransitionError` where the start frame is not in the source, or the end frame not in the destination."""
+def joined_at(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> Clip:
+    """The destination on the source's joints (see `on_joints_of`).
+
+    Raises
+    ------
+    TransitionError
+        Where they are on different rigs, or the start frame is not in the source, or the end frame in the destination.
+    """
+    destination = on_joints_of(source, destination)
     for what, frame, clip, kind in (
         ("start", start_frame, source, "source"),
         ("end", end_frame, destination, "destination"),
@@ -62,6 +70,7 @@ def check_frames(source: Clip, destination: Clip, start_frame: int, end_frame: i
                 f"Expected the {what} frame from 0 to {clip.frames - 1} in the {kind} {clip.name or 'clip'}, "
                 f"got {frame}."
             )
+    return destination
 
 
 def shortfall(source: Clip, destination: Clip, frames: Window) -> str:

@@ -169,7 +169,6 @@ def test_standing_is_drawn_out() -> None:
     clip = synthesize("stand", seconds=1.0, fps=60.0)
     assert getattr(find_cycle(clip), "kind", None) == "still"
     extension = extend(clip, frames_before=180, frames_after=180)
-    assert (extension.cycles_before, extension.cycles_after) == (0.0, 0.0)
     assert "of standing" in extension.note
     positions = joint_positions(extension.clip)
     assert np.linalg.norm(np.diff(positions, axis=0), axis=-1).max() * 60.0 < 0.3
@@ -183,7 +182,7 @@ def test_the_note_says_how_much(walk: Clip) -> None:
     extension = extend(clip, frames_before=60, frames_after=120)
     cycle = find_cycle(clip)
     assert cycle is not None
-    assert extension.cycles_after == pytest.approx(120 / cycle.cycle_frames)
+    assert f": {120 / cycle.cycle_frames:.2f} gait cycles" in extension.note
     assert "extended before its start by 60 frames (0.50 s)" in extension.note
     assert "extended after its end by 120 frames (1.00 s)" in extension.note
     assert extension.clip.history[-1] == extension.note

@@ -189,7 +189,6 @@ def test_a_floor_at_another_height_is_found_and_put_right(shift: float, kind: st
     assert kinds(moved) == [kind]
     assert "onto the floor" in mend(moved).history[-1]
     assert find_defects(mend(moved)) == ()
-    assert mend(moved, policy="refuse") is moved
 
 
 def test_a_body_that_lies_is_told() -> None:
@@ -201,20 +200,6 @@ def test_a_body_that_lies_is_told() -> None:
     (defect,) = find_defects(lying)
     assert defect.kind == "not-upright"
     assert "lies along Z" in defect.message
-
-
-def test_policies() -> None:
-    broken = turned(swinging(), "LeftForeArm", 1.2, slice(60, 61))
-    assert mend(broken, policy="keep") is broken
-    with pytest.raises(
-        MotionError, match=r"Expected a clip without defects, found 1 in swinging: LeftForeArm jumps 2 times"
-    ):
-        mend(broken, policy="refuse")
-    assert np.array_equal(mend(broken, policy="drop").rotations, broken.rotations[62:])
-    with pytest.raises(MotionError, match="Expected at least half of swinging to be free of defects"):
-        mend(turned(broken, "LeftForeArm", 1.2, slice(140, 141)), policy="drop")
-    with pytest.raises(MotionError, match="Expected a policy out of"):
-        mend(broken, policy="burn")  # type: ignore[arg-type]
 
 
 def test_only_the_defects_given_are_dealt_with() -> None:

@@ -241,7 +241,7 @@ def test_a_flat_folder_supplies_what_it_can(cmu_folder: Path) -> None:
     assert library.acknowledgement == CMU_ACKNOWLEDGEMENT
     for name in ("walk", "07_01"):
         entry = library.entry(name)
-        assert (entry.kind, entry.trial, entry.cyclic_start, entry.cyclic_end) == ("walking", "07_01", True, True)
+        assert (entry.kind, entry.trial, entry.start, entry.end) == ("walking", "07_01", "gait", "gait")
     assert library.clip("99_01").frames == library.clip("walk").frames
 
 

@@ -53,7 +53,7 @@ beats = [1.5, 0.5]
     assert set(library.names()) == {"two steps", "walk", "läuft"}
     entry = library.entry("two steps")
     assert (entry.kind, entry.genre, entry.beats) == ("strolling", "none", (0.5, 1.5))
-    assert (entry.cyclic, entry.cyclic_start, entry.cyclic_end) == (True, False, True)
+    assert (entry.cyclic, entry.start, entry.end) == (True, "", "gait")
     clip = library.clip("two steps")
     assert clip.frames == 60
     assert clip.start_s == pytest.approx(10 / 60)

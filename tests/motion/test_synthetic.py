@@ -31,7 +31,6 @@ def test_every_role_is_found() -> None:
 def test_clip_says_what_it_is(clip: Clip) -> None:
     assert clip.synthetic
     assert clip.frames == round(SHORT_S * 60.0)
-    assert describe(clip.name).name == clip.name
     assert "seed 3" in clip.history[0]
     assert clip.name in clip.history[0]
 
@@ -101,16 +100,6 @@ def test_every_name_and_parameter_is_documented() -> None:
         assert f"`{name}`" in page, name
         for parameter in describe(name).parameters:
             assert f"`{parameter}`" in page, parameter
-
-
-def test_library_needs_these_names() -> None:
-    """Protocols name these in every library."""
-    shared = (
-        "walk_slow walk walk_fast jog run run_fast stand idle stand_to_walk stand_to_run walk_to_stop run_to_stop "
-        "walk_turn_left walk_turn_right run_turn_left run_turn_right box box_combination dance dance_modern "
-        "dance_turns tai_chi tai_chi_slow"
-    )
-    assert set(shared.split()) <= set(NAMES)
 
 
 def test_default_lengths_leave_room_around_events() -> None:

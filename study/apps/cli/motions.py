@@ -142,7 +142,7 @@ def _role_lines(skeleton: Skeleton) -> Iterator[str]:
 
 
 def _nothing_found(skeleton: Skeleton) -> str:
-    if {"hip.L", "hip.R", "ankle.L", "ankle.R"} <= skeleton.roles.keys():
+    if skeleton.has("hip", "ankle"):
         return "no defects found"
     return "no jumps found; flipped legs and the floor were not looked for, as no legs were found"
 

@@ -170,7 +170,7 @@ def transition(
     from study.motion.drawing import draw_clip
     from study.motion.library_file import UNITS
     from study.motion.readers.bvh_writing import write_bvh
-    from study.transitions.flaws import find_flaws, has_feet
+    from study.transitions.flaws import find_flaws
     from study.transitions.footskate import plant_feet
     from study.transitions.rates import remade
 
@@ -194,7 +194,7 @@ def transition(
     if not keep_slide:
         joined = plant_feet(joined, first, second)
     blended = joined.blend_start, joined.blend_stop
-    flaws = find_flaws(joined.clip, blended, (first, second)) if has_feet(joined.clip) else None
+    flaws = find_flaws(joined.clip, blended, (first, second)) if joined.clip.skeleton.has("ankle") else None
     if out.suffix.lower() == ".bvh":
         write_bvh(joined.clip, out, metres_per_unit=UNITS[unit] if unit else None)
     else:

@@ -17,7 +17,7 @@ from study.experiment.stimuli.ways import Ways
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions, trim
 from study.transitions.blending import blend, facing
-from study.transitions.flaws import Flaws, find_flaws, has_feet
+from study.transitions.flaws import Flaws, find_flaws
 
 FloatArray = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def _draft(protocol: Protocol, planned: Planned, method: str, difference: int, f
     notes = tuple(note for note in (made.note, settled.lengths[method].note) if note)
     positions = _placed(joint_positions(clip, ends=True), protocol, settled)
     blended = made.blend_start - first, made.blend_stop - first
-    flaws = find_flaws(clip, blended, film.way.motions(place)) if has_feet(clip) else None
+    flaws = find_flaws(clip, blended, film.way.motions(place)) if clip.skeleton.has("ankle") else None
     frames, holds = film.way.blend_frames, film.way.holds_feet
     return Draft(points, method, difference, frames, clip, blended, positions, notes, flaws, holds)
 

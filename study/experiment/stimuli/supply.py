@@ -82,7 +82,7 @@ def supply(library: Library, fps: float, name: str, needs: Needs, within: tuple[
         clip,
         lambda: library.clip(name, min_seconds=seconds),
         (low, max(int(span[1] * clip.frames), low + 1)),
-        (bool(entry.cyclic_start), bool(entry.cyclic_end)),
+        (bool(entry.start), bool(entry.end)),
     )
     why = ""
     for before, after in ((needs.before, needs.after), (needs.least_before, needs.least_after)):

@@ -7,6 +7,9 @@ Lenetsky et al. 2013; Dinu & Louis 2020).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from study.arrays import FloatArray
@@ -167,10 +170,6 @@ def _cross(score: Score, time: float, rng: np.random.Generator, tempo: float, he
     return end - 0.06 + float(rng.uniform(0.0, 0.08))
 
 
-def _body_cross(score: Score, time: float, rng: np.random.Generator, tempo: float) -> float:
-    return _cross(score, time, rng, tempo, height=0.0)
-
-
 def _hook(score: Score, time: float, rng: np.random.Generator, tempo: float) -> float:
     load, out, back = 0.12 / tempo, 0.17 / tempo, 0.30 / tempo
     start, hit, end = time + load, time + load + out, time + load + out + back
@@ -222,14 +221,6 @@ def _duck(score: Score, time: float, rng: np.random.Generator, tempo: float) -> 
     return end
 
 
-def _slip_left(score: Score, time: float, rng: np.random.Generator, tempo: float) -> float:
-    return _slip(score, time, rng, tempo, 1.0)
-
-
-def _slip_right(score: Score, time: float, rng: np.random.Generator, tempo: float) -> float:
-    return _slip(score, time, rng, tempo, -1.0)
-
-
 def _strike(score: Score, side: int, time: float, hit: float, end: float, aim: list[float]) -> None:
     """A straight punch: the hand goes to its aim and back, the fist turns over, the shoulder follows."""
     score.aims[side].move(time - 0.02, time + 0.05, aim)
@@ -238,12 +229,12 @@ def _strike(score: Score, side: int, time: float, hit: float, end: float, aim: l
     score.collars[side].visit(time, hit, end, np.radians([9.0, 20.0]))
 
 
-_MOVES = {
+_MOVES: dict[str, Callable[[Score, float, np.random.Generator, float], float]] = {
     "jab": _jab,
     "cross": _cross,
-    "body_cross": _body_cross,
+    "body_cross": partial(_cross, height=0.0),
     "hook": _hook,
     "duck": _duck,
-    "slip_left": _slip_left,
-    "slip_right": _slip_right,
+    "slip_left": partial(_slip, toward=1.0),
+    "slip_right": partial(_slip, toward=-1.0),
 }

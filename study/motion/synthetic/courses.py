@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.errors import MotionError
 from study.motion.synthetic import gait
 from study.motion.synthetic.curves import bump, smooth_step
 from study.motion.synthetic.locomotion import Course, grid, travel
 from study.motion.synthetic.targets import Targets
-
-FloatArray = NDArray[np.float64]
 
 SPEED_RANGE = (0.5, 6.0)
 ANGLE_RANGE = (5.0, 180.0)

@@ -7,7 +7,9 @@ at a quarter to a half (Burger et al. 2013; Toiviainen et al. 2010); popular dan
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -35,6 +37,9 @@ HIGH = (0.15, 0.54, 0.09, 1.40)
 ROUND = (-0.06, -0.10, 0.38, 1.00)
 OPEN = (0.40, 0.30, 0.14, 1.25)
 CHEST = (-0.10, -0.08, 0.24, 0.90)
+
+
+Figure = TypeVar("Figure")
 
 
 @dataclass
@@ -74,6 +79,15 @@ def new_dancer(seconds: float, rng: np.random.Generator, beats_per_minute: float
 def first_beat(dancer: Dancer) -> float:
     """The time of the first beat, seconds."""
     return float(dancer.score.times[0]) + 1.2
+
+
+def phrases(dancer: Dancer, figures: Sequence[Figure], beats: int, left_over: int) -> Iterator[tuple[Figure, float]]:
+    """Figures of so many beats with their times, in an order drawn anew each round, until few beats are left over."""
+    time, order = first_beat(dancer), list[int]()
+    while time < dancer.score.times[-1] - left_over * dancer.beat:
+        order = order or dancer.rng.permutation(len(figures)).tolist()
+        yield figures[order.pop()], time
+        time += beats * dancer.beat
 
 
 def groove(dancer: Dancer, bounce: float = 1.0) -> None:

@@ -16,6 +16,7 @@ from study.motion.synthetic.dancer import (
     groove,
     move_arms,
     new_dancer,
+    phrases,
     sway_hips,
 )
 from study.motion.synthetic.score import perform
@@ -25,14 +26,8 @@ from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets
 def dance(seconds: float, rng: np.random.Generator, *, beats_per_minute: float = 116.0) -> Targets:
     """A groove: step-touches, grapevines, hip sways, twists and points, bouncing on the beat."""
     dancer = new_dancer(seconds, rng, beats_per_minute)
-    time = first_beat(dancer)
-    figures = [_step_touch, _grapevine, _sway_high, _twist, _points]
-    order: list[int] = []
-    while time < dancer.score.times[-1] - 9 * dancer.beat:
-        if not order:
-            order = [int(k) for k in rng.permutation(len(figures))]
-        figures[order.pop()](dancer, time)
-        time += 8 * dancer.beat
+    for figure, time in phrases(dancer, (_step_touch, _grapevine, _sway_high, _twist, _points), 8, 9):
+        figure(dancer, time)
     groove(dancer)
     return perform(dancer.score, rng, unrest=1.3)
 

@@ -149,7 +149,7 @@ def hip_height(
     pelvis_position: FloatArray,
     pelvis_angles: FloatArray,
     pivots: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray]:
     """Height of the middle of the hips that gives the bearing legs the bend they are meant to have.
 
     Returns
@@ -158,8 +158,6 @@ def hip_height(
         Weighted over the bearing legs; interpolated where no foot is down.
     limit : (n,)
         The greatest height at which every foot in contact can be reached.
-    weights : (n, 2)
-        How much each foot bears.
     """
     bearing = loads(sides, times)
     level = pelvis_position * np.array([1.0, 0.0, 1.0])
@@ -187,7 +185,7 @@ def hip_height(
     weight = bearing.sum(axis=1)
     known = weight > 0.05
     height = np.interp(times, times[known], total[known] / weight[known])
-    return height, limit, bearing
+    return height, limit
 
 
 def under_limit(height: FloatArray, limit: FloatArray, spread_s: float = 0.08) -> FloatArray:

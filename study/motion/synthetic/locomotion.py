@@ -324,7 +324,7 @@ def _height(
     In running the rise and fall is the one whose peak acceleration in flight is that of a free fall (the
     spring-mass model: Blickhan 1989), so its size follows from the step rate.
     """
-    walking, limit, _ = hip_height(contacts, times, level, pelvis_angles)
+    walking, limit = hip_height(contacts, times, level, pelvis_angles)
     running = blur(gait.running_share(pace), 0.12)
     swing = 0.98 * person.bounce * GRAVITY / (4 * np.pi * gait.stride_rate(pace)) ** 2
     stance = gait.by_speed("stance", pace)

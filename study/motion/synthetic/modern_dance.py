@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from study.motion.synthetic.dancer import CHEST, HIGH, LOW, OPEN, SIDE, TOE_OUT, Dancer, first_beat, new_dancer
+from study.motion.synthetic.dancer import CHEST, HIGH, LOW, OPEN, SIDE, TOE_OUT, Dancer, new_dancer, phrases
 from study.motion.synthetic.score import perform
 from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets
 
@@ -12,16 +12,10 @@ from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets
 def dance_modern(seconds: float, rng: np.random.Generator, *, beats_per_minute: float = 84.0) -> Targets:
     """Long lines and falls: lunges with sweeping arms, contractions, arches, slow lifts of a leg."""
     dancer = new_dancer(seconds, rng, beats_per_minute)
-    time = first_beat(dancer)
-    figures = [_lunge, _contract, _lunge, _lift, _circle]
-    order: list[int] = []
-    first = int(rng.integers(2))
-    while time < dancer.score.times[-1] - 6 * dancer.beat:
-        if not order:
-            order = [int(k) for k in rng.permutation(len(figures))]
-        figures[order.pop()](dancer, time, first)
-        first = 1 - first
-        time += 4 * dancer.beat
+    side = int(rng.integers(2))
+    for figure, time in phrases(dancer, (_lunge, _contract, _lunge, _lift, _circle), 4, 6):
+        figure(dancer, time, side)
+        side = 1 - side
     return perform(dancer.score, rng, unrest=1.5)
 
 

@@ -22,6 +22,8 @@ from study.motion.synthetic.curves import blur, slow_noise, smooth_step
 from study.motion.synthetic.legs import FOREVER, Contact, hip_height, on_grid, solve_legs, under_limit
 from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets, girdle_shift, orientation
 
+# Height of the middle of the hips of one who stands upright.
+_STANDING_M = 0.905
 _ARM = body.UPPER_ARM + body.FOREARM
 _SHOULDER = np.array([body.SHOULDER_HALF_WIDTH, 0.125, 0.004])
 
@@ -129,7 +131,7 @@ class Score:
         self.hands[side].move(start + 0.34 * long, stop, to)
 
 
-def perform(score: Score, rng: np.random.Generator, *, stature_hips: float = 0.905, unrest: float = 1.0) -> Targets:
+def perform(score: Score, rng: np.random.Generator, *, unrest: float) -> Targets:
     """The body that follows a score, with the small unrest of a living one."""
     times, n = score.times, len(score.times)
     heading = score.heading.values[:, 0]
@@ -151,8 +153,8 @@ def perform(score: Score, rng: np.random.Generator, *, stature_hips: float = 0.9
     head = turned + score.head.values + wander[:, 6:9]
 
     level = np.column_stack([ground[:, 0], np.zeros(n), ground[:, 1]])
-    _, limit, _ = hip_height(sides, times, level, pelvis, pivots)
-    level[:, 1] = under_limit(stature_hips - score.crouch.values[:, 0], limit, 0.12)
+    _, limit = hip_height(sides, times, level, pelvis, pivots)
+    level[:, 1] = under_limit(_STANDING_M - score.crouch.values[:, 0], limit, 0.12)
     ankles, feet, toes = solve_legs(sides, times, level, pelvis, heading, pivots)
     hands = np.stack([_hand(score, side, heading, chest, rng, unrest) for side in (LEFT, RIGHT)], axis=1)
     return Targets(

@@ -84,7 +84,7 @@ def _upright(
     yaw = restless * slow_noise(rng, times, np.radians(2.0), 1, (0.04, 0.2))[:, 0]
     pelvis = np.column_stack([yaw, np.full(n, np.radians(1.0)), 1.15 * shift])
     level = np.column_stack([shift + sway[:, 0], np.zeros(n), 0.015 + sway[:, 1]])
-    height, limit, _ = hip_height(sides, times, level, pelvis)
+    height, limit = hip_height(sides, times, level, pelvis)
     level[:, 1] = under_limit(blur(height, 0.12), limit, 0.20) - 0.004
     ankles, feet, toes = solve_legs(sides, times, level, pelvis, np.zeros(n))
 

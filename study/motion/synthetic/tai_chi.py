@@ -11,13 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.motion.synthetic.locomotion import grid
 from study.motion.synthetic.score import Score, perform
 from study.motion.synthetic.targets import LEFT, OUTWARD, RIGHT, Targets
-
-FloatArray = NDArray[np.float64]
 
 _STYLE = {
     "strike_pitch": 0.22,

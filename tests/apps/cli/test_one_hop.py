@@ -14,21 +14,8 @@ from study.motion.readers.bvh import read_bvh
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("one-hop") / "dances.bin"
-    arguments = [
-        "dance",
-        "box",
-        "walk",
-        "--pair",
-        "dance",
-        "box",
-        "--fps",
-        "15",
-        "--weight",
-        "0.0005",
-        "--out",
-        str(path),
-    ]
-    assert run(["one-hop", "build", *arguments]) == 0
+    arguments = ["dance", "box", "walk", "--pair", "dance", "box", "--fps", "15", "--weight", "0.0005"]
+    assert run(["one-hop", "build", *arguments, "--out", str(path)]) == 0
     return path
 
 

@@ -89,21 +89,8 @@ def test_warped_costs_come_as_numbers_averaged_or_as_printed(
     tables = []
     for option in ([], ["--printed-sum"]):
         out = tmp_path / "warped.csv"
-        ask(
-            capsys,
-            "blend-length",
-            "walk",
-            "run",
-            "--start",
-            60,
-            "--end",
-            80,
-            "--method",
-            "timewarp",
-            *option,
-            "--out",
-            out,
-        )
+        arguments = ["blend-length", "walk", "run", "--start", "60", "--end", "80", "--method", "timewarp"]
+        ask(capsys, *arguments, *option, "--out", out)
         tables.append(rows_of(out))
     pairs = [(int(row["source_frames"]), int(row["destination_frames"])) for row in tables[0]]
     every = range(1, 61)
@@ -187,26 +174,8 @@ def test_a_joint_can_blend_for_a_time_of_its_own(capsys: pytest.CaptureFixture[s
     differ = np.abs(clips[0].rotations - clips[1].rotations).max(axis=(0, 2)) > 1e-4
     assert np.flatnonzero(differ).tolist() == [clips[0].skeleton.role("shoulder.L")]
     for wrong in ("shoulder=4", "shoulder.L=0", "shoulder.L"):
-        assert (
-            run(
-                [
-                    "transition",
-                    "walk",
-                    "run",
-                    "--start",
-                    "60",
-                    "--end",
-                    "80",
-                    "--frames",
-                    "12",
-                    "--joint",
-                    wrong,
-                    "--out",
-                    "x.bvh",
-                ]
-            )
-            == 2
-        )
+        arguments = ["--start", "60", "--end", "80", "--frames", "12", "--out", "x.bvh", "--joint", wrong]
+        assert run(["transition", "walk", "run", *arguments]) == 2
         assert "ROLE=FRAMES" in capsys.readouterr().err
 
 

@@ -340,7 +340,7 @@ def test_captured_motions_are_extended_and_the_record_says_by_how_much(monkeypat
         root = clip.root_positions[path].copy()
         root[:, 2] = speed * np.arange(-frames_before, clip.frames + frames_after)
         longer = replace(clip, root_positions=root, rotations=clip.rotations[path])
-        return cycles.Extension(longer, frames_before, frames_after, 1.0, 1.0, "extended by the test")
+        return cycles.Extension(longer, frames_before, frames_after, "extended by the test")
 
     monkeypatch.setattr(cycles, "extend", extend)
     made = prepare(changed(("entry_s = 0.3", "entry_s = 2.0"), ("exit_s = 0.3", "exit_s = 2.0")), library)
