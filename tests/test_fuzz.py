@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from programs import program
 
 CASES, SEED, CHUNKS = 2000, 1, 16
 # Rare ones that were found among many more: models of preferences that overflowed or divided by zero.
 FOUND_ONCE = {"table": (2603, 6312, 7638)}
-PATH = Path(__file__).parents[1] / "benchmarks" / "fuzz.py"
 
 
 @pytest.fixture(scope="module")
 def fuzz() -> ModuleType:
-    if "benchmarks_fuzz" not in sys.modules:
-        spec = importlib.util.spec_from_file_location("benchmarks_fuzz", PATH)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["benchmarks_fuzz"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules["benchmarks_fuzz"]
+    return program("benchmarks/fuzz")
 
 
 @pytest.mark.parametrize("chunk", range(CHUNKS))

@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
-
-ROOT = Path(__file__).parents[1]
-
-
-def script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"scripts_{name}", ROOT / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from programs import ROOT, program
 
 
 def test_every_package_that_segue_installs_stands_on_the_page() -> None:
     page = (ROOT / "docs" / "security.md").read_text(encoding="utf-8")
-    missing = [name for name in script("licences").installed("segue") if f"| {name} | " not in page]
+    missing = [name for name in program("scripts/licences").installed("segue") if f"| {name} | " not in page]
     assert not missing, "run `python scripts/licences.py` and put its lines onto the page"
     assert "libx264 and libx265 (GPL-2.0-or-later)" in page
 
@@ -55,6 +42,6 @@ def test_every_package_that_segue_installs_stands_on_the_page() -> None:
     ],
 )
 def test_only_packages_that_were_looked_up_pass_an_audit(answer: Any, status: int, said: str) -> None:
-    found, lines = script("audited").audited("pypi", answer if isinstance(answer, str) else json.dumps(answer))
+    found, lines = program("scripts/audited").audited("pypi", answer if isinstance(answer, str) else json.dumps(answer))
     assert found == status
     assert said in "\n".join(lines)

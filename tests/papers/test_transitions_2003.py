@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from programs import program
 
 from study.motion.clip import retarget
 from study.motion.library import Library, open_library
@@ -71,12 +71,7 @@ def test_section_4_1_leaving_one_label_out_moves_the_optimum_by_less_than_a_fram
 
     The labels are not the paper's, which were not published: 16 good and 26 bad ones by the published weights.
     """
-    path = Path(__file__).parents[2] / "benchmarks" / "fit_weights.py"
-    spec = importlib.util.spec_from_file_location("benchmarks_fit_weights", path)
-    assert spec is not None
-    assert spec.loader is not None
-    benchmark = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(benchmark)
+    benchmark = program("benchmarks/fit_weights")
     library = open_library(mocap / "cmu")
     names = ["16_15", "16_21", "16_35", "16_45", "16_17", "16_18", "16_31", "16_32"]
     names += ["16_33", "16_34", "127_03", "127_08", "14_02", "17_10", "49_01", "49_04", "05_01", "05_02"]

@@ -1,13 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from walks import make_walk
 
 from study.errors import TransitionError
-from study.motion.clip import Clip, sample
+from study.motion.clip import sample
 from study.motion.library import open_library
 from study.transitions.advice import advise, is_cyclic, just_noticeable, own_time
 from study.transitions.blend_length import fixed_length, geodesic_length
@@ -45,13 +45,13 @@ def test_captured_motions_are_told_apart(mocap: Path) -> None:
     assert [name for name in FREE if name in there and is_cyclic(library.clip(name))] == []
 
 
-def test_the_own_time_of_a_swing_is_a_sixth_of_its_cycle(make_walk: Callable[..., Clip]) -> None:
+def test_the_own_time_of_a_swing_is_a_sixth_of_its_cycle() -> None:
     assert own_time(make_walk(150, cadence=1.0)) == pytest.approx(30 / (2 * np.pi), rel=0.1)
     assert own_time(make_walk(150, cadence=0.5)) == pytest.approx(60 / (2 * np.pi), rel=0.1)
     assert own_time(sample(make_walk(5), [0.0] * 20)) == 0.0
 
 
-def test_advice_is_the_methods_own_length_at_its_point(make_walk: Callable[..., Clip]) -> None:
+def test_advice_is_the_methods_own_length_at_its_point() -> None:
     source, destination = make_walk(150, name="slow"), make_walk(150, phase=1.0, cadence=1.5, swing=0.7, name="quick")
     for cyclic, method in (((True, False), "geodesic"), ((False, False), "velocity")):
         found = advise(source, destination, cyclic=cyclic)
@@ -68,14 +68,14 @@ def test_advice_is_the_methods_own_length_at_its_point(make_walk: Callable[..., 
         assert found.end_frame < 120
 
 
-def test_two_walks_out_of_phase_are_joined_in_phase(make_walk: Callable[..., Clip]) -> None:
+def test_two_walks_out_of_phase_are_joined_in_phase() -> None:
     source, destination = make_walk(150), make_walk(150, phase=2.0)
     found = advise(source, destination)
     assert found.why == "both motions are cyclic"
     assert found.cost < 0.02 * np.mean(geodesic_length(source, destination, 60, 89).costs)
 
 
-def test_short_clips_say_so(make_walk: Callable[..., Clip]) -> None:
+def test_short_clips_say_so() -> None:
     short = make_walk(45, name="short")
     found = advise(short, short, cyclic=(True, True))
     assert "the clips supply blends of up to 24 frames; 60 were asked for" in found.note

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from walks import make_walk
 
 from study.errors import TransitionError
-from study.motion.clip import Clip
 from study.transitions.batch import geodesic_lengths, velocity_lengths
 from study.transitions.blend_length import BlendLength, geodesic_length, velocity_length
 
 
-def test_many_at_once_are_what_they_are_one_by_one(make_walk: Callable[..., Clip]) -> None:
+def test_many_at_once_are_what_they_are_one_by_one() -> None:
     source, destination = make_walk(200, phase=0.3), make_walk(180, phase=2.0, cadence=1.3, swing=0.7)
     rng = np.random.default_rng(5)
     starts, ends = rng.integers(0, 141, 60), rng.integers(59, 180, 60)
@@ -37,15 +37,13 @@ def test_many_at_once_are_what_they_are_one_by_one(make_walk: Callable[..., Clip
         ([0, 1], [60], r"as many start frames as end frames.*\(2,\) and \(1,\)"),
     ],
 )
-def test_frames_that_are_not_there_are_counted(
-    make_walk: Callable[..., Clip], starts: list[int], ends: list[int], message: str
-) -> None:
+def test_frames_that_are_not_there_are_counted(starts: list[int], ends: list[int], message: str) -> None:
     # At 1800 frames a second the shortest blend takes 60 frames.
     with pytest.raises(TransitionError, match=message):
         geodesic_lengths(make_walk(100, 1800.0), make_walk(100, 1800.0), starts, ends)
 
 
-def test_velocity_lengths_are_those_found_one_by_one(make_walk: Callable[..., Clip]) -> None:
+def test_velocity_lengths_are_those_found_one_by_one() -> None:
     source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
     rng = np.random.default_rng(2)
     starts, ends = rng.integers(0, 60, 40), rng.integers(29, 80, 40)
@@ -58,7 +56,7 @@ def test_velocity_lengths_are_those_found_one_by_one(make_walk: Callable[..., Cl
 
 @pytest.mark.parametrize(("length", "find"), [(geodesic_length, geodesic_lengths), (velocity_length, velocity_lengths)])
 def test_near_the_ends_of_clips_lengths_are_held_as_they_are_one_by_one(
-    make_walk: Callable[..., Clip], length: Callable[..., BlendLength], find: Callable[..., Any]
+    length: Callable[..., BlendLength], find: Callable[..., Any]
 ) -> None:
     source, destination = make_walk(90, phase=0.4), make_walk(80, phase=2.5, cadence=1.6, swing=0.8)
     rng = np.random.default_rng(7)

@@ -2,10 +2,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from types import ModuleType
 
 import numpy as np
 import pytest
+from programs import program
+from walks import make_walk
 
 from study.errors import TransitionError
 from study.motion.clip import Clip, moved, resample, trim
@@ -26,7 +27,8 @@ from study.transitions.windows import SPECIFICATIONS, longest_available, shortfa
 LENGTHS = (geodesic_length, velocity_length, fixed_length)
 
 
-def test_costs_are_those_of_the_plain_equations(make_walk: Callable[..., Clip], oracle: ModuleType) -> None:
+def test_costs_are_those_of_the_plain_equations() -> None:
+    oracle = program("benchmarks/blend_length")
     source, destination = make_walk(60, phase=0.4), make_walk(60, phase=2.1, cadence=1.3, swing=0.7)
     weights = joint_weights(source.skeleton)
     fast = geodesic_costs(source, destination, 7, 50, 40, weights)
@@ -38,7 +40,7 @@ def test_costs_are_those_of_the_plain_equations(make_walk: Callable[..., Clip], 
 
 
 @pytest.mark.parametrize("specification", SPECIFICATIONS)
-def test_every_specification_averages_over_its_own_window(make_walk: Callable[..., Clip], specification: str) -> None:
+def test_every_specification_averages_over_its_own_window(specification: str) -> None:
     source, destination = make_walk(80, phase=0.4), make_walk(80, phase=2.1, swing=0.7)
     weights = joint_weights(source.skeleton)
     costs = geodesic_costs(source, destination, 30, 40, 31, weights, specification)
@@ -49,7 +51,7 @@ def test_every_specification_averages_over_its_own_window(make_walk: Callable[..
         assert costs[length - 1] == pytest.approx(float(np.mean(frame_distance(a, b, weights))), rel=1e-12)
 
 
-def test_one_cycle_in_phase_is_found(make_walk: Callable[..., Clip]) -> None:
+def test_one_cycle_in_phase_is_found() -> None:
     """Destination and source are one motion, shifted: the length that brings them into phase costs nothing."""
     walk = make_walk(150, cadence=1.0)
     found = geodesic_length(walk, walk, 40, 60)
@@ -62,7 +64,7 @@ def test_one_cycle_in_phase_is_found(make_walk: Callable[..., Clip]) -> None:
     assert found.blend_s == found.blend_frames / 30
 
 
-def test_joint_costs_add_up_to_the_cost(make_walk: Callable[..., Clip]) -> None:
+def test_joint_costs_add_up_to_the_cost() -> None:
     source, destination = make_walk(80), make_walk(80, phase=2.0)
     weights = joint_weights(source.skeleton)
     each = joint_costs(source, destination, 10, 70, 60, np.arange(source.skeleton.joints))
@@ -70,7 +72,7 @@ def test_joint_costs_add_up_to_the_cost(make_walk: Callable[..., Clip]) -> None:
     np.testing.assert_allclose(weights @ each, geodesic_costs(source, destination, 10, 70, 60, weights), rtol=1e-12)
 
 
-def test_lengths_do_not_depend_on_where_the_clips_stand(make_walk: Callable[..., Clip]) -> None:
+def test_lengths_do_not_depend_on_where_the_clips_stand() -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     turned = moved(destination, np.radians(170), np.array([5.0, 0.0, 2.0]))
     for length in LENGTHS:
@@ -78,7 +80,7 @@ def test_lengths_do_not_depend_on_where_the_clips_stand(make_walk: Callable[...,
         assert (plain.blend_frames, plain.cost) == (moved_one.blend_frames, moved_one.cost)
 
 
-def test_the_range_is_in_seconds_at_any_frame_rate(make_walk: Callable[..., Clip]) -> None:
+def test_the_range_is_in_seconds_at_any_frame_rate() -> None:
     walk = make_walk(600, fps=120.0)
     at_60 = geodesic_length(resample(walk, 60), resample(walk, 60), 150, 150)
     assert at_60.lengths is not None
@@ -87,7 +89,7 @@ def test_the_range_is_in_seconds_at_any_frame_rate(make_walk: Callable[..., Clip
     assert fixed_length(resample(walk, 30), resample(walk, 30), 75, 75).blend_frames == 10
 
 
-def test_geodesic_and_velocity_give_the_same_seconds_at_twice_the_rate(make_walk: Callable[..., Clip]) -> None:
+def test_geodesic_and_velocity_give_the_same_seconds_at_twice_the_rate() -> None:
     source, destination = make_walk(600, fps=60.0), make_walk(600, fps=60.0, phase=2.0)
     for length in (geodesic_length, velocity_length):
         fine = length(source, destination, 200, 400)
@@ -95,7 +97,7 @@ def test_geodesic_and_velocity_give_the_same_seconds_at_twice_the_rate(make_walk
         assert coarse.blend_s == pytest.approx(fine.blend_s, abs=1.5 / 30)
 
 
-def test_velocity_divides_the_largest_difference_by_that_joints_mean_speed(make_walk: Callable[..., Clip]) -> None:
+def test_velocity_divides_the_largest_difference_by_that_joints_mean_speed() -> None:
     source, destination = make_walk(100, phase=0.2), make_walk(100, phase=2.5, swing=0.8)
     found = velocity_length(source, destination, 30, 70)
     differences = major_joint_differences(source, destination, 30, 70)
@@ -106,7 +108,7 @@ def test_velocity_divides_the_largest_difference_by_that_joints_mean_speed(make_
     assert found.blend_frames == round(found.unclipped_s * 30)
 
 
-def test_joint_speed_is_half_the_angular_speed(make_walk: Callable[..., Clip]) -> None:
+def test_joint_speed_is_half_the_angular_speed() -> None:
     walk = make_walk(301, fps=300.0, cadence=0.5, swing=0.4)
     hip = walk.skeleton.role("hip.L")
     for frame in (0, 150, 300):
@@ -115,7 +117,7 @@ def test_joint_speed_is_half_the_angular_speed(make_walk: Callable[..., Clip]) -
         assert joint_speed(walk, frame, hip) == pytest.approx(expected, abs=2e-3)
 
 
-def test_joints_that_stand_still_clip_the_velocity_method_and_it_says_so(make_walk: Callable[..., Clip]) -> None:
+def test_joints_that_stand_still_clip_the_velocity_method_and_it_says_so() -> None:
     walk = make_walk(100)
     still = Clip(
         walk.skeleton, np.tile(walk.root_positions[:1], (100, 1)), np.tile(walk.rotations[:1], (100, 1, 1)), 30
@@ -145,14 +147,14 @@ def test_joints_that_stand_still_clip_the_velocity_method_and_it_says_so(make_wa
 )
 @pytest.mark.parametrize("length", [geodesic_length, fixed_length])
 def test_what_the_clips_cannot_supply_is_counted(
-    make_walk: Callable[..., Clip], frames: tuple[int, ...], message: str, length: Callable[..., BlendLength]
+    frames: tuple[int, ...], message: str, length: Callable[..., BlendLength]
 ) -> None:
     """At 1800 frames a second the shortest blend takes 60 frames."""
     with pytest.raises(TransitionError, match=message):
         length(make_walk(100, 1800.0, name="short"), make_walk(100, 1800.0, name="long"), *frames)
 
 
-def test_candidates_are_held_to_what_there_is(make_walk: Callable[..., Clip]) -> None:
+def test_candidates_are_held_to_what_there_is() -> None:
     walk = make_walk(100)
     found = geodesic_length(walk, walk, 80, 90)
     assert found.lengths is not None
@@ -166,7 +168,7 @@ def test_candidates_are_held_to_what_there_is(make_walk: Callable[..., Clip]) ->
         geodesic_length(*[make_walk(100, 900.0)] * 2, 80, 90)
 
 
-def test_the_velocity_methods_length_is_held_too_and_says_what_it_gave(make_walk: Callable[..., Clip]) -> None:
+def test_the_velocity_methods_length_is_held_too_and_says_what_it_gave() -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     free = velocity_length(source, destination, 40, 67)
     assert 5 < free.blend_frames < 60
@@ -178,15 +180,13 @@ def test_the_velocity_methods_length_is_held_too_and_says_what_it_gave(make_walk
 
 
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
-def test_the_fixed_length_is_a_third_of_a_second_at_any_rate(make_walk: Callable[..., Clip], fps: float) -> None:
+def test_the_fixed_length_is_a_third_of_a_second_at_any_rate(fps: float) -> None:
     walk = make_walk(400, fps)
     assert fixed_length(walk, walk, 100, 300).blend_frames == round(fps / 3)
 
 
 @pytest.mark.parametrize("specification", SPECIFICATIONS)
-def test_the_longest_available_is_the_longest_without_shortfall(
-    make_walk: Callable[..., Clip], specification: str
-) -> None:
+def test_the_longest_available_is_the_longest_without_shortfall(specification: str) -> None:
     source, destination = make_walk(30), make_walk(40)
     for i, j in ((0, 0), (5, 33), (29, 39), (14, 20), (0, 39)):
         longest = longest_available(source, destination, i, j, specification)
@@ -194,7 +194,7 @@ def test_the_longest_available_is_the_longest_without_shortfall(
         assert fits == list(range(1, longest + 1))
 
 
-def test_options_that_are_not_known_are_refused(make_walk: Callable[..., Clip]) -> None:
+def test_options_that_are_not_known_are_refused() -> None:
     walk = make_walk(150)
     with pytest.raises(TransitionError, match="a longest blend of at least 1 frame, got 0"):
         geodesic_length(walk, walk, 70, 80, longest=0)
@@ -204,7 +204,7 @@ def test_options_that_are_not_known_are_refused(make_walk: Callable[..., Clip]) 
         fixed_length(walk, walk, 70, 80, 0)
 
 
-def test_trimming_away_unused_frames_changes_nothing(make_walk: Callable[..., Clip]) -> None:
+def test_trimming_away_unused_frames_changes_nothing() -> None:
     source, destination = make_walk(150), make_walk(150, phase=2.0)
     whole = geodesic_length(source, destination, 50, 100)
     part = geodesic_length(trim(source, 50, 110), trim(destination, 41, 101), 0, 59)

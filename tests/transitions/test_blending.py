@@ -1,11 +1,11 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from walks import make_walk
 
 from study.errors import MotionError, TransitionError
 from study.motion import quaternions as quat
@@ -35,7 +35,7 @@ def test_linear_weights_go_in_equal_steps_from_the_frame_before_to_the_frame_aft
         blend_weights(4, "cubic")
 
 
-def test_facing_follows_a_turn_and_not_the_counter_rotation(make_walk: Callable[..., Clip]) -> None:
+def test_facing_follows_a_turn_and_not_the_counter_rotation() -> None:
     walk = make_walk(90, heading=0.3)
     assert np.max(np.abs(facing(walk) - 0.3)) < 0.05
     np.testing.assert_allclose(facing(moved(walk, 1.0, np.zeros(3))) - facing(walk), 1.0, atol=1e-12)
@@ -46,9 +46,7 @@ def test_facing_follows_a_turn_and_not_the_counter_rotation(make_walk: Callable[
 
 @pytest.mark.parametrize("blend_frames", [1, 2, 10, 45, 60])
 @pytest.mark.parametrize("weight", ["linear", "sigmoid"])
-def test_blending_a_clip_with_itself_in_phase_gives_the_clip(
-    make_walk: Callable[..., Clip], blend_frames: int, weight: str
-) -> None:
+def test_blending_a_clip_with_itself_in_phase_gives_the_clip(blend_frames: int, weight: str) -> None:
     walk = make_walk(150, turn_rate=0.4)
     result = blend(walk, walk, 45, 45 + blend_frames - 1, blend_frames, weight=weight)
     assert result.clip.frames == walk.frames
@@ -58,7 +56,7 @@ def test_blending_a_clip_with_itself_in_phase_gives_the_clip(
 
 
 @pytest.mark.parametrize("specification", SPECIFICATIONS)
-def test_frames_outside_the_blend_are_the_clips_own(make_walk: Callable[..., Clip], specification: str) -> None:
+def test_frames_outside_the_blend_are_the_clips_own(specification: str) -> None:
     source, destination = make_walk(120, speed=1.0), make_walk(140, phase=2.0, speed=2.5, heading=2.0)
     result = blend(source, destination, 50, 70, 20, specification=specification)
     first, last = result.source_frames[0], result.destination_frames[1]
@@ -73,7 +71,7 @@ def test_frames_outside_the_blend_are_the_clips_own(make_walk: Callable[..., Cli
     assert result.alignment.translation[1] == 0.0
 
 
-def test_start_and_end_frames_say_where_the_blend_starts_and_ends(make_walk: Callable[..., Clip]) -> None:
+def test_start_and_end_frames_say_where_the_blend_starts_and_ends() -> None:
     result = blend(make_walk(100), make_walk(100, phase=2.0), 40, 60, 15)
     assert (result.blend_start, result.blend_stop) == (40, 55)
     assert result.source_frames == (40, 55)
@@ -81,9 +79,7 @@ def test_start_and_end_frames_say_where_the_blend_starts_and_ends(make_walk: Cal
 
 
 @pytest.mark.parametrize("blend_frames", [1, 2, 7, 30, 60])
-def test_the_root_runs_over_from_one_speed_to_the_other_without_a_jump(
-    make_walk: Callable[..., Clip], blend_frames: int
-) -> None:
+def test_the_root_runs_over_from_one_speed_to_the_other_without_a_jump(blend_frames: int) -> None:
     slow, fast = make_walk(150, speed=1.0), make_walk(150, speed=3.0, phase=1.0, heading=-2.5)
     result = blend(slow, fast, 70, 80, blend_frames)
     speed = speeds(result.clip)
@@ -95,7 +91,7 @@ def test_the_root_runs_over_from_one_speed_to_the_other_without_a_jump(
     assert speed[-10:] == pytest.approx(3.0)
 
 
-def test_straight_ahead_stays_straight_ahead(make_walk: Callable[..., Clip]) -> None:
+def test_straight_ahead_stays_straight_ahead() -> None:
     """Two straight walks: the blended root leaves the source's line by no more than the bodies sway."""
     source, destination = make_walk(150, speed=1.0, heading=0.7), make_walk(150, speed=2.5, phase=2.0, heading=-2.0)
     result = blend(source, destination, 60, 90, 30)
@@ -106,7 +102,7 @@ def test_straight_ahead_stays_straight_ahead(make_walk: Callable[..., Clip]) -> 
     assert np.max(np.abs(velocity)) < 0.15
 
 
-def test_a_turning_destination_goes_on_turning(make_walk: Callable[..., Clip]) -> None:
+def test_a_turning_destination_goes_on_turning() -> None:
     source, destination = make_walk(150, speed=2.0), make_walk(150, speed=2.0, turn_rate=1.5, heading=1.0)
     result = blend(source, destination, 60, 90, 30)
     rate = np.diff(facing(result.clip)) * 30
@@ -117,7 +113,7 @@ def test_a_turning_destination_goes_on_turning(make_walk: Callable[..., Clip]) -
 
 
 @pytest.mark.parametrize("angle", [0.4, 2 * np.pi / 3, np.radians(170), -3.0])
-def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(make_walk: Callable[..., Clip], angle: Any) -> None:
+def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(angle: Any) -> None:
     source, destination = make_walk(120, turn_rate=0.5), make_walk(120, phase=2.0, speed=2.0)
     shift = np.array([3.0, 0.0, -7.0])
     plain = joint_positions(blend(source, destination, 50, 80, 25).clip)
@@ -128,7 +124,7 @@ def test_turning_either_clip_on_the_floor_moves_the_result_rigidly(make_walk: Ca
     np.testing.assert_allclose(joint_positions(with_source.clip), expected, atol=1e-12)
 
 
-def test_joints_move_no_faster_than_clips_and_ramp_together_allow(make_walk: Callable[..., Clip]) -> None:
+def test_joints_move_no_faster_than_clips_and_ramp_together_allow() -> None:
     source, destination = make_walk(120), make_walk(120, phase=2.0, cadence=1.4, swing=0.8)
     count = 20
     result = blend(source, destination, 50, 80, count)
@@ -140,7 +136,7 @@ def test_joints_move_no_faster_than_clips_and_ramp_together_allow(make_walk: Cal
     assert np.all(steps[:, 1:] <= (np.maximum(*own) + apart / (count + 1))[1:] + 1e-9)
 
 
-def test_reversing_time_and_roles_reverses_the_pose_blend(make_walk: Callable[..., Clip]) -> None:
+def test_reversing_time_and_roles_reverses_the_pose_blend() -> None:
     """Symmetric weights: destination to source, backwards, is the same blend of the joints."""
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     there = blend(source, destination, 40, 60, 15)
@@ -177,7 +173,7 @@ def test_slerp_agrees_with_the_shorter_way_where_there_is_no_doubt() -> None:
     np.testing.assert_array_equal(slerp_one_way(same, -same, share[:, None]), same)
 
 
-def test_blends_reach_to_the_very_ends_of_the_clips(make_walk: Callable[..., Clip]) -> None:
+def test_blends_reach_to_the_very_ends_of_the_clips() -> None:
     """No frame before the source's window, none after the destination's, none on the far side of either."""
     source, destination = make_walk(20), make_walk(20, phase=1.0)
     whole = blend(source, destination, 0, 19, 20)
@@ -189,7 +185,7 @@ def test_blends_reach_to_the_very_ends_of_the_clips(make_walk: Callable[..., Cli
     assert np.max(np.abs(np.diff(speeds(left.clip)))) < 0.05
 
 
-def test_joints_may_blend_for_less_long_than_the_figure(make_walk: Callable[..., Clip]) -> None:
+def test_joints_may_blend_for_less_long_than_the_figure() -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     shoulder, hip = (source.skeleton.role(role) for role in ("shoulder.L", "hip.L"))
     whole = blend(source, destination, 40, 60, 20).clip.rotations[40:60]
@@ -204,7 +200,7 @@ def test_joints_may_blend_for_less_long_than_the_figure(make_walk: Callable[...,
         blend(source, destination, 40, 60, 20, joint_frames={"knee.R": 21})
 
 
-def test_a_cut_matches_facing_and_floor_position(make_walk: Callable[..., Clip]) -> None:
+def test_a_cut_matches_facing_and_floor_position() -> None:
     source, destination = make_walk(100, heading=1.0), make_walk(100, phase=2.0, heading=-2.0)
     result = cut(source, destination, 40, 60)
     assert (result.blend_start, result.blend_stop, result.blend_frames) == (40, 40, 0)
@@ -216,13 +212,13 @@ def test_a_cut_matches_facing_and_floor_position(make_walk: Callable[..., Clip])
     np.testing.assert_allclose(same.root_positions, source.root_positions, atol=1e-12)
 
 
-def test_the_destination_is_put_on_the_sources_skeleton(make_walk: Callable[..., Clip]) -> None:
+def test_the_destination_is_put_on_the_sources_skeleton() -> None:
     result = blend(make_walk(100), make_walk(100, scale=1.5, speed=3.0), 40, 60, 10)
     assert result.clip.skeleton.leg_length == pytest.approx(0.84)
     assert speeds(result.clip)[-1] == pytest.approx(2.0)
 
 
-def test_rigs_that_differ_in_leaf_joints_alone_are_blended(make_walk: Callable[..., Clip]) -> None:
+def test_rigs_that_differ_in_leaf_joints_alone_are_blended() -> None:
     source, destination = make_walk(100), make_walk(100, toes=False)
     result = blend(source, destination, 40, 60, 10).clip
     np.testing.assert_allclose(result.rotations, blend(source, make_walk(100), 40, 60, 10).clip.rotations, atol=1e-12)
@@ -232,7 +228,7 @@ def test_rigs_that_differ_in_leaf_joints_alone_are_blended(make_walk: Callable[.
     assert "removed joints LeftToe, RightToe" in " ".join(back.history)
 
 
-def test_what_was_done_is_on_record(make_walk: Callable[..., Clip]) -> None:
+def test_what_was_done_is_on_record() -> None:
     source, destination = (
         make_walk(100, name="walk").noting("mended"),
         replace(make_walk(100, name="run"), synthetic=True),
@@ -254,9 +250,7 @@ def test_what_was_done_is_on_record(make_walk: Callable[..., Clip]) -> None:
         ((40, 100, 1), "end frame from 0 to 99"),
     ],
 )
-def test_frames_that_are_not_there_are_refused(
-    make_walk: Callable[..., Clip], frames: tuple[int, ...], message: str
-) -> None:
+def test_frames_that_are_not_there_are_refused(frames: tuple[int, ...], message: str) -> None:
     walk = make_walk(100, name="walk")
     with pytest.raises(TransitionError, match=message):
         blend(walk, walk, *frames)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
+from walks import make_walk
 
-from study.motion.clip import Clip
 from study.transitions.candidates import frame_costs
 from study.transitions.cost_matrix import WINDOW_S
 from study.transitions.one_hop.joint_distance import JointDistance
 from study.transitions.point_cloud import point_cloud, window_distances
 
 
-def test_point_clouds_are_compared_over_a_third_of_a_second_around_a_frame(make_walk: Callable[..., Clip]) -> None:
+def test_point_clouds_are_compared_over_a_third_of_a_second_around_a_frame() -> None:
     source, destination = make_walk(40, speed=1.0), make_walk(50, speed=2.0, phase=1.0)
     frames = round(WINDOW_S * 30)
     assert frames > 5
@@ -26,7 +24,7 @@ def test_point_clouds_are_compared_over_a_third_of_a_second_around_a_frame(make_
     assert costs[0, 0] == pytest.approx(np.median(whole)), "a frame without a whole window"
 
 
-def test_a_frame_costs_nothing_beside_itself(make_walk: Callable[..., Clip]) -> None:
+def test_a_frame_costs_nothing_beside_itself() -> None:
     walk = make_walk(60, cadence=0.9)
     counts = JointDistance().counts(walk, walk, 5, range(10, 40), range(20, 50))
     same = [counts[row - 10, row - 20] for row in range(20, 40)]

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from walks import make_walk
 
 from study.errors import TransitionError
 from study.motion.clip import Clip, moved, resample, sample
@@ -55,7 +55,7 @@ def plain_cost(
 
 
 @pytest.fixture(scope="module")
-def pair(make_walk: Callable[..., Clip]) -> Any:
+def pair() -> Any:
     return (
         make_walk(40, phase=0.3, turn_rate=0.4, heading=1.0),
         make_walk(50, phase=2.0, swing=0.8, speed=2.0, cadence=1.4),
@@ -112,13 +112,13 @@ def test_a_clip_costs_nothing_to_itself(pair: Any) -> None:
     np.testing.assert_allclose(np.diag(cm.cost_matrix(pair[0], pair[0], weights="lee2002")), 0.0, atol=1e-12)
 
 
-def test_velocities_mean_the_same_at_another_frame_rate(make_walk: Callable[..., Clip]) -> None:
+def test_velocities_mean_the_same_at_another_frame_rate() -> None:
     slow, fast = make_walk(40), make_walk(160, fps=120.0)
     joints = np.flatnonzero(joint_weights(slow.skeleton))
     np.testing.assert_allclose(cm.velocities(fast, joints)[4:150:4], cm.velocities(slow, joints)[1:38], atol=2e-3)
 
 
-def test_blocks_are_rows_of_the_matrix_in_order(make_walk: Callable[..., Clip]) -> None:
+def test_blocks_are_rows_of_the_matrix_in_order() -> None:
     source, destination = make_walk(600), make_walk(90, phase=1.0)
     whole = cm.cost_matrix(source, destination, precision="single")
     at = 0
@@ -132,7 +132,7 @@ def test_blocks_are_rows_of_the_matrix_in_order(make_walk: Callable[..., Clip]) 
     assert (found.min, found.max, found.shape) == (float(whole.min()), float(whole.max()), whole.shape)
 
 
-def test_the_least_cost_is_where_the_same_pose_comes_again(make_walk: Callable[..., Clip]) -> None:
+def test_the_least_cost_is_where_the_same_pose_comes_again() -> None:
     walk = make_walk(150, phase=0.3)
     later = sample(walk, np.arange(40, 120))
     found = cm.extremes(cm.joint_blocks(walk, later, precision="double"))
@@ -140,7 +140,7 @@ def test_the_least_cost_is_where_the_same_pose_comes_again(make_walk: Callable[.
     assert (found.argmin[0] - found.argmin[1] - 40) % 30 == 0, "the walk repeats each 30 frames"
 
 
-def test_point_clouds_come_in_blocks_too(make_walk: Callable[..., Clip]) -> None:
+def test_point_clouds_come_in_blocks_too() -> None:
     from study.transitions.point_cloud import point_cloud, window_distances
 
     source, destination = make_walk(300), make_walk(80, phase=1.0)

@@ -1,17 +1,16 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from walks import make_rig
 
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
-from study.motion.skeleton import Skeleton
 from study.transitions.candidates import candidates
 from study.transitions.cost_matrix import cost_matrix
 from study.transitions.fit_weights import (
@@ -27,9 +26,9 @@ from study.transitions.weights import LEE2002, ROLES, WANG2003
 
 
 @pytest.fixture(scope="module")
-def clips(rig: Callable[..., Skeleton]) -> list[Clip]:
+def clips() -> list[Clip]:
     """Restless figures: every joint wanders smoothly on its own, so that no two joints tell the same."""
-    skeleton = rig()
+    skeleton = make_rig()
     rng = np.random.default_rng(3)
     made = []
     for number in range(4):

@@ -1,26 +1,27 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from walks import make_walk
 
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, global_rotations, joint_positions, moved, trim
+from study.motion.feet import toes
 from study.motion.legs import lowered, reach
 from study.motion.synthetic import synthesize
 from study.transitions.blending import Transition, blend, cut
 from study.transitions.flaws import find_flaws
 from study.transitions.footskate import plant_feet
-from study.transitions.support import find_support, toes
+from study.transitions.support import find_support
 from study.transitions.timewarp import warped_blend
 
 
 @pytest.fixture(scope="module")
-def slider(make_walk: Callable[..., Clip]) -> Clip:
+def slider() -> Clip:
     """Ninety frames of bent legs that glide along at 0.2 m/s without lifting the feet."""
     walk = make_walk(90, speed=0.2, swing=0.0)
     rotations = walk.rotations.copy()
@@ -241,7 +242,7 @@ def test_knees_are_neither_inverted_nor_overstretched(
     np.testing.assert_allclose(shifts_of_low[..., 1] - shifts[..., 1], np.stack([drop, drop], axis=1), atol=1e-12)
 
 
-def test_a_straight_leg_bends_forward_at_the_knee(make_walk: Callable[..., Clip]) -> None:
+def test_a_straight_leg_bends_forward_at_the_knee() -> None:
     """Knees that are straight in every frame have no plane of their own; the line of the hips gives the axis."""
     still = make_walk(40, speed=0.0, swing=0.0)
     shifts = np.zeros((40, 2, 3))

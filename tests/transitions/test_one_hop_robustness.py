@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -11,6 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from programs import program
 
 from study.errors import TransitionError
 from study.motion.clip import Clip, resample, retarget, trim
@@ -25,32 +24,17 @@ from study.transitions.one_hop.play import Played, Segment
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
 from study.transitions.point_cloud import point_cloud, window_distances
 
-ROOT = Path(__file__).parents[2]
-
-
-def loaded(name: str) -> ModuleType:
-    """A benchmark as a module."""
-    spec = importlib.util.spec_from_file_location(f"benchmark_{name}", ROOT / "benchmarks" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    path = list(sys.path)
-    spec.loader.exec_module(module)
-    sys.path[:] = path
-    return module
-
 
 @pytest.fixture(scope="module")
 def benchmark() -> ModuleType:
     """The benchmark, for its search that tries everything."""
-    return loaded("one_hop")
+    return program("benchmarks/one_hop")
 
 
 @pytest.fixture(scope="module")
 def robustness() -> ModuleType:
     """The transitions by rule, their costs and pictures."""
-    return loaded("one_hop_robustness")
+    return program("benchmarks/one_hop_robustness")
 
 
 @pytest.fixture(scope="module")

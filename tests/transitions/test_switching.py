@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from scipy.integrate import quad, solve_ivp
+from walks import make_walk
 
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions, moved
@@ -106,22 +105,17 @@ def made(kind: str, source: Clip, destination: Clip, blend_s: float = BLEND_S) -
     return inertialized(source, destination, start, end, frames, decay, placed_frames=count)
 
 
-@pytest.fixture
-def pair(make_walk: Callable[..., Clip]) -> Callable[[float], tuple[Clip, Clip]]:
+def pair(fps: float) -> tuple[Clip, Clip]:
     """A slow walk and a fast one in another phase that turns, at a frame rate."""
-
-    def make(fps: float) -> tuple[Clip, Clip]:
-        frames = round(5 * fps)
-        return (
-            make_walk(frames, fps, speed=1.0, swing=0.4),
-            make_walk(frames, fps, speed=2.4, swing=0.7, cadence=1.3, phase=1.9, heading=2.0, turn_rate=0.6),
-        )
-
-    return make
+    frames = round(5 * fps)
+    return (
+        make_walk(frames, fps, speed=1.0, swing=0.4),
+        make_walk(frames, fps, speed=2.4, swing=0.7, cadence=1.3, phase=1.9, heading=2.0, turn_rate=0.6),
+    )
 
 
 @pytest.mark.parametrize("kind", ["quintic", "spring"])
-def test_switching_to_the_clip_itself_in_phase_gives_the_clip(kind: str, make_walk: Callable[..., Clip]) -> None:
+def test_switching_to_the_clip_itself_in_phase_gives_the_clip(kind: str) -> None:
     walk = make_walk(150, turn_rate=0.4)
     start, count = 61, 20
     decay = quintic(21 / 30) if kind == "quintic" else spring(0.1, 21 / 30)
@@ -131,7 +125,7 @@ def test_switching_to_the_clip_itself_in_phase_gives_the_clip(kind: str, make_wa
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_frames_outside_are_the_clips_own(kind: str, pair: Callable[[float], tuple[Clip, Clip]]) -> None:
+def test_frames_outside_are_the_clips_own(kind: str) -> None:
     source, destination = pair(30.0)
     result = made(kind, source, destination)
     assert (result.blend_start, result.blend_stop - result.blend_start) == (61, result.blend_frames)
@@ -144,7 +138,7 @@ def test_frames_outside_are_the_clips_own(kind: str, pair: Callable[[float], tup
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_neither_poses_nor_speeds_jump_at_either_end(kind: str, pair: Callable[[float], tuple[Clip, Clip]]) -> None:
+def test_neither_poses_nor_speeds_jump_at_either_end(kind: str) -> None:
     source, destination = pair(120.0)
     result = made(kind, source, destination)
     positions = joint_positions(result.clip)
@@ -164,7 +158,7 @@ def test_neither_poses_nor_speeds_jump_at_either_end(kind: str, pair: Callable[[
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_frame_rates_agree(kind: str, pair: Callable[[float], tuple[Clip, Clip]]) -> None:
+def test_frame_rates_agree(kind: str) -> None:
     """The same transition sampled at 30, 60 and 120 fps, to what velocities over two frames differ by."""
     fine = joint_positions(made(kind, *pair(240.0)).clip)[::8]
     apart = []
@@ -177,7 +171,7 @@ def test_frame_rates_agree(kind: str, pair: Callable[[float], tuple[Clip, Clip]]
     assert apart[2] < 0.5 * apart[1]
 
 
-def test_a_dead_blend_holds_to_a_source_that_goes_where_the_destination_is(make_walk: Callable[..., Clip]) -> None:
+def test_a_dead_blend_holds_to_a_source_that_goes_where_the_destination_is() -> None:
     """At the first blended frames the pose is the source's own, moved on at its speed."""
     source, destination = make_walk(150), make_walk(150, phase=0.4)
     result = made("dead", source, destination)
@@ -191,17 +185,13 @@ def test_a_dead_blend_holds_to_a_source_that_goes_where_the_destination_is(make_
     (20, 9, 10, "lacks 1 frame before its first"),
     (20, 148, 10, "20 frames after it"),
 ])  # fmt: skip
-def test_what_the_clips_lack_is_said(
-    start: int, end: int, count: int, found: str, make_walk: Callable[..., Clip]
-) -> None:
+def test_what_the_clips_lack_is_said(start: int, end: int, count: int, found: str) -> None:
     walk = make_walk(150)
     with pytest.raises(TransitionError, match=found):
         inertialized(walk, walk, start, end, 2 * count, quintic(0.5), placed_frames=count)
 
 
-def test_a_switch_at_the_beginning_of_a_clip_takes_both_velocities_over_the_same_frames(
-    make_walk: Callable[..., Clip],
-) -> None:
+def test_a_switch_at_the_beginning_of_a_clip_takes_both_velocities_over_the_same_frames() -> None:
     """A clip that goes on as itself from its second frame has no offset and no rate of one."""
     walk = make_walk(90)
     later = make_walk(89, phase=2 * np.pi / 30)  # the same walk from its second frame on

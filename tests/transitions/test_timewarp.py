@@ -1,12 +1,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from walks import make_walk
 
 from study.errors import TransitionError
 from study.motion import quaternions as quat
@@ -34,7 +34,7 @@ def plain_cost(source: Clip, destination: Clip, i: int, j: int, b_from: int, b_t
 
 
 @pytest.fixture(scope="module")
-def pair(make_walk: Callable[..., Clip]) -> Any:
+def pair() -> Any:
     return make_walk(60, phase=0.4), make_walk(60, phase=2.1, cadence=1.4, swing=0.7)
 
 
@@ -49,7 +49,7 @@ def test_costs_are_those_of_the_plain_equations(pair: Any, average: bool) -> Non
             assert costs[b_from - 1, b_to - 1] == pytest.approx(expected, rel=1e-11, abs=1e-14), (b_from, b_to)
 
 
-def test_long_windows_agree_at_a_sample_of_lengths(make_walk: Callable[..., Clip]) -> None:
+def test_long_windows_agree_at_a_sample_of_lengths() -> None:
     pair = make_walk(90, phase=0.4), make_walk(90, phase=2.1, cadence=1.4)
     weights = joint_weights(pair[0].skeleton)
     costs = warp_costs(*pair, 25, 70, 60, weights, average=False, steepest=math.inf)
@@ -83,9 +83,7 @@ def _between(frames: list[list[float]], time: float) -> list[float]:
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("steepest", [1.0, 1.5, 2.0, 12.0])
-def test_the_search_finds_what_trying_every_pair_of_windows_finds(
-    make_walk: Callable[..., Clip], seed: int, steepest: float
-) -> None:
+def test_the_search_finds_what_trying_every_pair_of_windows_finds(seed: int, steepest: float) -> None:
     """Every pose of every pair of windows within the slope, in plain Python that shares no code with the search."""
     rng = np.random.default_rng(seed)
     clips = [make_walk(50, phase=float(rng.uniform(0, 6)), cadence=float(rng.uniform(0.6, 1.6))) for _ in range(2)]
@@ -114,7 +112,7 @@ def test_the_search_finds_what_trying_every_pair_of_windows_finds(
     assert int(np.isfinite(found.costs).sum()) == len(costs)
 
 
-def test_neither_window_is_more_than_twice_as_long_as_the_other(make_walk: Callable[..., Clip]) -> None:
+def test_neither_window_is_more_than_twice_as_long_as_the_other() -> None:
     """Standing meets walking as well in many frames as in few: without a bound it would be drawn out without end."""
     stand, walk = make_walk(100, swing=0.0), make_walk(100, phase=1.0)
     unbounded = warp_length(stand, walk, 20, 80, longest=40, steepest=math.inf)
@@ -127,9 +125,7 @@ def test_neither_window_is_more_than_twice_as_long_as_the_other(make_walk: Calla
 
 
 @pytest.mark.parametrize("windows", [(9, 18), (18, 9), (12, 17), (17, 12), (10, 10)])
-def test_time_runs_on_within_a_warp_at_slopes_within_the_bound(
-    make_walk: Callable[..., Clip], windows: tuple[int, int]
-) -> None:
+def test_time_runs_on_within_a_warp_at_slopes_within_the_bound(windows: tuple[int, int]) -> None:
     """Two clips whose elbows turn like clocks, one at each side, show which of their moments each blended frame has."""
     rate = np.radians(2.0)
     base = make_walk(70, swing=0.0)
@@ -159,7 +155,7 @@ def test_time_runs_on_within_a_warp_at_slopes_within_the_bound(
     assert 0.5 - 1e-6 <= ratio <= 2.0 + 1e-6
 
 
-def test_another_tempo_of_the_same_motion_is_found(make_walk: Callable[..., Clip]) -> None:
+def test_another_tempo_of_the_same_motion_is_found() -> None:
     """The destination is the source at two thirds of its tempo: two source frames to three of the destination."""
     source, destination = make_walk(150, cadence=1.2), make_walk(150, cadence=0.8)
     # Source frame i - 1 + s is at phase 1.2 (i - 1 + s), destination frame j - b + t at 0.8 (j - b + t): equal for
@@ -192,9 +188,7 @@ def test_equal_lengths_blend_as_without_a_warp(pair: Any) -> None:
 
 
 @pytest.mark.parametrize(("b_from", "b_to"), [(10, 20), (20, 10), (1, 15), (15, 1), (18, 28)])
-def test_a_warped_blend_takes_the_longer_time_and_keeps_the_rest(
-    make_walk: Callable[..., Clip], b_from: int, b_to: int
-) -> None:
+def test_a_warped_blend_takes_the_longer_time_and_keeps_the_rest(b_from: int, b_to: int) -> None:
     source, destination = make_walk(100), make_walk(100, phase=2.0)
     result = warped_blend(source, destination, 40, 60, b_from, b_to, weight="sigmoid")
     assert result.blend_frames == max(b_from, b_to) == result.blend_stop - result.blend_start

@@ -1,17 +1,16 @@
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
+from walks import make_rig
 
 from study.errors import MotionError, TransitionError
 from study.motion.skeleton import Skeleton
 from study.transitions.weights import joint_weights
 
 
-def test_the_root_weighs_nothing_unless_asked_for(rig: Callable[..., Skeleton]) -> None:
-    skeleton = rig()
+def test_the_root_weighs_nothing_unless_asked_for() -> None:
+    skeleton = make_rig()
     weights = joint_weights(skeleton, "lee2002")
     assert weights[skeleton.role("pelvis")] == 0.0
     assert weights[skeleton.role("spine")] == 1.0
@@ -19,8 +18,8 @@ def test_the_root_weighs_nothing_unless_asked_for(rig: Callable[..., Skeleton]) 
     assert joint_weights(skeleton, "lee2002", with_root=True)[skeleton.role("pelvis")] == 1.0
 
 
-def test_a_mapping_by_role_is_taken_as_it_is(rig: Callable[..., Skeleton]) -> None:
-    skeleton = rig()
+def test_a_mapping_by_role_is_taken_as_it_is() -> None:
+    skeleton = make_rig()
     weights = joint_weights(skeleton, {"wrist.L": 0.25, "head": 2.0, "hip.L": 0.0})
     assert weights[skeleton.role("wrist.L")] == 0.25
     assert weights[skeleton.role("head")] == 2.0
@@ -51,8 +50,6 @@ def test_a_rig_without_a_needed_joint_is_refused_by_role() -> None:
         ({"pelvis": 1.0}, "other than the root"),
     ],
 )
-def test_weights_that_make_no_sense_are_refused(
-    rig: Callable[..., Skeleton], weights: dict[str, float] | str, message: str
-) -> None:
+def test_weights_that_make_no_sense_are_refused(weights: dict[str, float] | str, message: str) -> None:
     with pytest.raises(TransitionError, match=message):
-        joint_weights(rig(), weights)
+        joint_weights(make_rig(), weights)
