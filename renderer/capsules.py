@@ -7,7 +7,8 @@ world. Which capsules make up a body is the business of `renderer.figure`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,13 @@ class Anchor:
     moved: tuple[tuple[Way, float], ...] = ()
 
 
+_ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
+    "ends": ((2,), np.int64), "along": ((2,), np.float64), "beyond": ((2,), np.float64), "radii": ((2,), np.float64),
+    "colours": ((3,), np.int64), "rounded": ((2,), np.bool_), "part": ((), np.int64), "lift": ((), np.float64),
+}  # fmt: skip
+"""The arrays of a figure, with what each has for a capsule."""
+
+
 @dataclass(frozen=True, eq=False)
 class Figure:
     """Capsules on points: cones with round ends, each from one point towards another.
@@ -79,14 +87,14 @@ class Figure:
     lit
         Whether capsules are shaded as round; else flat discs of one colour.
     rounded : (capsules, 2)
-        Whether an end is shaded as a round one, not as going straight on into the next bone; no end where None.
+        Whether an end is shaded as a round one, not as going straight on into the next bone; no end by default.
     anchors
         Further points to hang capsules on; each may rest on those before it.
     part : (capsules,)
         The capsule along whose line each one is lit. Those with one line look like one surface, whatever they are put
-        together from; each by its own where None.
+        together from; each by its own by default.
     lift : (capsules,)
-        Metres by which it counts as nearer to the eye when it is decided what is painted over what; zeros where None.
+        Metres by which it counts as nearer to the eye when it is decided what is painted over what; zeros by default.
     floor_m
         Height of a floor to stand on, metres; None for none.
     """
@@ -100,35 +108,30 @@ class Figure:
     colours: IntArray
     background: RGB = BACKGROUND
     lit: bool = True
-    rounded: NDArray[np.bool_] | None = None
+    rounded: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     anchors: tuple[Anchor, ...] = ()
-    part: IntArray | None = None
-    lift: FloatArray | None = None
+    part: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    lift: FloatArray = field(default_factory=lambda: np.zeros(0))
     floor_m: float | None = None
     ending: tuple[int, int] = (0, 0)
 
     def __post_init__(self) -> None:
         check_colour(self.background, "background colour")
         count = len(self.ends)
-        for name, shape in (
-            ("ends", (count, 2)),
-            ("along", (count, 2)),
-            ("beyond", (count, 2)),
-            ("radii", (count, 2)),
-            ("colours", (count, 3)),
-        ):
-            array = np.array(getattr(self, name), dtype=np.int64 if name in ("ends", "colours") else np.float64)
-            if array.shape != shape or count == 0:
+        defaults: dict[str, NDArray[Any]] = {
+            "rounded": np.zeros((count, 2)),
+            "part": np.arange(count),
+            "lift": np.zeros(count),
+        }
+        for name, (shape, kind) in _ARRAYS.items():
+            given = np.asarray(getattr(self, name))
+            array: NDArray[Any] = np.array(given if given.size else defaults.get(name, given), dtype=kind)
+            if array.shape != (count, *shape) or count == 0:
                 raise RendererError(
-                    f"Expected a figure's {name} of shape {shape}, at least one capsule, got {array.shape}."
+                    f"Expected a figure's {name} of shape {(count, *shape)}, at least one capsule, got {array.shape}."
                 )
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        for name, given in (("part", self.part), ("lift", self.lift)):
-            if given is not None and given.shape != (count,):
-                raise RendererError(f"Expected a figure's {name} of shape {(count,)}, got {given.shape}.")
-        if self.rounded is not None and self.rounded.shape != (count, 2):
-            raise RendererError(f"Expected round ends of shape {(count, 2)}, got {self.rounded.shape}.")
         if self.floor_m is not None and not np.isfinite(self.floor_m):
             raise RendererError(f"Expected a floor at a finite height, got {self.floor_m}.")
         last = self.points + len(self.anchors) - 1
@@ -155,11 +158,6 @@ def place(figure: Figure, positions: FloatArray) -> FloatArray:
         [first + way * figure.along[:, e, None] + unit * figure.beyond[:, e, None] for e in (0, 1)], axis=2
     )
     return placed
-
-
-def outline(figure: Figure, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What a figure takes of space: ends of its capsules `(frames, points, 3)`, and their radii `(points,)`, metres."""
-    return place(figure, positions).reshape(len(positions), -1, 3), figure.radii.reshape(-1)
 
 
 def _with_anchors(figure: Figure, positions: FloatArray) -> FloatArray:
@@ -195,9 +193,7 @@ def _direction(way: Way, points: Sequence[FloatArray], known: dict[Way, FloatArr
 
 def kept_capsules(figure: Figure, keep: NDArray[np.bool_]) -> Figure:
     """The figure with only some of its capsules, `keep (capsules,)`."""
-    names = ("ends", "along", "beyond", "radii", "colours", "rounded", "lift")
-    kept = {name: getattr(figure, name)[keep] for name in names if getattr(figure, name) is not None}
-    if figure.part is not None:
-        number = np.cumsum(keep) - 1
-        kept["part"] = np.where(keep[figure.part], number[figure.part], number)[keep]
-    return replace(figure, **kept)
+    number = np.cumsum(keep) - 1
+    part = np.where(keep[figure.part], number[figure.part], number)[keep]
+    kept = {name: getattr(figure, name)[keep] for name in _ARRAYS}
+    return replace(figure, **{**kept, "part": part})

@@ -10,7 +10,7 @@ Okabe and Ito (2008), the right side also clearly darker.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -122,11 +122,12 @@ def make_figure(
     if not 0.1 <= height <= 10.0:
         raise RendererError(f"Expected a height from 0.1 to 10 metres, got {height}.")
     body = Body(tree, tuple(sides), dict(parts or {}), height / REFERENCE_HEIGHT_M)
-    make, own, ground = {
-        "stick": (_stick, COLOURS, BACKGROUND),
+    styles: dict[str, tuple[Callable[[Body, Mapping[str, RGB]], Parts], Mapping[str, RGB], RGB]] = {
+        "stick": (_bones, COLOURS, BACKGROUND),
         "points": (_points, dict.fromkeys(SIDES, POINT_COLOUR), POINT_BACKGROUND),
         "mannequin": (_full, {**COLOURS, "centre": MANNEQUIN_CENTRE}, BACKGROUND),
-    }[style]
+    }
+    make, own, ground = styles[style]
     if unknown := sorted(set(colours or {}) - set(SIDES)):
         raise RendererError(f"Expected colours for {', '.join(SIDES)}, got {', '.join(map(repr, unknown))}.")
     paint = {**own, **{side: check_colour(c, f"{side} colour") for side, c in (colours or {}).items()}}
@@ -135,16 +136,12 @@ def make_figure(
     return replace(make(body, paint).figure(style, ground, lit=style != "points"), floor_m=floor_m)
 
 
-def _stick(body: Body, paint: Mapping[str, RGB]) -> Parts:
-    return _bones(body, paint, _STICK_RADII)
-
-
 def _full(body: Body, paint: Mapping[str, RGB]) -> Parts:
     """A mannequin, or full bones for a body that lacks limbs."""
     return mannequin(body, paint) if body.parts.keys() >= WHOLE else _bones(body, paint, _FULL_RADII)
 
 
-def _bones(body: Body, paint: Mapping[str, RGB], thickness: Mapping[str, tuple[float, float]]) -> Parts:
+def _bones(body: Body, paint: Mapping[str, RGB], thickness: Mapping[str, tuple[float, float]] = _STICK_RADII) -> Parts:
     """A capsule for each bone, one for each hand, and a head."""
     made = Parts(len(body.sides))
     hidden = body.below("head", "wrist.L", "wrist.R")
@@ -159,7 +156,11 @@ def _bones(body: Body, paint: Mapping[str, RGB], thickness: Mapping[str, tuple[f
         # One capsule from the wrist to the tip of the longest finger: the fingers are held together.
         if wrist is not None and (tip := body.tip_of(wrist)) != wrist:
             made.add((wrist, tip), body.scaled(thickness["wrist"]), paint[name])
-    _add_head(made, body, paint["centre"])
+    if "head" in body.parts:
+        # An egg from chin to crown; where the head has no bone of its own, its joint is at the end of the line.
+        line, radii, reach = body.head_line(), body.scaled(_HEAD_RADII), body.scaled(_HEAD_REACH)
+        share = 0.0 if line[0] == body.parts["head"] else 1.0
+        made.add(line, radii, paint["centre"], (share, share), reach, rounded=True)
     return made
 
 
@@ -178,19 +179,6 @@ def _points(body: Body, paint: Mapping[str, RGB]) -> Parts:
         for point, side in enumerate(body.sides):
             made.add((point, point), radius, paint[side])
     return made
-
-
-def _head_start(body: Body) -> tuple[float, float]:
-    """Where the head's joint lies on `head_line`: at its start, or at its end where the head has no bone of its own."""
-    share = 0.0 if body.head_line()[0] == body.parts["head"] else 1.0
-    return share, share
-
-
-def _add_head(made: Parts, body: Body, colour: RGB) -> None:
-    """An egg from chin to crown, on the line from the head's joint to the end of its bone."""
-    if "head" in body.parts:
-        radii, reach = body.scaled(_HEAD_RADII), body.scaled(_HEAD_REACH)
-        made.add(body.head_line(), radii, colour, _head_start(body), reach, rounded=True)
 
 
 def _check_bones(bones: ArrayLike, sides: Sequence[str], parts: Mapping[str, int]) -> IntArray:

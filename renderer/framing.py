@@ -24,7 +24,7 @@ from renderer.camera import (
     view_axes,
     view_yaw,
 )
-from renderer.capsules import Figure, outline
+from renderer.capsules import Figure, place
 from renderer.errors import RendererError
 
 FILLS = {"fixed": (0.86, 0.86), "pan": (0.80, 0.90), "track": (0.86, 0.86)}
@@ -99,8 +99,8 @@ def frame_group(
     group = [clip - shift for clip, shift in zip(group, shifts, strict=True)]
     radii: list[FloatArray | float] = [padding_m] * len(group)
     if figures:
-        outlines = [outline(figure, clip) for figure, clip in zip(figures, group, strict=True)]
-        group, radii = [ends for ends, _ in outlines], [radius for _, radius in outlines]
+        placed = [place(figure, clip) for figure, clip in zip(figures, group, strict=True)]
+        group, radii = [ends.reshape(len(ends), -1, 3) for ends in placed], [each.radii.reshape(-1) for each in figures]
     if camera == "pan":
         return _panning(group, radii, size, yaw, elevation, shares, fps)
     still = _still(group, radii, size, view_axes(yaw, elevation), shares, field_of_view)
@@ -137,7 +137,7 @@ def _still(
         eye[axis] = 0.5 * (right - left)
     # Never closer than half a metre before the nearest point, whatever the lens.
     eye[2] = max(*distances, float((seen[:, 2] + padding).max()) + 0.5)
-    return Camera(_turned_back(eye, axes), axes, float(focal), size)
+    return Camera((axes * eye[:, None]).sum(axis=0), axes, float(focal), size)
 
 
 def _panning(
@@ -211,8 +211,3 @@ def find_heading(group: Sequence[FloatArray]) -> float:
     if np.hypot(*way) < 0.3:
         return 0.0
     return float(np.arctan2(way[0], way[1]))
-
-
-def _turned_back(point: FloatArray, axes: FloatArray) -> FloatArray:
-    turned: FloatArray = (axes * point[:, None]).sum(axis=0)
-    return turned

@@ -12,7 +12,7 @@ import pickle
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
@@ -134,29 +134,22 @@ def render_many(
     count = default_workers() if workers is None else workers
     if count < 1:
         raise RendererError(f"Expected at least one worker, got {workers}.")
-    tell = _Teller(todo, progress)
+    start, frames = time.perf_counter(), sum(len(job.positions) for job in todo)
+    told: list[VideoInfo] = []
+
+    def tell(video: VideoInfo) -> VideoInfo:
+        told.append(video)
+        if progress is not None:
+            made, seconds = sum(one.frames for one in told), time.perf_counter() - start
+            progress(Progress(len(told), len(todo), made, frames, seconds, video))
+        return video
+
     if min(count, len(todo)) <= 1:
         return [tell(run_job(job)) for job in todo]
     return _in_processes(todo, min(count, len(todo)), tell)
 
 
-class _Teller:
-    def __init__(self, jobs: Sequence[RenderJob], progress: Callable[[Progress], object] | None) -> None:
-        self._total = (len(jobs), sum(len(job.positions) for job in jobs))
-        self._progress = progress
-        self._start = time.perf_counter()
-        self._videos = self._frames = 0
-
-    def __call__(self, video: VideoInfo) -> VideoInfo:
-        self._videos += 1
-        self._frames += video.frames
-        if self._progress is not None:
-            seconds = time.perf_counter() - self._start
-            self._progress(Progress(self._videos, self._total[0], self._frames, self._total[1], seconds, video))
-        return video
-
-
-def _in_processes(jobs: list[RenderJob], workers: int, tell: _Teller) -> list[VideoInfo]:
+def _in_processes(jobs: list[RenderJob], workers: int, tell: Callable[[VideoInfo], VideoInfo]) -> list[VideoInfo]:
     # Spawned, not forked: a GL library that has run in this process does not survive a fork.
     try:
         pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)

@@ -96,9 +96,8 @@ def lay_out(
     ends = np.round(ends * 256.0) / 256.0
     radii = figure.radii * camera.focal_pixels * nearness
     radii = np.maximum(np.round(radii * 256.0) / 256.0, 0.5)
-    parts = np.arange(len(figure.ends)) if figure.part is None else figure.part
-    lifted = nearness if figure.lift is None else nearness + figure.lift[:, None] * nearness**2
-    order = paint_order(ends, radii, lifted, figure.radii.mean(axis=1), joined(figure), parts)
+    lifted = nearness + figure.lift[:, None] * nearness**2
+    order = paint_order(ends, radii, lifted, figure.radii.mean(axis=1), joined(figure), figure.part)
     data = _shader_numbers(ends, radii, figure)
     for segment in segments:
         data[segment.start : segment.stop, :, 8:11] = _paint(painted(figure, segment.start, [segment]))
@@ -192,15 +191,12 @@ def _shader_numbers(ends: FloatArray, radii: FloatArray, figure: Figure | None) 
         return data
     data[..., 8:11] = _paint(figure)
     if figure.lit:
-        rounded = np.zeros((count, 2), dtype=bool) if figure.rounded is None else figure.rounded
         # 1: going straight on at both ends; 2: the far end is round; 3: both are.
-        data[..., 14] = 1.0 + rounded[:, 1] + (rounded[:, 0] & rounded[:, 1])
-    if figure.part is not None:
-        data[..., 14] = data[..., figure.part, 14]
-        for leader in np.unique(figure.part).tolist():
-            members = np.flatnonzero(figure.part == leader)
-            around = np.round(_reach(ends[:, members], radii[:, members], ends[:, leader]) * 256.0) / 256.0
-            data[:, members, 16:24] = _line(ends[:, leader], around)[:, None]
+        data[..., 14] = (1.0 + figure.rounded[:, 1] + figure.rounded.all(axis=1))[figure.part]
+    for leader in np.unique(figure.part).tolist():
+        members = np.flatnonzero(figure.part == leader)
+        around = np.round(_reach(ends[:, members], radii[:, members], ends[:, leader]) * 256.0) / 256.0
+        data[:, members, 16:24] = _line(ends[:, leader], around)[:, None]
     return data
 
 

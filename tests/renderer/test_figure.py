@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.capsules import Figure, outline, place
+from renderer.capsules import Figure, place
 from renderer.colour import nv12_to_rgb, to_rgb, to_ycbcr
 from renderer.errors import RendererError
 from renderer.figure import COLOURS, STYLES, make_figure
@@ -105,7 +105,7 @@ def test_the_nose_points_the_way_the_body_faces(puppet: Any) -> None:
     pose = puppet.walk(5)
     for turn in (1.0, -1.0):
         turned = pose * [turn, 1, turn]
-        ends, radii = outline(figure, turned)
+        ends, radii = place(figure, turned).reshape(len(turned), -1, 3), figure.radii.reshape(-1)
         head = turned[:, puppet.parts["head"], :]
         high = ends[..., 1] > head[:, None, 1] + 0.05
         ahead = np.where(high, (ends[..., 2] - head[:, None, 2]) * turn + radii, -np.inf).max(axis=1)

@@ -91,7 +91,7 @@ from renderer.jobs import RenderJob, render_many
 if __name__ == "__main__":
     bones = np.array([[i, i + 1] for i in range(11)])
     figure = make_figure(bones, ["centre"] * 12)
-    clip = np.cumsum(np.random.default_rng(1).normal(0, 0.01, (90, 12, 3)), axis=0)
+    clip = np.cumsum(np.random.default_rng(1).normal(0, 0.01, (900, 12, 3)), axis=0)
     camera = frame_group([clip], size=(640, 480))
     jobs = [RenderJob(Path(sys.argv[1]) / f"{i}.mp4", clip, figure, camera) for i in range(20)]
     render_many(jobs, 2, lambda p: print(p, flush=True))
@@ -124,7 +124,7 @@ def test_an_interruption_leaves_whole_videos_only(tmp_path: Path, how: signal.Si
     assert 1 <= len(done) < 20
     for path in done:
         with av.open(str(path)) as container:
-            assert sum(1 for _ in container.decode(video=0)) == 90
+            assert sum(1 for _ in container.decode(video=0)) == 900
     if how == signal.SIGINT:
         assert list(out.glob(".*.part")) == []
 
