@@ -127,7 +127,7 @@ def warp_costs(
     `cos(u theta) (q0 . p) + sin(u theta) ((q1 . p) - cos(theta) (q0 . p)) / sin(theta)`, so a table of dot products of
     whole frames serves all the poses between them, exactly.
     """
-    _check_supply(source, destination, start_frame, end_frame, longest, longest)
+    check_supply(source, destination, start_frame, end_frame, longest, longest)
     used = np.flatnonzero(weights)
     a = source.rotations[start_frame - 1 : start_frame + longest][:, used]
     b = destination.rotations[end_frame - longest : end_frame + 1][:, used]
@@ -221,9 +221,10 @@ class _Arcs:
         return np.asarray((half_angle_squares(dots) @ self.weights).reshape(pairs.shorter, -1).sum(axis=1))
 
 
-def _check_supply(
+def check_supply(
     source: Clip, destination: Clip, start_frame: int, end_frame: int, source_frames: int, destination_frames: int
 ) -> None:
+    """Refuse windows of which the clips lack frames, or the frame before the first."""
     names = [
         f"the {kind} {c.name}" if c.name else f"the {kind}"
         for kind, c in (("source", source), ("destination", destination))
@@ -273,14 +274,15 @@ def warped_blend(
         raise TransitionError(
             f"Expected at least 1 frame of each clip in a blend, got {source_frames} and {destination_frames}."
         )
-    _check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
+    check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
     destination = retarget(destination, source.skeleton)
     count = max(source_frames, destination_frames)
+    even = np.arange(count + 1) / count
     return join(
         source,
         destination,
-        _stretch(source, start_frame - 1, source_frames, count, rate_after=source_frames / count),
-        _stretch(destination, end_frame - destination_frames, destination_frames, count, rate_after=1.0),
+        stretch(source, start_frame - 1 + source_frames * even, source_frames / count),
+        stretch(destination, end_frame - destination_frames + destination_frames * even, 1.0),
         (start_frame, start_frame + source_frames),
         (end_frame - destination_frames + 1, end_frame + 1),
         blend_weights(count, weight),
@@ -289,11 +291,11 @@ def warped_blend(
     )
 
 
-def _stretch(clip: Clip, before: int, frames: int, count: int, *, rate_after: float) -> Stretch:
-    """`count` poses over `frames` frames, with the pose before them and, where there is one, the pose after."""
-    times = before + np.arange(count + 1) * frames / count
-    # Rounding must not put the last pose beside its frame.
-    times[-1] = before + frames
-    after = times[-1] + rate_after
-    has_after = after <= clip.frames - 1
-    return Stretch(sample(clip, np.append(times, after if has_after else times[-1])), True, bool(has_after))
+def stretch(clip: Clip, times: FloatArray, rate_after: float) -> Stretch:
+    """The poses at `times (blend_frames + 1,)`, frames, of which the first lies before the blend, and the next one.
+
+    That is `rate_after` frames after the last, which is a whole frame, where the clip has it.
+    """
+    last = round(float(times[-1]))  # rounding must not put the last pose beside its frame
+    has_after = last + rate_after <= clip.frames - 1
+    return Stretch(sample(clip, [*times[:-1], last, last + rate_after * has_after]), True, has_after)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from study.transitions.methods.lengths.none import NoLength
 from study.transitions.methods.lengths.wang2004 import Fixed, Geodesic, Timewarp, Velocity
-from study.transitions.methods.makes.blends import Cut, Slerp, Warped
+from study.transitions.methods.makes.blends import Cut, Registered, Slerp, Warped
 from study.transitions.methods.makes.dead_blend import DeadBlend
 from study.transitions.methods.makes.given import Given
 from study.transitions.methods.makes.inertialize import Inertialize, InertializeQuintic
@@ -22,7 +22,8 @@ from study.transitions.methods.points.shared import Shared
 POINTS: Mapping[str, type[Points]] = {part.name: part for part in (Shared, LeastCost)}
 LENGTHS: Mapping[str, type[Length]] = {part.name: part for part in (Fixed, Geodesic, Velocity, Timewarp, NoLength)}
 MAKES: Mapping[str, type[Make]] = {
-    part.name: part for part in (Slerp, Warped, Cut, Inertialize, InertializeQuintic, DeadBlend, OneHop, Given)
+    part.name: part
+    for part in (Slerp, Registered, Warped, Cut, Inertialize, InertializeQuintic, DeadBlend, OneHop, Given)
 }
 
 # Utilities by 2004 Table 2; of cuts at two optima, the distance that gives 2003's F of 6.39 in ratings. Of methods of
@@ -34,6 +35,7 @@ METHODS: Mapping[str, Method] = {
         Method("velocity", Shared(), Velocity(), Slerp(), 0.65),
         Method("geodesic", Shared(), Geodesic(), Slerp(), 3.29),
         Method("timewarp", Shared(), Timewarp(), Warped(), 3.06),
+        Method("registration-curve", Shared(), Geodesic(), Registered(), 3.29),
         Method("cut", Shared(), NoLength(), Cut(), -2.0),
         Method("cut-lee2002", LeastCost("lee2002"), NoLength(), Cut(), -2.6),
         Method("cut-wang2003", LeastCost("wang2003"), NoLength(), Cut(), -0.2),

@@ -6,10 +6,15 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from study.settings import setting
-from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Made, Make, Place, Way
+from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Length, Made, Make, Place, Room, Way
 
 if TYPE_CHECKING:
     from study.transitions.blending import Transition
+
+KOVAR_2003 = (
+    "Kovar, L., & Gleicher, M. (2003). Flexible automatic motion blending with registration curves. Proceedings of the "
+    "2003 ACM SIGGRAPH/Eurographics Symposium on Computer Animation, 214–224."
+)
 
 
 def finished(made: Transition, place: Place, clean_feet: bool) -> Made:
@@ -102,6 +107,39 @@ class Slerp(Blending):
         """A blend of that many frames."""
         del place
         return Blended(windows, self.weight, self.clean_feet)
+
+
+@dataclass(frozen=True)
+class InStep(Blended):
+    """A blend along a registration curve."""
+
+    def made(self, place: Place) -> Made:
+        """Bring the windows into step and blend; then plant the feet."""
+        from study.transitions.registration import registered_blend
+
+        clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
+        made = registered_blend(*clips, *points, *self.windows, weight=self.weight)
+        return finished(made, place, self.holds_feet)
+
+
+class Registered(Slerp):
+    """A blend of two windows of one length, brought into step (Kovar & Gleicher 2003)."""
+
+    name = "registration-curve"
+    words = "blends along registration curves {length} {points}"
+    sources = (SHOEMAKE_1985, KOVAR_2003)
+    levels = False
+    moves = False
+
+    def way(self, place: Place, windows: tuple[int, int]) -> Way:
+        """A blend of that many frames of each clip."""
+        del place
+        return InStep(windows, self.weight, self.clean_feet)
+
+    def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
+        """One frame of each clip before its window."""
+        room = super().room(length, fps, longest_frames)
+        return replace(room, blend=room.blend + 1, search=room.search + 1, entry=max(room.entry, 1))
 
 
 class Warped(Slerp):

@@ -1,0 +1,153 @@
+"""Registration curves: two stretches of motion are brought into step before they are blended.
+
+In: two clips of one rig and the window of each that goes into the blend. Out: the blend in which poses meet that are
+alike, whenever each occurs. Kovar & Gleicher 2003, "Flexible automatic motion blending with registration curves": a
+dynamic timewarp of bounded slope over the distances of point clouds (section 3.1), made smooth and strictly increasing;
+and poses aligned pair by pair rather than once (section 3.2). The second comes for free: `study.transitions.blending`
+mixes how each clip steps and turns in its own facing, which is such an alignment of every pair.
+
+The 2004 paper (section 3.1.4) warps both windows evenly. Here the ends of the windows are the same, and what lies
+between them is warped as the motions ask for; at both ends each clip runs at the rate that it has without a warp.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from study.arrays import FloatArray
+from study.motion.clip import Clip, retarget, sample
+from study.transitions.blending import Transition, blend_weights, join, joint_shares
+from study.transitions.distances import on_joints_of
+from study.transitions.point_cloud import point_cloud, window_distances
+from study.transitions.timewarp import check_supply, stretch
+from study.transitions.windows import check_frames
+
+STEEPEST = 2.0
+"""One clip goes on at most this many times as fast as the other, each as a share of its window."""
+
+_KNOT_FRAMES = 4
+"""The smooth curve has a knot for so many frames."""
+_SMOOTH = 0.03
+"""How much a change of its slope from knot to knot counts beside its distance from the path, in the fit."""
+
+
+def registered_blend(
+    source: Clip,
+    destination: Clip,
+    start_frame: int,
+    end_frame: int,
+    source_frames: int,
+    destination_frames: int,
+    *,
+    weight: str = "linear",
+) -> Transition:
+    """Source, a blend of two windows that are brought into step, destination.
+
+    Parameters
+    ----------
+    source, destination, start_frame, end_frame, weight
+        As in `study.transitions.blending.blend`.
+    source_frames, destination_frames
+        Frames of each clip that go into the blend, at least 1; the blend takes as many as the longer has.
+
+    Raises
+    ------
+    TransitionError
+        Where the clips lack frames: one more than the window is needed before it.
+    """
+    destination = on_joints_of(source, destination)
+    check_frames(source, destination, start_frame, end_frame)
+    check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
+    destination = retarget(destination, source.skeleton)
+    count = max(source_frames, destination_frames)
+    even = np.arange(count + 1) / count
+    windows = (
+        (source, start_frame - 1, source_frames),
+        (destination, end_frame - destination_frames, destination_frames),
+    )
+    clouds = [point_cloud(sample(clip, before + frames * even)) for clip, before, frames in windows]
+    lead = smooth_lead(least_path(window_distances(*clouds, 1, precision="double")), count)
+    return join(
+        source,
+        destination,
+        *(
+            stretch(clip, before + frames * (even + ahead), rate)
+            for (clip, before, frames), ahead, rate in zip(
+                windows, (-0.5 * lead, 0.5 * lead), (source_frames / count, 1.0), strict=True
+            )
+        ),
+        (start_frame, start_frame + source_frames),
+        (end_frame - destination_frames + 1, end_frame + 1),
+        blend_weights(count, weight),
+        joint_shares(source.skeleton, count, weight, None),
+        f"{weight} blend along a registration curve: {source_frames} source, {destination_frames} destination frames",
+    )
+
+
+def least_path(distances: FloatArray) -> FloatArray:
+    """The path of least mean distance from the first pair of poses to the last, `(pairs, 2)`, as shares of the windows.
+
+    Parameters
+    ----------
+    distances : (poses, poses)
+        Of the source's poses from the destination's. Each step of the path goes on by one pose in one clip and by one
+        or two in the other, which bounds its slope by `STEEPEST`; it counts for as many poses as it goes on by.
+    """
+    poses = len(distances)
+    total = np.full((poses + 1, poses + 1), np.inf)  # a row and a column before the first, which no path enters
+    came = np.zeros((poses, poses), dtype=np.int64)
+    total[1, 1] = distances[0, 0]
+    steps = ((1, 1), (1, 2), (2, 1))
+    for row in range(2, poses + 1):
+        costs = np.full((3, poses - 1), np.inf)
+        for place, (down, across) in enumerate(steps):
+            costs[place, across - 1 :] = (
+                total[row - down, 1 : poses + 1 - across] + (down + across) * distances[row - 1, across:]
+            )
+        came[row - 1, 1:] = costs.argmin(axis=0)
+        total[row, 2:] = costs.min(axis=0)
+    path = [(poses - 1, poses - 1)]
+    while path[-1] != (0, 0):
+        down, across = steps[came[path[-1]]]
+        path.append((path[-1][0] - down, path[-1][1] - across))
+    return np.array(path[::-1]) / (poses - 1.0)
+
+
+def smooth_lead(path: FloatArray, count: int) -> FloatArray:
+    """By how much the destination is ahead of the source along a smooth, strictly increasing curve near a path.
+
+    Parameters
+    ----------
+    path : (pairs, 2)
+        Shares of the windows, as `least_path` gives them.
+    count
+        Steps of the blend.
+
+    Returns
+    -------
+    (count + 1,) in shares of a window, 0 and level at both ends; 0 throughout under 12 frames, too few for a curve.
+
+    Notes
+    -----
+    A quadratic spline with even knots, fitted by least squares. Its slope is a spline of straight pieces, so bounds at
+    the knots bound it everywhere.
+    """
+    pieces = count // _KNOT_FRAMES
+    if pieces < 3:
+        return np.zeros(count + 1)
+    from scipy.interpolate import BSpline
+    from scipy.optimize import lsq_linear
+
+    knots = np.concatenate([[0.0, 0.0], np.linspace(0.0, 1.0, pieces + 1), [1.0, 1.0]])
+    # Unknown are the slopes at the inner knots; the curve is their sum and comes back to 0.
+    rises = np.tril(np.ones((pieces + 2, pieces - 1)), k=-2) / pieces
+    at = path.mean(axis=1)
+    fitted = BSpline.design_matrix(at, knots, 2).toarray() @ rises
+    wanted = path[:, 1] - path[:, 0]
+    bends = _SMOOTH * np.diff(np.eye(pieces + 1)[:, 1:-1], axis=0)
+    back = 1e3 * np.ones((1, pieces - 1))
+    rows, values = np.concatenate([fitted, bends, back]), np.concatenate([wanted, np.zeros(pieces + 1)])
+    most = 2.0 * (STEEPEST - 1.0) / (STEEPEST + 1.0)
+    slopes = lsq_linear(rows, values, (-most, most)).x
+    even = np.arange(count + 1) / count
+    return np.asarray(BSpline.design_matrix(even, knots, 2).toarray() @ (rises @ slopes))
