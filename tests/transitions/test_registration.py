@@ -78,9 +78,7 @@ def test_a_walk_and_the_same_walk_out_of_step_are_brought_into_step() -> None:
         assert (made.blend_start, made.blend_stop, made.clip.frames) == (60, 100, walk.frames)
         positions = joint_positions(made.clip) - made.clip.root_positions[:, None]
         # How far every blended pose is from the nearest pose of the walk, at any time.
-        apart[name] = max(
-            np.linalg.norm(own - positions[frame], axis=-1).max(axis=1).min() for frame in range(60, 100)
-        )
+        apart[name] = max(np.linalg.norm(own - positions[frame], axis=-1).max(axis=1).min() for frame in range(60, 100))
     assert apart["in step"] < 0.6 * apart["evenly"]
 
 
