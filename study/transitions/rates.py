@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from study.motion.clip import Clip
 from study.transitions.blending import Transition, blend
+from study.transitions.registration import registered_blend
 from study.transitions.timewarp import warped_blend
 
 
@@ -20,6 +21,7 @@ def remade(
     *,
     weight: str = "linear",
     joint_frames: Mapping[str, int] | None = None,
+    in_step: bool = False,
 ) -> Transition:
     """The transition with its clips at another rate.
 
@@ -28,11 +30,13 @@ def remade(
     Parameters
     ----------
     made
-        A blend or a time-warped blend of the same two clips.
+        A blend of the same two clips, time-warped or not.
     source, destination
         The clips at the new rate, on one skeleton.
     weight, joint_frames
         As it was made with; see `study.transitions.blending.blend`.
+    in_step
+        Whether it goes along a registration curve, of which the new rate has one of its own.
     """
     ratio = source.fps / made.clip.fps
 
@@ -42,8 +46,10 @@ def remade(
 
     start, stop = between(made.source_frames, source)
     first, end = between(made.destination_frames, destination)
-    if made.source_frames[1] - made.source_frames[0] != made.destination_frames[1] - made.destination_frames[0]:
-        return warped_blend(source, destination, start, end - 1, stop - start, end - first, weight=weight)
+    uneven = made.source_frames[1] - made.source_frames[0] != made.destination_frames[1] - made.destination_frames[0]
+    if in_step or uneven:
+        make = registered_blend if in_step else warped_blend
+        return make(source, destination, start, end - 1, stop - start, end - first, weight=weight)
     frames = min(stop - start, end)
     own = {role: min(frames, round((count + 1) * ratio) - 1) for role, count in (joint_frames or {}).items()}
     return blend(source, destination, start, end - 1, frames, weight=weight, joint_frames=own)

@@ -25,8 +25,8 @@ from study.transitions.windows import check_frames
 STEEPEST = 2.0
 """One clip goes on at most this many times as fast as the other, each as a share of its window."""
 
-_KNOT_FRAMES = 4
-"""The smooth curve has a knot for so many frames."""
+_SHORTEST, _FEWEST, _KNOT_FRAMES = 6, 4, 4
+"""A blend of so many frames has room for a curve, of so many pieces at least, and of one for so many frames."""
 _SMOOTH = 0.03
 """How much a change of its slope from knot to knot counts beside its distance from the path, in the fit."""
 
@@ -125,19 +125,19 @@ def smooth_lead(path: FloatArray, count: int) -> FloatArray:
 
     Returns
     -------
-    (count + 1,) in shares of a window, 0 and level at both ends; 0 throughout under 12 frames, too few for a curve.
+    (count + 1,) in shares of a window, 0 and level at both ends; 0 throughout under 6 frames, too few for a curve.
 
     Notes
     -----
     A quadratic spline with even knots, fitted by least squares. Its slope is a spline of straight pieces, so bounds at
     the knots bound it everywhere.
     """
-    pieces = count // _KNOT_FRAMES
-    if pieces < 3:
+    if count < _SHORTEST:
         return np.zeros(count + 1)
     from scipy.interpolate import BSpline
     from scipy.optimize import lsq_linear
 
+    pieces = max(_FEWEST, count // _KNOT_FRAMES)
     knots = np.concatenate([[0.0, 0.0], np.linspace(0.0, 1.0, pieces + 1), [1.0, 1.0]])
     # Unknown are the slopes at the inner knots; the curve is their sum and comes back to 0.
     rises = np.tril(np.ones((pieces + 2, pieces - 1)), k=-2) / pieces

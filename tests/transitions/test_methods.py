@@ -63,6 +63,7 @@ def test_the_parts_of_a_method_are_those_of_their_sources() -> None:
         "velocity": ("shared", "velocity", "slerp"),
         "geodesic": ("shared", "geodesic", "slerp"),
         "timewarp": ("shared", "timewarp", "timewarp"),
+        "registration-curve": ("shared", "geodesic", "registration-curve"),
         "cut": ("shared", "none", "cut"),
         "cut-lee2002": ("least-cost", "none", "cut"),
         "cut-wang2003": ("least-cost", "none", "cut"),

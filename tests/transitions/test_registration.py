@@ -41,7 +41,7 @@ def test_no_path_costs_less(seed: int, poses: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("count", [12, 30, 60])
+@pytest.mark.parametrize("count", [6, 13, 30, 60])
 def test_curves_are_smooth_strictly_increasing_and_level_at_the_ends(seed: int, count: int) -> None:
     lead = smooth_lead(least_path(np.random.default_rng(seed).random((count + 1, count + 1))), count)
     even = np.arange(count + 1) / count
@@ -52,7 +52,7 @@ def test_curves_are_smooth_strictly_increasing_and_level_at_the_ends(seed: int, 
     assert ratios.max() <= STEEPEST + 1e-6
     assert ratios.min() >= 1 / STEEPEST - 1e-6
     np.testing.assert_allclose(lead[[0, -1]], 0.0, atol=1e-6)
-    assert np.abs(np.diff(lead)[[0, -1]]).max() < 0.2 / count
+    assert np.abs(np.diff(lead)[[0, -1]]).max() < 0.25 / count
 
 
 def test_a_known_warp_is_found() -> None:
@@ -94,7 +94,7 @@ def test_the_rest_is_the_clips_own_and_speeds_run_over_without_a_jump() -> None:
     assert bends[[57, 58, 59, 87, 88, 89]].max() < 1.2 * own
 
 
-@pytest.mark.parametrize("frames", [1, 2, 11])
+@pytest.mark.parametrize("frames", [1, 2, 5])
 def test_short_windows_have_no_room_for_a_curve(frames: int) -> None:
     walk, run = synthesize("walk", seconds=4.0), synthesize("run", seconds=4.0)
     made, plain = (each(walk, run, 40, 60, *counts) for each, counts in (

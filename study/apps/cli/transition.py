@@ -15,7 +15,7 @@ from study.apps.cli.console import FILE, FPS, emit, json_option, together
 from study.apps.cli.films import film_options
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
-from study.transitions.methods.makes.blends import Slerp
+from study.transitions.methods.makes.blends import Registered, Slerp, Warped
 from study.transitions.methods.makes.inertialize import Switching
 from study.transitions.methods.registry import MAKES, METHODS
 
@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from study.transitions.blending import Transition
     from study.transitions.timewarp import WarpLength
 
-LENGTHS = {name: one.length for name, one in METHODS.items() if one.length.windows and isinstance(one.make, Slerp)}
+LENGTHS = {
+    name: one.length for name, one in METHODS.items() if one.length.windows and type(one.make) in (Slerp, Warped)
+}
 """Methods whose blend lies between two given frames, and the length of each."""
 
 SWITCHES = {name: make for name, make in MAKES.items() if issubclass(make, Switching)}
@@ -125,8 +127,9 @@ def _check_two_windows(method: str, specification: str) -> None:
 @clip_options
 @click.option("--method", type=click.Choice(list(LENGTHS)), help="Choose the blend length by this method.")
 @click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
-@click.option("--make", type=click.Choice([Slerp.name, *SWITCHES]), default=Slerp.name, show_default=True,
-              help="How the frames are made: a blend, or a switch as game engines make it.")  # fmt: skip
+@click.option("--make", type=click.Choice([Slerp.name, Registered.name, *SWITCHES]), default=Slerp.name,
+              show_default=True,
+              help="How frames are made: a blend, a blend in step, or a switch as game engines make it.")  # fmt: skip
 @click.option("--halflife", type=click.FloatRange(0.01, 2.0),
               help="With --make inertialize: seconds; by default it matches the blend length.")  # fmt: skip
 @click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
@@ -177,9 +180,18 @@ def transition(
     if (method is None) == (frames is None):
         raise click.UsageError("expected either --method or --frames; give one of them.")
     first, second = clip_pair(source, destination, library, fps)
-    switch = switch_of(make, halflife, method, specification, joints)
+    switch, in_step = switch_of(make, halflife, method, specification, joints), make == Registered.name
     joined, found = join(
-        first, second, (start, end), method, frames, weight, specification, joint_frames(joints), switch=switch
+        first,
+        second,
+        (start, end),
+        method,
+        frames,
+        weight,
+        specification,
+        joint_frames(joints),
+        switch=switch,
+        in_step=in_step,
     )
     points = {**moment(first, start, "start"), **moment(second, end, "end")}
     where = f"from {in_words(first, start, source)} to {in_words(second, end, destination)}"
@@ -187,7 +199,8 @@ def transition(
     if out.suffix.lower() == ".bvh" and not told and first.file_fps:
         first, second = clip_pair(source, destination, library, first.file_fps, tell=False)
         if switch is None:
-            joined = remade(joined, first, second, weight=weight, joint_frames=joint_frames(joints))
+            own = joint_frames(joints)
+            joined = remade(joined, first, second, weight=weight, joint_frames=own, in_step=in_step)
         else:
             count = frames if found is None else found.blend_frames
             joined = switched(switch, first, second, (start, end), count or 1, fps)
@@ -236,12 +249,15 @@ def join(
     shorter: dict[str, int] | None = None,
     *,
     switch: Switching | None = None,
+    in_step: bool = False,
 ) -> tuple[Transition, BlendLength | WarpLength | None]:
     """The transition of a given or a method's length, and the method's result.
 
-    `shorter` has blends of joints' own, by role; `switch` takes the place of the blend.
+    `shorter` has blends of joints' own, by role; `switch` takes the place of the blend, or the motions are brought
+    `in_step` by a registration curve.
     """
     from study.transitions.blending import blend
+    from study.transitions.registration import registered_blend
     from study.transitions.timewarp import warp_length, warped_blend
 
     if method is not None and LENGTHS[method].windows == 2:
@@ -249,7 +265,8 @@ def join(
         if shorter:
             raise click.UsageError(f"expected no --joint with {method}: its joints share one warp.")
         warped = warp_length(source, destination, *points)
-        return warped_blend(source, destination, *points, *warped.windows, weight=weight), warped
+        make = registered_blend if in_step else warped_blend
+        return make(source, destination, *points, *warped.windows, weight=weight), warped
     chosen = None
     if method is not None:
         chosen = LENGTHS[method].at(source, destination, *points, specification=specification)
@@ -257,6 +274,8 @@ def join(
     assert count is not None, "either a method or a length is given"
     if switch is not None:
         return switched(switch, source, destination, points, count, source.fps), chosen
+    if in_step:
+        return registered_blend(source, destination, *points, count, count, weight=weight), chosen
     made = blend(source, destination, *points, count, weight=weight, specification=specification, joint_frames=shorter)
     return made, chosen
 
@@ -267,10 +286,12 @@ def switch_of(
     """The make that switches, if `--make` names one; with options that it does not know, a usage error."""
     if halflife is not None and make != "inertialize":
         raise click.UsageError(f"expected no --halflife with --make {make}; it belongs to --make inertialize.")
-    if make not in SWITCHES:
+    if make == Slerp.name:
         return None
     if joints or specification != "start-end":
-        raise click.UsageError(f"expected neither --joint nor --specification with --make {make}, which is no blend.")
+        raise click.UsageError(f"expected neither --joint nor --specification with --make {make}, which has its own.")
+    if make not in SWITCHES:
+        return None
     if method is not None and LENGTHS[method].windows == 2:
         raise click.UsageError(f"expected another --method than {method} with --make {make}: it has one length.")
     return SWITCHES[make]().with_settings({} if halflife is None else {"halflife_s": halflife})

@@ -190,6 +190,30 @@ def test_a_switch_takes_the_place_of_a_blend(
     assert ask(capsys, "motions", "inspect", tmp_path / "made.bvh")["frames"] == answer["frames"]
 
 
+@pytest.mark.parametrize("method", ["geodesic", "timewarp"])
+def test_motions_are_brought_into_step(capsys: pytest.CaptureFixture[str], tmp_path: Path, method: str) -> None:
+    points = ("transition", "walk", "jog", "--start", 60, "--end", 120, "--method", method)
+    in_step = ask(capsys, *points, "--make", "registration-curve", "--out", tmp_path / "in_step.bvh")
+    plain = ask(capsys, *points, "--out", tmp_path / "plain.bvh")
+    assert "registration curve" in str(in_step["note"])
+    for key in ("frames", "blend_start", "blend_stop", "cost"):
+        assert in_step[key] == plain[key]
+    assert (tmp_path / "in_step.bvh").read_bytes() != (tmp_path / "plain.bvh").read_bytes()
+
+
+def test_a_registration_curve_is_made_anew_at_the_rate_of_a_file(
+    capsys: pytest.CaptureFixture[str], mocap: Path, tmp_path: Path
+) -> None:
+    verb = ("transition", "walk", "walk_fast", "--library", mocap / "cmu", "--start", 60, "--end", 40, "--frames", 24)
+    in_step = (*verb, "--make", "registration-curve")
+    fine = ask(capsys, *in_step, "--out", tmp_path / "fine.bvh")
+    coarse = ask(capsys, *in_step, "--fps", 30, "--out", tmp_path / "coarse.bvh")
+    assert (fine["fps"], coarse["fps"]) == (120, 30)
+    assert fine["blend_s"] == pytest.approx(coarse["blend_s"], abs=0.03)
+    assert fine["seconds"] == pytest.approx(coarse["seconds"], abs=0.06)
+    assert "registration curve" in str(fine["note"])
+
+
 def test_a_switch_is_written_at_the_rate_of_its_file_with_the_same_moments(
     capsys: pytest.CaptureFixture[str], mocap: Path, tmp_path: Path
 ) -> None:
