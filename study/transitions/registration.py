@@ -65,17 +65,19 @@ def registered_blend(
         (source, start_frame - 1, source_frames),
         (destination, end_frame - destination_frames, destination_frames),
     )
-    clouds = [point_cloud(sample(clip, before + frames * even)) for clip, before, frames in windows]
-    lead = smooth_lead(least_path(window_distances(*clouds, 1, precision="double")), count)
+    ours, theirs = (point_cloud(sample(clip, before + frames * even)) for clip, before, frames in windows)
+    lead = smooth_lead(least_path(window_distances(ours, theirs, 1, precision="double")), count)
+    first, second = (
+        stretch(clip, before + frames * (even + ahead), rate)
+        for (clip, before, frames), ahead, rate in zip(
+            windows, (-0.5 * lead, 0.5 * lead), (source_frames / count, 1.0), strict=True
+        )
+    )
     return join(
         source,
         destination,
-        *(
-            stretch(clip, before + frames * (even + ahead), rate)
-            for (clip, before, frames), ahead, rate in zip(
-                windows, (-0.5 * lead, 0.5 * lead), (source_frames / count, 1.0), strict=True
-            )
-        ),
+        first,
+        second,
         (start_frame, start_frame + source_frames),
         (end_frame - destination_frames + 1, end_frame + 1),
         blend_weights(count, weight),

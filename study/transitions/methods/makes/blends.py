@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from study.settings import setting
 from study.transitions.methods.method import SHOEMAKE_1985, WANG_2003, Length, Made, Make, Place, Room, Way
@@ -99,7 +99,7 @@ class Slerp(Blending):
 
     name = "slerp"
     words = "blends {length} {points}"
-    sources = (SHOEMAKE_1985,)
+    sources: ClassVar[tuple[str, ...]] = (SHOEMAKE_1985,)
     levels = True
     moves = True
 
