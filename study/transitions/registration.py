@@ -17,10 +17,9 @@ import numpy as np
 from study.arrays import FloatArray
 from study.motion.clip import Clip, retarget, sample
 from study.transitions.blending import Transition, blend_weights, join, joint_shares
-from study.transitions.distances import on_joints_of
 from study.transitions.point_cloud import point_cloud, window_distances
 from study.transitions.timewarp import check_supply, stretch
-from study.transitions.windows import check_frames
+from study.transitions.windows import joined_at
 
 STEEPEST = 2.0
 """One clip goes on at most this many times as fast as the other, each as a share of its window."""
@@ -55,8 +54,7 @@ def registered_blend(
     TransitionError
         Where the clips lack frames: one more than the window is needed before it.
     """
-    destination = on_joints_of(source, destination)
-    check_frames(source, destination, start_frame, end_frame)
+    destination = joined_at(source, destination, start_frame, end_frame)
     check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
     destination = retarget(destination, source.skeleton)
     count = max(source_frames, destination_frames)
