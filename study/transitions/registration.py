@@ -148,6 +148,6 @@ def smooth_lead(path: FloatArray, count: int) -> FloatArray:
     back = 1e3 * np.ones((1, pieces - 1))
     rows, values = np.concatenate([fitted, bends, back]), np.concatenate([wanted, np.zeros(pieces + 1)])
     most = 2.0 * (STEEPEST - 1.0) / (STEEPEST + 1.0)
-    slopes = lsq_linear(rows, values, (-most, most)).x
+    slopes = lsq_linear(rows, values, (-most, most), method="bvls").x
     even = np.arange(count + 1) / count
     return np.asarray(BSpline.design_matrix(even, knots, 2).toarray() @ (rises @ slopes))
