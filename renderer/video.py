@@ -1,7 +1,7 @@
 """Videos: NV12 frames in, one H.264 file in an mp4 out, whole or not at all.
 
-The file plays in every browser: yuv420p, High profile, the index at the front (faststart), a key frame every
-second, constant frame rate, BT.709 tags. It is written under a temporary name in the same folder and renamed when
+The file plays in every browser: yuv420p, Constrained Baseline profile, the index at the front (faststart), a key frame
+every second, constant frame rate, BT.709 tags. It is written under a temporary name in the same folder and renamed when
 it is complete, so an interruption leaves nothing under the final name.
 
 `frames_sha256` is a hash of the raw frames: what participants see, whatever the encoder's version. mp4 bytes repeat
@@ -202,7 +202,6 @@ def _stream(out: Any, size: tuple[int, int], rate: Fraction) -> Any:
     codec = stream.codec_context
     # libx264 takes NV12 and writes 4:2:0 as ever: a decoder gives yuv420p.
     codec.pix_fmt = "nv12"
-    codec.profile = "High"
     # One thread: with one process a core it is the fastest, and the bytes repeat.
     codec.thread_count = 1
     codec.gop_size = max(1, round(rate))

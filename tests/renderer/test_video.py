@@ -49,6 +49,7 @@ def decoded(path: Path) -> tuple[Any, list[Any]]:
             "base_rate": stream.base_rate,
             "pix_fmt": stream.codec_context.pix_fmt,
             "codec": stream.codec_context.name,
+            "profile": stream.codec_context.profile,
             "primaries": stream.codec_context.color_primaries,
             "transfer": stream.codec_context.color_trc,
             "matrix": stream.codec_context.colorspace,
@@ -62,6 +63,7 @@ def test_what_is_in_the_file(tmp_path: Path) -> None:
     facts, frames = decoded(video.path)
     assert facts["rate"] == facts["base_rate"] == 30
     assert facts["pix_fmt"] == "yuv420p"
+    assert facts["profile"] == "Constrained Baseline"
     assert facts["codec"] == "h264"
     # BT.709 and limited range, as ISO/IEC 23091-2 and FFmpeg number them.
     assert (facts["primaries"], facts["transfer"], facts["matrix"], facts["range"]) == (1, 1, 1, 1)
