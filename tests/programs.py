@@ -18,7 +18,5 @@ def program(name: str) -> ModuleType:
         assert spec is not None
         assert spec.loader is not None
         module = sys.modules[key] = importlib.util.module_from_spec(spec)
-        path = list(sys.path)
-        spec.loader.exec_module(module)
-        sys.path[:] = path
+        spec.loader.exec_module(module)  # which may add its folder to the path, from where it imports others later
     return sys.modules[key]
