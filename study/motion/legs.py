@@ -23,8 +23,7 @@ LARGEST_BEND = 2.6
 _STRAIGHT = 0.35
 # Cosines between that plane's normal and the usual axis: a knee that bends aside is not overstretched, one against is,
 # if it bends little (radians): no knee is overstretched far.
-_ASIDE, _AGAINST = -0.5, -0.9
-_LITTLE, _FAR = 0.35, 0.6
+_ASIDE_AGAINST, _FAR_LITTLE = (-0.5, -0.9), (0.6, 0.35)
 # An overstretched knee is brought round over a correction of this size.
 _COME_ROUND_M = 0.01
 _PASSES = 3
@@ -184,7 +183,7 @@ def _overstretched(thigh: FloatArray, shank: FloatArray, axis: FloatArray) -> Fl
     length = np.linalg.norm(normal, axis=1)
     bent = np.arctan2(length, np.sum(thigh * shank, axis=1))
     along = np.sum(normal * axis, axis=1) / np.maximum(length, 1e-12)
-    return _smooth((along - _ASIDE) / (_AGAINST - _ASIDE)) * _smooth((_FAR - bent) / (_FAR - _LITTLE))
+    return ramp(along, _ASIDE_AGAINST) * ramp(bent, _FAR_LITTLE)
 
 
 def _between(here: FloatArray, there: FloatArray) -> FloatArray:
@@ -195,7 +194,7 @@ def _between(here: FloatArray, there: FloatArray) -> FloatArray:
     return quat.normalise(np.concatenate([1.0 + dots, np.cross(here, there)], axis=1))
 
 
-def _smooth(share: FloatArray) -> FloatArray:
-    """From 0 at 0 to 1 at 1, smoothly."""
-    share = np.clip(share, 0.0, 1.0)
-    return np.asarray(share * share * (3.0 - 2.0 * share))
+def ramp(values: FloatArray, bounds: tuple[float, float]) -> FloatArray:
+    """From 0 at the first bound to 1 at the second, smoothly, and level beyond them."""
+    x = np.clip((values - bounds[0]) / (bounds[1] - bounds[0]), 0.0, 1.0)
+    return np.asarray(x * x * (3.0 - 2.0 * x))

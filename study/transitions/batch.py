@@ -34,7 +34,7 @@ def geodesic_lengths(
     source, destination
         Clips of one rig at one frame rate.
     start_frames, end_frames : (transitions,)
-        Whole frame numbers, as `blend_length` takes them one at a time.
+        Whole frame numbers, as `geodesic_length` takes them one at a time.
 
     Returns
     -------

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 
 from study.motion.clip import Clip
 from study.transitions.blending import Transition, blend
-from study.transitions.registration import registered_blend
 from study.transitions.timewarp import warped_blend
 
 
@@ -48,8 +47,8 @@ def remade(
     first, end = between(made.destination_frames, destination)
     uneven = made.source_frames[1] - made.source_frames[0] != made.destination_frames[1] - made.destination_frames[0]
     if in_step or uneven:
-        make = registered_blend if in_step else warped_blend
-        return make(source, destination, start, end - 1, stop - start, end - first, weight=weight)
+        windows = stop - start, end - first
+        return warped_blend(source, destination, start, end - 1, *windows, weight=weight, in_step=in_step)
     frames = min(stop - start, end)
     own = {role: min(frames, round((count + 1) * ratio) - 1) for role, count in (joint_frames or {}).items()}
     return blend(source, destination, start, end - 1, frames, weight=weight, joint_frames=own)

@@ -1,10 +1,11 @@
 """Registration curves: two stretches of motion are brought into step before they are blended.
 
-In: two clips of one rig and the window of each that goes into the blend. Out: the blend in which poses meet that are
-alike, whenever each occurs. Kovar & Gleicher 2003, "Flexible automatic motion blending with registration curves": a
-dynamic timewarp of bounded slope over the distances of point clouds (section 3.1), made smooth and strictly increasing;
-and poses aligned pair by pair rather than once (section 3.2). The second comes for free: `study.transitions.blending`
-mixes how each clip steps and turns in its own facing, which is such an alignment of every pair.
+In: the window of each clip that goes into the blend. Out: how far one has to be ahead of the other in each frame, so
+that poses meet that are alike, whenever each occurs; `study.transitions.timewarp.warped_blend` blends them so. Kovar &
+Gleicher 2003, "Flexible automatic motion blending with registration curves": a dynamic timewarp of bounded slope over
+the distances of point clouds (section 3.1), made smooth and strictly increasing; and poses aligned pair by pair rather
+than once (section 3.2). The second comes for free: `study.transitions.blending` mixes how each clip steps and turns in
+its own facing, which is such an alignment of every pair.
 
 The 2004 paper (section 3.1.4) warps both windows evenly. Here the ends of the windows are the same, and what lies
 between them is warped as the motions ask for; at both ends each clip runs at the rate that it has without a warp.
@@ -15,11 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from study.arrays import FloatArray
-from study.motion.clip import Clip, retarget, sample
-from study.transitions.blending import Transition, blend_weights, join, joint_shares
+from study.motion.clip import Clip
 from study.transitions.point_cloud import point_cloud, window_distances
-from study.transitions.timewarp import check_supply, stretch
-from study.transitions.windows import joined_at
 
 STEEPEST = 2.0
 """One clip goes on at most this many times as fast as the other, each as a share of its window."""
@@ -30,58 +28,16 @@ _SMOOTH = 0.03
 """How much a change of its slope from knot to knot counts beside its distance from the path, in the fit."""
 
 
-def registered_blend(
-    source: Clip,
-    destination: Clip,
-    start_frame: int,
-    end_frame: int,
-    source_frames: int,
-    destination_frames: int,
-    *,
-    weight: str = "linear",
-) -> Transition:
-    """Source, a blend of two windows that are brought into step, destination.
+def registration(source: Clip, destination: Clip) -> FloatArray:
+    """By how much the destination is ahead of the source where both are in step, `(frames,)`, in shares of a window.
 
     Parameters
     ----------
-    source, destination, start_frame, end_frame, weight
-        As in `study.transitions.blending.blend`.
-    source_frames, destination_frames
-        Frames of each clip that go into the blend, at least 1; the blend takes as many as the longer has.
-
-    Raises
-    ------
-    TransitionError
-        Where the clips lack frames: one more than the window is needed before it.
+    source, destination
+        The two windows on one skeleton, as clips of equally many frames, evenly spaced in each.
     """
-    destination = joined_at(source, destination, start_frame, end_frame)
-    check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
-    destination = retarget(destination, source.skeleton)
-    count = max(source_frames, destination_frames)
-    even = np.arange(count + 1) / count
-    windows = (
-        (source, start_frame - 1, source_frames),
-        (destination, end_frame - destination_frames, destination_frames),
-    )
-    ours, theirs = (point_cloud(sample(clip, before + frames * even)) for clip, before, frames in windows)
-    lead = smooth_lead(least_path(window_distances(ours, theirs, 1, precision="double")), count)
-    first, second = (
-        stretch(clip, before + frames * (even + ahead), rate)
-        for (clip, before, frames), ahead, rate in zip(
-            windows, (-0.5 * lead, 0.5 * lead), (source_frames / count, 1.0), strict=True
-        )
-    )
-    return join(
-        source,
-        destination,
-        first,
-        second,
-        (start_frame, start_frame + source_frames),
-        (end_frame - destination_frames + 1, end_frame + 1),
-        blend_weights(count, weight),
-        joint_shares(source.skeleton, count, weight, None),
-        f"{weight} blend along a registration curve: {source_frames} source, {destination_frames} destination frames",
-    )
+    ours, theirs = point_cloud(source), point_cloud(destination)
+    return smooth_lead(least_path(window_distances(ours, theirs, 1, precision="double")), source.frames - 1)
 
 
 def least_path(distances: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from study.arrays import FloatArray, IntArray
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, sample, trim
 from study.motion.feet import foot_points, toes
+from study.motion.legs import ramp
 from study.transitions.blending import Transition, facing
 
 # A point of a foot bears all its weight up to the first speed (m/s) and height over its lowest (m), none from the
@@ -83,7 +84,7 @@ def footwork(clip: Clip) -> Footwork:
     for foot in points:
         heights = foot[..., 1] - np.quantile(foot[..., 1], 0.02, axis=0)
         speed = np.linalg.norm(np.diff(foot[..., [0, 2]], axis=0), axis=-1) * clip.fps
-        weight = (1.0 - _ramp(speed, _SPEEDS)) * (1.0 - _ramp(np.maximum(heights[1:], heights[:-1]), _HEIGHTS))
+        weight = (1.0 - ramp(speed, _SPEEDS)) * (1.0 - ramp(np.maximum(heights[1:], heights[:-1]), _HEIGHTS))
         # Of points that bear alike the slowest counts.
         best = np.argmax(weight - 1e-3 * speed, axis=1)
         weights.append(weight[np.arange(len(weight)), best])
@@ -168,7 +169,7 @@ def _compared(
     weights = mixed[:, :, None] * borne
     total = weights.sum(axis=1)
     most = total.max(axis=1, keepdims=True)
-    held = _ramp(total / np.maximum(most, 1e-9), _HELD) * _ramp(most, _BORNE)
+    held = ramp(total / np.maximum(most, 1e-9), _HELD) * ramp(most, _BORNE)
     excess, over = np.zeros((len(shares), 2, 3)), np.zeros((len(shares), 2))
     parts = weights / np.maximum(total, 1e-9)[:, None]
     rows = np.arange(len(shares))
@@ -196,9 +197,3 @@ def _taken(values: FloatArray, rows: IntArray) -> FloatArray:
 
 def _with_first(values: FloatArray) -> FloatArray:
     return np.concatenate([values[:1], values])
-
-
-def _ramp(values: FloatArray, bounds: tuple[float, float]) -> FloatArray:
-    """From 0 below the first bound to 1 above the second, smoothly."""
-    x = np.clip((values - bounds[0]) / (bounds[1] - bounds[0]), 0.0, 1.0)
-    return np.asarray(x * x * (3.0 - 2.0 * x))

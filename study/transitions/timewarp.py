@@ -24,6 +24,7 @@ from study.motion.clip import Clip, retarget, sample
 from study.transitions.blend_length import length_range
 from study.transitions.blending import Stretch, Transition, blend_weights, join, joint_shares
 from study.transitions.distances import half_angle_squares
+from study.transitions.registration import registration
 from study.transitions.weights import joint_weights
 from study.transitions.windows import held, joined_at
 
@@ -127,7 +128,7 @@ def warp_costs(
     `cos(u theta) (q0 . p) + sin(u theta) ((q1 . p) - cos(theta) (q0 . p)) / sin(theta)`, so a table of dot products of
     whole frames serves all the poses between them, exactly.
     """
-    check_supply(source, destination, start_frame, end_frame, longest, longest)
+    _check_supply(source, destination, start_frame, end_frame, longest, longest)
     used = np.flatnonzero(weights)
     a = source.rotations[start_frame - 1 : start_frame + longest][:, used]
     b = destination.rotations[end_frame - longest : end_frame + 1][:, used]
@@ -221,10 +222,9 @@ class _Arcs:
         return np.asarray((half_angle_squares(dots) @ self.weights).reshape(pairs.shorter, -1).sum(axis=1))
 
 
-def check_supply(
+def _check_supply(
     source: Clip, destination: Clip, start_frame: int, end_frame: int, source_frames: int, destination_frames: int
 ) -> None:
-    """Refuse windows of which the clips lack frames, or the frame before the first."""
     names = [
         f"the {kind} {c.name}" if c.name else f"the {kind}"
         for kind, c in (("source", source), ("destination", destination))
@@ -253,6 +253,7 @@ def warped_blend(
     destination_frames: int,
     *,
     weight: str = "linear",
+    in_step: bool = False,
 ) -> Transition:
     """Source, a blend in which the shorter window is slowed to the length of the longer one, destination.
 
@@ -263,35 +264,48 @@ def warped_blend(
     source_frames, destination_frames
         Frames of each clip that go into the blend, at least 1, as `warp_length` chooses them. The blend takes as many
         frames as the longer window has.
+    in_step
+        Whether the windows are warped by a registration curve (`study.transitions.registration`) and not evenly.
 
     Returns
     -------
     Transition
-        With equal lengths, the same as `blend`.
+        With equal lengths and not in step, the same as `blend`.
+
+    Raises
+    ------
+    TransitionError
+        Where the clips don't supply the frames, one before each window among them, or differ in rig or frame rate.
     """
     destination = joined_at(source, destination, start_frame, end_frame)
     if min(source_frames, destination_frames) < 1:
         raise TransitionError(
             f"Expected at least 1 frame of each clip in a blend, got {source_frames} and {destination_frames}."
         )
-    check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
+    _check_supply(source, destination, start_frame, end_frame, source_frames, destination_frames)
     destination = retarget(destination, source.skeleton)
     count = max(source_frames, destination_frames)
     even = np.arange(count + 1) / count
+    before, ahead = (start_frame - 1, end_frame - destination_frames), np.zeros(count + 1)
+    if in_step:
+        ahead = registration(
+            sample(source, before[0] + source_frames * even), sample(destination, before[1] + destination_frames * even)
+        )
     return join(
         source,
         destination,
-        stretch(source, start_frame - 1 + source_frames * even, source_frames / count),
-        stretch(destination, end_frame - destination_frames + destination_frames * even, 1.0),
+        _stretch(source, before[0] + source_frames * (even - 0.5 * ahead), source_frames / count),
+        _stretch(destination, before[1] + destination_frames * (even + 0.5 * ahead), 1.0),
         (start_frame, start_frame + source_frames),
         (end_frame - destination_frames + 1, end_frame + 1),
         blend_weights(count, weight),
         joint_shares(source.skeleton, count, weight, None),
-        f"{weight} time-warped blend of {source_frames} source and {destination_frames} destination frames",
+        f"{weight} {'blend along a registration curve' if in_step else 'time-warped blend'} of {source_frames} source "
+        f"and {destination_frames} destination frames",
     )
 
 
-def stretch(clip: Clip, times: FloatArray, rate_after: float) -> Stretch:
+def _stretch(clip: Clip, times: FloatArray, rate_after: float) -> Stretch:
     """The poses at `times (blend_frames + 1,)`, frames, of which the first lies before the blend, and the next one.
 
     That is `rate_after` frames after the last, which is a whole frame, where the clip has it.

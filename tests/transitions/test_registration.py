@@ -11,7 +11,8 @@ from study.errors import TransitionError
 from study.motion.clip import joint_positions, sample
 from study.motion.synthetic import synthesize
 from study.transitions.blending import blend
-from study.transitions.registration import STEEPEST, least_path, registered_blend, smooth_lead
+from study.transitions.registration import STEEPEST, least_path, smooth_lead
+from study.transitions.timewarp import warped_blend
 
 
 def cheapest(distances: np.ndarray) -> float:
@@ -72,7 +73,7 @@ def test_a_walk_and_the_same_walk_out_of_step_are_brought_into_step() -> None:
     own = joint_positions(fine) - fine.root_positions[:, None]
     apart = {}
     for name, made in (
-        ("in step", registered_blend(walk, uneven, 60, 99, 40, 40)),
+        ("in step", warped_blend(walk, uneven, 60, 99, 40, 40, in_step=True)),
         ("evenly", blend(walk, uneven, 60, 99, 40)),
     ):
         assert (made.blend_start, made.blend_stop, made.clip.frames) == (60, 100, walk.frames)
@@ -84,7 +85,7 @@ def test_a_walk_and_the_same_walk_out_of_step_are_brought_into_step() -> None:
 
 def test_the_rest_is_the_clips_own_and_speeds_run_over_without_a_jump() -> None:
     walk, run = synthesize("walk", seconds=6.0), synthesize("run", seconds=6.0)
-    made = registered_blend(walk, run, 60, 100, 30, 30)
+    made = warped_blend(walk, run, 60, 100, 30, 30, in_step=True)
     np.testing.assert_array_equal(made.clip.rotations[:60], walk.rotations[:60])
     np.testing.assert_allclose(
         np.abs(np.sum(made.clip.rotations[90:, 1:] * run.rotations[101:, 1:], axis=-1)), 1.0, atol=1e-12
@@ -97,9 +98,8 @@ def test_the_rest_is_the_clips_own_and_speeds_run_over_without_a_jump() -> None:
 @pytest.mark.parametrize("frames", [1, 2, 5])
 def test_short_windows_have_no_room_for_a_curve(frames: int) -> None:
     walk, run = synthesize("walk", seconds=4.0), synthesize("run", seconds=4.0)
-    made, plain = (each(walk, run, 40, 60, *counts) for each, counts in (
-        (registered_blend, (frames, frames)), (blend, (frames,))
-    ))  # fmt: skip
+    made = warped_blend(walk, run, 40, 60, frames, frames, in_step=True)
+    plain = blend(walk, run, 40, 60, frames)
     np.testing.assert_allclose(made.clip.rotations, plain.clip.rotations, atol=1e-9)
     np.testing.assert_allclose(made.clip.root_positions, plain.clip.root_positions, atol=1e-9)
 
@@ -107,4 +107,4 @@ def test_short_windows_have_no_room_for_a_curve(frames: int) -> None:
 def test_a_window_needs_a_frame_before_it() -> None:
     walk = synthesize("walk", seconds=2.0)
     with pytest.raises(TransitionError, match="lacks 1 frame before its first"):
-        registered_blend(walk, walk, 0, 40, 20, 20)
+        warped_blend(walk, walk, 0, 40, 20, 20, in_step=True)

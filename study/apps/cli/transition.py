@@ -257,25 +257,23 @@ def join(
     `in_step` by a registration curve.
     """
     from study.transitions.blending import blend
-    from study.transitions.registration import registered_blend
     from study.transitions.timewarp import warp_length, warped_blend
 
+    chosen: BlendLength | WarpLength | None = None
     if method is not None and LENGTHS[method].windows == 2:
         _check_two_windows(method, specification)
         if shorter:
             raise click.UsageError(f"expected no --joint with {method}: its joints share one warp.")
-        warped = warp_length(source, destination, *points)
-        make = registered_blend if in_step else warped_blend
-        return make(source, destination, *points, *warped.windows, weight=weight), warped
-    chosen = None
-    if method is not None:
+        chosen = warp_length(source, destination, *points)
+    elif method is not None:
         chosen = LENGTHS[method].at(source, destination, *points, specification=specification)
     count = frames if chosen is None else chosen.blend_frames
     assert count is not None, "either a method or a length is given"
+    windows = (count, count) if chosen is None else chosen.windows
     if switch is not None:
         return switched(switch, source, destination, points, count, source.fps), chosen
-    if in_step:
-        return registered_blend(source, destination, *points, count, count, weight=weight), chosen
+    if in_step or windows[0] != windows[1]:
+        return warped_blend(source, destination, *points, *windows, weight=weight, in_step=in_step), chosen
     made = blend(source, destination, *points, count, weight=weight, specification=specification, joint_frames=shorter)
     return made, chosen
 

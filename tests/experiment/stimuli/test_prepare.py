@@ -184,7 +184,7 @@ def test_names_follow_what_is_seen_and_nothing_else(
 
 
 def test_lengths_are_those_of_the_methods(prepared: StimulusSet, toys: ToyLibrary) -> None:
-    """What the record says is what `blend_length` gives at the recorded points."""
+    """What the record says is what its length gives at the recorded points."""
     for pair in prepared.pairs:
         record = prepared.stimulus(pair.stimuli[0]).record
         clips = [

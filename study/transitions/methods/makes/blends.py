@@ -29,11 +29,16 @@ def finished(made: Transition, place: Place, clean_feet: bool) -> Made:
 
 @dataclass(frozen=True)
 class Blended(Way):
-    """A blend of so many source and destination frames, under a weight, with feet planted or not; a cut of none."""
+    """A blend of so many source and destination frames, under a weight, with feet planted or not; a cut of none.
+
+    Motions of equal windows are blended frame by frame unless they are brought `in_step`.
+    """
 
     windows: tuple[int, int]
     weight: str = "linear"
     clean_feet: bool = False
+
+    in_step: ClassVar[bool] = False
 
     @property
     def frames(self) -> int:
@@ -53,8 +58,8 @@ class Blended(Way):
         clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
         if self.blend_frames == 0:
             made = cut(*clips, *points)
-        elif self.windows[0] != self.windows[1]:
-            made = warped_blend(*clips, *points, *self.windows, weight=self.weight)
+        elif self.in_step or self.windows[0] != self.windows[1]:
+            made = warped_blend(*clips, *points, *self.windows, weight=self.weight, in_step=self.in_step)
         else:
             made = blend(*clips, *points, self.blend_frames, weight=self.weight)
         return finished(made, place, self.holds_feet)
@@ -109,17 +114,10 @@ class Slerp(Blending):
         return Blended(windows, self.weight, self.clean_feet)
 
 
-@dataclass(frozen=True)
 class InStep(Blended):
     """A blend along a registration curve."""
 
-    def made(self, place: Place) -> Made:
-        """Bring the windows into step and blend; then plant the feet."""
-        from study.transitions.registration import registered_blend
-
-        clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
-        made = registered_blend(*clips, *points, *self.windows, weight=self.weight)
-        return finished(made, place, self.holds_feet)
+    in_step = True
 
 
 class Registered(Slerp):
