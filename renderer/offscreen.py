@@ -22,6 +22,7 @@ from renderer.camera import Camera, camera_path, check_positions, check_size
 from renderer.capsules import Figure
 from renderer.colour import to_ycbcr
 from renderer.context import Context, shared_context
+from renderer.errors import RendererError
 from renderer.floor import Floor
 from renderer.painter import Painter
 from renderer.segments import Segment
@@ -70,7 +71,7 @@ def render_frames(
     Raises
     ------
     RendererError
-        For positions that are not finite, or no frames.
+        For positions that are not finite, no frames, or a batch below 1.
     """
     for frame, _ in paste_frames(positions, figure, camera, fps=fps, batch=batch, context=context):
         yield frame.copy()
@@ -126,6 +127,8 @@ def paste_frames(
     it is the background.
     """
     points = check_positions(positions)
+    if batch < 1:
+        raise RendererError(f"Expected a batch of at least one frame, got {batch}.")
     shapes = lay_out(points, figure, camera, fps, segments)
     backdrop = Ground(figure, camera, points, fps)
     gl = (context or shared_context()).gl

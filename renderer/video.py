@@ -35,10 +35,10 @@ from renderer.segments import Segment
 # ISO/IEC 23091-2: 1 is BT.709 for primaries, transfer and matrix; 1 in FFmpeg's range enumeration is limited.
 _BT709, _LIMITED = 1, 1
 
-# One quantiser for all P-frames: how finely a figure is drawn must not depend on how it moves. libx264's own choice
-# (crf) would besides look at each frame twice. It also saves bits on what moves fast and on what stands out from its
-# surroundings, which here are the limbs that participants judge: its macroblock tree and adaptive quantisation are off,
-# as are its searches for scene cuts, fades and B-frames, which find nothing in a figure before a still background.
+# One quantiser for all P-frames: how finely a figure is drawn must not depend on how it moves, as it does by libx264's
+# own choice (crf). That also saves bits on what moves fast and on what stands out from its surroundings, which here are
+# the limbs that participants judge: its macroblock tree and adaptive quantisation are off, as are its searches for
+# scene cuts, fades and B-frames, which find nothing in a figure before a still background.
 _OPTIONS = {
     "preset": "ultrafast",
     "qp": "13",

@@ -50,8 +50,7 @@ def right_answer(trial: Trial) -> str | None:
 
 def answer_columns(trial: Trial, answer: Answer) -> dict[str, Any]:
     """A row of the table of answers: the trial, what was answered, and what that means to the task."""
-    task = task_of_trial(trial)
-    right = trial.expected if trial.role == "check" else task.right(trial)
+    right = right_answer(trial)
     return {
         "trial": trial.trial,
         "item": answer.item,
@@ -77,5 +76,5 @@ def answer_columns(trial: Trial, answer: Answer) -> dict[str, Any]:
         "shown_well": answer.shown_well,
         "role": trial.role,
         "expected": trial.expected,
-        **task.columns(trial, answer),
+        **task_of_trial(trial).columns(trial, answer),
     }

@@ -102,6 +102,16 @@ def test_every_name_and_parameter_is_documented() -> None:
             assert f"`{parameter}`" in page, parameter
 
 
+def test_library_needs_these_names() -> None:
+    """Protocols name these in every library."""
+    shared = (
+        "walk_slow walk walk_fast jog run run_fast stand idle stand_to_walk stand_to_run walk_to_stop run_to_stop "
+        "walk_turn_left walk_turn_right run_turn_left run_turn_right box box_combination dance dance_modern "
+        "dance_turns tai_chi tai_chi_slow"
+    )
+    assert set(shared.split()) <= set(NAMES)
+
+
 def test_default_lengths_leave_room_around_events() -> None:
     for name in ("stand_to_walk", "walk_to_stop", "run_turn_left", "walk_turn_right"):
         assert describe(name).seconds >= 10.0

@@ -303,6 +303,11 @@ def test_a_floor_travels_under_a_tracking_camera(puppet: Any) -> None:
     assert all((a == b).all() for a, b in zip(frames, alone, strict=True))
 
 
+def test_a_batch_without_frames_is_refused() -> None:
+    with pytest.raises(RendererError, match="batch of at least one"):
+        next(render_frames(points((0, 0, 0), (1, 0, 0)), capsules([(0.1, 0.1)], [BLACK]), CAMERA, batch=0))
+
+
 def test_bad_positions_are_refused_before_anything_is_drawn() -> None:
     figure = capsules([(0.1, 0.1)], [BLACK])
     with pytest.raises(RendererError, match="frame 0, point 1"):

@@ -12,7 +12,7 @@ _LARGE = 2**19
 
 
 def set_up() -> None:
-    """Let all threads take memory from one heap, and large pieces (films, bodies) from the system itself.
+    """Let all threads take memory from one heap, and pieces of half a megabyte and more from the system itself.
 
     glibc gives each thread a heap of its own, and what one frees no other can use; and it learns to take ever larger
     pieces from the heap, which they then break up. Threads of Python wait for each other anyway. Two hundred answers

@@ -95,7 +95,7 @@ def _lifespan(host: Host) -> Callable[[Starlette], contextlib.AbstractAsyncConte
                 await host.note_who_is_here()
             except Exception:
                 log.exception("Recording who is active failed; next attempt in %g s.", HERE_EVERY_SECONDS)
-            hand_back()
+            await asyncio.to_thread(hand_back)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:

@@ -176,14 +176,15 @@ def _margin(found: NoEffect) -> str:
 def preference_table(name: str, comparison: Comparison) -> Table:
     """Return the tests of a preference, as published and corrected."""
     first, second = methods_of(comparison)
+    beyond = "Other participants and motions: the test that takes both for samples. "
     return tables.make(
         f"{name}_preference",
         f"Percent favouring {first} over {second}. As published: all answers as independent (Wilson’s interval), "
         "which a participant’s "
         "answers are not. Corrected: each participant’s percentage, by Student’s t and by ranks. Orders balanced: the "
         "mean of the percentages with the first method shown first and second. A typical participant: a model with a "
-        "term for the order. Other participants and motions: the test that takes both for samples. The "
-        f"default test is {comparison.default.test}.",
+        f"term for the order. {beyond if comparison.motions_as_sample.both else ''}The default test is "
+        f"{comparison.default.test}.",
         "reading percent low:one high:one test statistic p_value",
         [*_published_rows(comparison), *_corrected_rows(comparison), *_model_rows(comparison)],
     )
