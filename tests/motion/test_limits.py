@@ -1,4 +1,4 @@
-"""Motion files with numbers, sizes and names past what is meant: refused with their place, or read in line with size."""
+"""Motion files with numbers, sizes and names past what is meant: refused with their place; read in line with size."""
 
 from __future__ import annotations
 
