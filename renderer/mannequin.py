@@ -1,8 +1,7 @@
 """The mannequin: a full body on any rig with whole limbs.
 
 Lengths between joints are the rig's own. What lies around them is in proportion to stature: breadths, depths and girths
-of the body are those of people (men of the 1988 survey of the US Army: Gordon et al. 1989, Natick/TR-89/044; lengths
-of segments: Drillis and Contini 1966, as in Winter, *Biomechanics and Motor Control of Human Movement*, Figure 4.1),
+of the body are those of people (the 1,774 men of the 1988 survey of the US Army: Gordon et al. 1989, Natick/TR-89/044),
 made a little slimmer. Each limb and the trunk are put together from several capsules that are lit as one surface. The
 limbs begin in the trunk's colour, as under a shirt and shorts: whether a limb is painted before or behind the trunk can
 change from one frame to the next, and is then hardly seen.
