@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import expit, ndtr
 
-from study.analysis.preference.crossed import crossed
+from study.analysis.crossed import crossed
 from study.analysis.preference.motions import motions_as_sample
 from study.analysis.preference.no_effect import no_preference
 from study.analysis.preference.participants import participant_tests

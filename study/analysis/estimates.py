@@ -60,7 +60,7 @@ class MeanTest(Mean):
     """The mean against an expected value; `t` is None where the participants are all alike and it can't be formed."""
 
     t: float | None
-    degrees_of_freedom: int | None
+    degrees_of_freedom: float | None
     p_value: float | None
 
 

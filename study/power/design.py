@@ -6,7 +6,7 @@ included. Hundreds of studies are drawn and analysed at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +101,12 @@ class Effect:
     """Whether a study takes so long that fewer are simulated."""
     answers: Callable[[Design], int] = lambda design: len(design.trials()[0])
     """How many trials of the study a participant answers, on average."""
+
+
+def motions_of(trials: Sequence[Sequence[Trial]]) -> FloatArray:
+    """Return which motion each trial shows, shape (participants, trials, motions), 0 or 1."""
+    names = sorted({trial.motion for own in trials for trial in own})
+    return np.array([[[float(trial.motion == name) for name in names] for trial in own] for own in trials])
 
 
 def times(design: Design, rng: np.random.Generator, ease: FloatArray) -> tuple[FloatArray, BoolArray]:

@@ -18,7 +18,7 @@ from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.choice import PreferenceObserver
 from study.power.curve import Run
-from study.power.design import Design, Effect, kept_of, times
+from study.power.design import Design, Effect, kept_of, motions_of, times
 from study.tasks.observer import ObserverSettings, default_observer
 
 
@@ -101,8 +101,7 @@ def preference_study(design: Design, alpha: float, share: float) -> Run:
     """Whether the default test finds the preference, in the right direction (2004 section 5.2)."""
     trials, typical = design.trials(), design.settings.preference
     signs = np.array([[1.0 if trial.a_first else -1.0 for trial in own] for own in trials])
-    names = sorted({trial.motion for own in trials for trial in own})
-    of_motion = np.array([[[float(trial.motion == name) for name in names] for trial in own] for own in trials])
+    of_motion = motions_of(trials)
     lean = typical.utility[design.study.reference] - typical.utility.get(design.study.comparison or "", 0.0)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from study.analysis.analyse import Analysis
+from study.analysis.crossed import general_p_values
 from study.analysis.estimates import student_p_values
 from study.analysis.ratings.analyse import PairRatings, Ratings
 from study.arrays import BoolArray, FloatArray
@@ -16,7 +17,7 @@ from study.experiment.protocol.whole import StudySpec
 from study.models.choice import PreferenceObserver
 from study.models.ordinal import RatingObserver
 from study.power.curve import Run
-from study.power.design import Design, Effect, kept_of, times
+from study.power.design import Design, Effect, kept_of, motions_of, times
 from study.tasks.observer import ObserverSettings, default_observer
 from study.tasks.registry import task_of
 
@@ -30,7 +31,7 @@ def rating_effect(study: StudySpec, options: Mapping[str, float], decided: Analy
         observer=rating_observer(study, difference, correlation, options["missed"]),
         stated={"difference": difference, "correlation": correlation},
         icc=correlation,
-        test=f"Student's t of participants' {'mean scores' if paired else 'differences'} at {alpha:g}, one question",
+        test=f"Student's t of {'scores' if paired else 'differences'} (the default test) at {alpha:g}, one question",
         aim=f"find a difference of {difference:g} points in one question at the level {alpha:g}",
         study=lambda design: rating_study(design, alpha, difference),
         found=lambda analysis: found(analysis, study, difference, alpha),
@@ -71,15 +72,15 @@ def rating_observer(study: StudySpec, difference: float, correlation: float, mis
 
 
 def rating_study(design: Design, alpha: float, difference: float) -> Run:
-    """Whether the t test over participants finds how the methods differ, for one question.
+    """Whether the default test finds how the methods differ, for one question.
 
-    Of each participant's own difference of the two methods' ratings; where pairs are rated, of the mean score less the
+    Of each participant's own differences of the two methods' ratings; where pairs are rated, of the scores less the
     middle of the scale (whether a trial showed one or the other first changes nothing).
     """
     rating, points, paired = design.settings.rating, design.study.scale_points, task_of(design.study).slots > 1
-    raised = np.array(
-        [[paired or trial.methods[0] == design.study.comparison for trial in own] for own in design.trials()]
-    )
+    trials = design.trials()
+    raised = np.array([[paired or trial.methods[0] == design.study.comparison for trial in own] for own in trials])
+    of_motion = motions_of(trials)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
         people, middle = max(sizes), (points - 1) / 2
@@ -88,27 +89,40 @@ def rating_study(design: Design, alpha: float, difference: float) -> Run:
         given = np.clip(np.round(leaning + rating.noise_sd * rng.standard_normal(leaning.shape)), 0, points - 1)
         response_s, answered = times(design, rng, np.full(given.shape, 0.5))
         kept = kept_of(design, rng, response_s, answered)
-        mean, seen = _mean(given, kept & raised[:people])
-        other, both = _mean(given, kept & ~raised[:people])
-        apart = mean - middle if paired else mean - other
-        return _apart(apart, seen if paired else seen & both, sizes, alpha, difference)
+
+        def apart(motions: FloatArray) -> tuple[FloatArray, BoolArray]:
+            mean, seen = _mean(given, kept & raised[:people], motions[:people])
+            other, both = _mean(given, kept & ~raised[:people], motions[:people])
+            return (mean - middle, seen) if paired else (mean - other, seen & both)
+
+        over_all = apart(of_motion.max(axis=2, keepdims=True))
+        return _found(over_all, apart(of_motion), sizes, alpha, difference)
 
     return run
 
 
-def _mean(given: FloatArray, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """Mean over these answers of each participant, and who gave one."""
-    count = rows.sum(axis=2)
-    return (given * rows).sum(axis=2) / np.maximum(count, 1), count > 0
+def _mean(given: FloatArray, rows: BoolArray, motions: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Mean over these answers of each participant in each motion, and where there are any."""
+    sums, count = (np.einsum("spt,ptm->spm", part, motions, optimize=True) for part in (given * rows, rows * 1.0))
+    return sums / np.maximum(count, 1), count > 0
 
 
-def _apart(apart: FloatArray, seen: BoolArray, sizes: Sequence[int], alpha: float, difference: float) -> BoolArray:
+Apart = tuple[FloatArray, BoolArray]
+"""How far the methods are apart, shape (studies, participants, motions), and where that is known."""
+
+
+def _found(over_all: Apart, by_motion: Apart, sizes: Sequence[int], alpha: float, difference: float) -> BoolArray:
     """Significant, and in the right direction (either way where there is no difference), for each number of people."""
     found = []
     for size in sizes:
-        there = seen[:, :size]
-        p_value = student_p_values(apart[:, :size], there, 0.0)
-        mean = (apart[:, :size] * there).sum(axis=1)
+        apart, there = over_all[0][:, :size, 0], over_all[1][:, :size, 0]
+        within, known = by_motion[0][:, :size], by_motion[1][:, :size]
+        p_value = student_p_values(apart, there, 0.0)
+        # As the analysis does: over motions only where that costs no participant.
+        complete = (known.any(axis=2) == there).all(axis=1)
+        general = general_p_values(p_value, within * known, known.astype(np.float64))
+        p_value = np.where(complete, general, p_value)
+        mean = (apart * there).sum(axis=1)
         towards = (mean > 0) == (difference > 0) if difference else np.ones(len(apart), dtype=bool)
         found.append((p_value < alpha) & towards)
     return np.column_stack(found)

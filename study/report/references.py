@@ -33,6 +33,10 @@ SATTERTHWAITE_1946 = (
     "Satterthwaite, F. E. (1946). An approximate distribution of estimates of variance components. Biometrics "
     "Bulletin, 2, 110–114."
 )
+AS_SAMPLES = (
+    "with participants and motions as samples (Clark 1973) and Satterthwaite’s degrees of freedom (1946), made smaller "
+    "for few motions"
+)
 BRADLEY_1952 = (
     "Bradley, R. A., & Terry, M. E. (1952). Rank analysis of incomplete block designs. Biometrika, 39, 324–345."
 )

@@ -12,17 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from study.analysis.crossed import BOTH, OVER_BOTH, general_p_values
 from study.analysis.headline import holds_for
-from study.analysis.preference.crossed import crossed
-from study.analysis.preference.motions import FEWEST_MOTIONS
 from study.analysis.preference.participants import default_p_values
 from study.arrays import FloatArray
 
 if TYPE_CHECKING:
     from study.analysis.preference.motions import MotionsAsSample
     from study.analysis.preference.participants import ParticipantTests
-
-OVER_BOTH = "Student's t over participants and motions"
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class DefaultTest:
 def default_test(people: ParticipantTests, motions: MotionsAsSample) -> DefaultTest:
     """Choose between the tests that were made."""
     if (both := motions.both) is not None:
-        return DefaultTest(both.percent, both.low, both.high, both.p_value, OVER_BOTH, "participants and motions", "")
+        return DefaultTest(both.percent, both.low, both.high, both.p_value, OVER_BOTH, BOTH, "")
     return DefaultTest(
         people.mean_percent, people.low, people.high, people.p_value, people.test, holds_for(people.participants),
         people.note,
@@ -67,8 +64,4 @@ def p_values_of_studies(chosen: ArrayLike, shown: ArrayLike) -> FloatArray:
     """
     yes, total = np.asarray(chosen, dtype=np.float64), np.asarray(shown, dtype=np.float64)
     people = default_p_values(yes.sum(axis=-1), total.sum(axis=-1))
-    if yes.shape[-1] < FEWEST_MOTIONS:
-        return people
-    both = crossed(yes, total).p_values()
-    enough = (total > 0).any(axis=-2).sum(axis=-1) >= FEWEST_MOTIONS
-    return np.asarray(np.where(enough & ~np.isnan(both), both, people))
+    return general_p_values(people, yes, total, 0.5)

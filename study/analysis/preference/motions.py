@@ -8,14 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
-from study.analysis.preference.crossed import crossed
+from study.analysis.crossed import FEWEST_MOTIONS, crossed
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-FEWEST_MOTIONS = 3
-"""Two can't say how far motions differ."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +60,7 @@ def _both_vary(part: pd.DataFrame, confidence: float) -> tuple[BothVary | None, 
     np.add.at(chosen, (groups[0], groups[1]), part["chose_a"].to_numpy(dtype=np.float64))
     np.add.at(shown, (groups[0], groups[1]), 1.0)
     found = crossed(chosen, shown)
-    share, error, freedom = (float(value) for value in (found.share, found.error, found.freedom))
+    share, error, freedom = (float(value) for value in (found.mean, found.error, found.freedom))
     if error <= 1e-6:
         return None, "all answers are the same: there is no spread to estimate"
     half = estimates.t_quantile(confidence, freedom) * error

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from study.analysis import estimates
+from study.analysis.crossed import STUDENT
 from study.analysis.rank_tests import NO_RANKS, signed_rank
 from study.arrays import FloatArray
 
-STUDENT, SIGN = "Student's t over participants", "exact sign test"
+SIGN = "exact sign test"
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class ParticipantTests:
     low: float | None
     high: float | None
     t: float | None
-    degrees_of_freedom: int | None
+    degrees_of_freedom: float | None
     p_value: float | None
     test: str
     wilcoxon_p_value: float | None

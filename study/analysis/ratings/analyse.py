@@ -63,7 +63,7 @@ class Ratings:
                 p=row.p_value,
                 p_adjusted=row.p_value if row.holm_p_value is None else row.holm_p_value,
                 test=row.test,
-                generalises_to=holds_for(row.participants),
+                generalises_to=row.generalises_to,
                 note=row.note,
             )
             for question in self.questions
@@ -95,8 +95,8 @@ class PairRatings:
                 interval=Interval(question.participants.low, question.participants.high, confidence),
                 p=question.participants.p_value,
                 p_adjusted=question.participants.p_value,
-                test="Student's t over participants",
-                generalises_to=holds_for(question.participants.participants),
+                test=question.participants.test,
+                generalises_to=question.participants.generalises_to,
                 note=question.participants.note,
             )
             for question, sentence in zip(self.questions, pair_sentences(self.questions, alpha), strict=True)
@@ -170,11 +170,11 @@ def _omnibus(question: Question, alpha: float) -> str:
 
 
 def _difference(row: MethodDifference, alpha: float) -> str:
-    """The difference of two methods over participants, with its test or why there is none."""
-    said = f"{row.of} over participants {row.mean:.2f}"
+    """The difference of two methods, with what it holds for and its test, or why there is none."""
+    said = f"{row.of} over {row.generalises_to} {row.mean:.2f}"
     if row.p_value is None or row.holm_p_value is None:
         return f"{said}; {row.note}"
     if row.t is None:
         return f"{said}, the same for all {row.participants}, {row.test} {_verdict(row.p_value, alpha)}"
     verdict = _verdict(row.holm_p_value, alpha, "p adjusted by Holm" if row.holm_p_value > row.p_value else "p")
-    return f"{said} ({row.low:.2f} to {row.high:.2f}), t({row.degrees_of_freedom}) = {row.t:.2f}, {verdict}"
+    return f"{said} ({row.low:.2f} to {row.high:.2f}), t({row.degrees_of_freedom:.3g}) = {row.t:.2f}, {verdict}"

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
+from study.analysis.crossed import OVER_BOTH, GeneralTest, general_test
 from study.analysis.rank_tests import NO_RANKS, Friedman, RankTest, friedman, signed_rank
 from study.analysis.ratings.answers import first_seen, rated
 from study.analysis.regression.ordinal import fit_ordinal
@@ -27,15 +28,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class MethodDifference(estimates.MeanTest):
-    """How much higher the other of two methods was rated: mean of each participant's own difference, with its test.
+class MethodDifference(GeneralTest):
+    """How much higher the other of two methods was rated: mean of each participant's own differences, with its test.
 
-    `test` is Student's t, or the exact sign test where all participants differ alike; `holm_p_value` is adjusted over
-    the pairs of methods.
+    The differences are those within a motion, where there are enough motions to generalise over; `holm_p_value` is
+    adjusted over the pairs of methods.
     """
 
     of: str
-    test: str
     holm_p_value: float | None = None
 
 
@@ -151,30 +151,31 @@ def _as_published(part: pd.DataFrame, alpha: float) -> tuple[TwoWay | tuple[()],
     return table, "the ratings of each combination are all the same: no F" if table[0].f is None else ""
 
 
-def _means(part: pd.DataFrame) -> pd.DataFrame:
-    """Each participant's mean rating of each method, NaN where there is none."""
-    return part.groupby(["participant", "method_a"])["rating"].mean().unstack()
+def _means(part: pd.DataFrame, *within: str) -> pd.DataFrame:
+    """Each participant's mean rating of each method (within each motion, say), NaN where there is none."""
+    return part.groupby(["participant", *within, "method_a"])["rating"].mean().unstack()
 
 
 def _differences(part: pd.DataFrame, confidence: float) -> tuple[MethodDifference, ...]:
-    """The difference of each two methods over participants, p-values adjusted over the pairs by Holm's method."""
-    means = _means(part)
-    rows = [_difference(means[one], means[other], confidence) for one, other in combinations(sorted(means.columns), 2)]
+    """The difference of each two methods, p-values adjusted over the pairs by Holm's method."""
+    means, cells = _means(part), _means(part, "motion") if "motion" in part.columns else None
+    rows = [_difference(means, cells, one, other, confidence) for one, other in combinations(sorted(means.columns), 2)]
     adjusted = estimates.holm([row.p_value for row in rows])
     return tuple(replace(row, holm_p_value=p) for row, p in zip(rows, adjusted, strict=True))
 
 
-def _difference(one: pd.Series[float], other: pd.Series[float], confidence: float) -> MethodDifference:
-    """How much higher the other method was rated; by the exact sign test where all participants differ alike."""
-    apart = (other - one).dropna().to_numpy(dtype=np.float64)
-    test = estimates.mean_test(apart, 0.0, confidence)
-    p_value = signed_rank(apart) if test.p_value is None else test.p_value
+def _difference(
+    means: pd.DataFrame, cells: pd.DataFrame | None, one: str, other: str, confidence: float
+) -> MethodDifference:
+    """How much higher the other method was rated, over participants and motions where that can be told."""
+    apart = (means[other] - means[one]).dropna()
+    test = general_test(apart, 0.0, confidence)
+    if cells is not None:
+        within = general_test((cells[other] - cells[one]).dropna(), 0.0, confidence)
+        test = within if within.test == OVER_BOTH and within.participants == test.participants else test
     note = "everybody rated the two equally" if len(apart) > 1 and not apart.any() else test.note
-    return MethodDifference(
-        **vars(test) | {"p_value": p_value, "note": note if len(apart) else "no participant rated both"},
-        of=f"{other.name} minus {one.name}",
-        test="none" if p_value is None else "exact sign test" if test.p_value is None else "Student's t",
-    )
+    note = note if len(apart) else "no participant rated both"
+    return MethodDifference(**vars(test) | {"note": note}, of=f"{other} minus {one}")
 
 
 def _mixed_design(part: pd.DataFrame, alpha: float) -> MixedDesign:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
+from study.analysis.crossed import GeneralTest, general_test
 from study.analysis.estimates import Mean, MeanTest, mean_of, mean_test
 from study.analysis.rank_tests import NO_RANKS, signed_rank
 from study.analysis.ratings.answers import rated
@@ -37,8 +38,10 @@ class AllAnswers:
 
 
 @dataclass(frozen=True)
-class ScoreTest(MeanTest):
-    """One mean score a participant against the middle of the scale, by Student's t and by signed ranks."""
+class ScoreTest(GeneralTest):
+    """The mean score against the middle of the scale by the test that generalises furthest; and one a participant, by
+    its standard deviation and by signed ranks.
+    """
 
     standard_deviation: float | None
     signed_rank_p_value: float | None
@@ -83,8 +86,8 @@ class OrderTest:
 class PairQuestion:
     """How method b compares with method a in one question.
 
-    `middle` is the score that means no difference; `published` is of all answers, `participants` of one mean score a
-    participant against the middle, `motions` the same a motion.
+    `middle` is the score that means no difference; `published` is of all answers, `participants` against the middle,
+    over motions too where there are enough, `motions` of one motion over participants.
     """
 
     item: str
@@ -172,7 +175,8 @@ def _means(part: pd.DataFrame) -> pd.Series[float]:
 
 def _over_participants(part: pd.DataFrame, middle: float, confidence: float) -> ScoreTest:
     means = _means(part)
-    found, by_ranks = mean_test(means, middle, confidence), signed_rank(means - middle)
+    cells = part.set_index([column for column in ("participant", "motion") if column in part.columns])["score"]
+    found, by_ranks = general_test(cells, middle, confidence), signed_rank(means - middle)
     note = "; ".join(filter(None, (found.note, NO_RANKS if by_ranks is None else "")))
     spread = float(means.std(ddof=1)) if len(means) > 1 else None
     return ScoreTest(**vars(found) | {"note": note}, standard_deviation=spread, signed_rank_p_value=by_ranks)
@@ -218,7 +222,7 @@ def _within(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
     test = mean_test(first - second, 0.0)
     if test.t is None or test.degrees_of_freedom is None:
         return OrderTest(note=f"effect of order: {test.note}")
-    return _tested(test.t**2, test.degrees_of_freedom)
+    return _tested(test.t**2, int(test.degrees_of_freedom))
 
 
 def _tested(f: float, left: int) -> OrderTest:
@@ -245,11 +249,11 @@ def pair_sentences(questions: Sequence[PairQuestion], alpha: float) -> list[str]
         test, name = question.participants, question.item or "rating"
         said = f"{name}: {question.of} {test.mean:.2f}, {question.middle:g} being the same"
         if test.t is None or test.p_value is None:
-            found.append(f"{said}; {test.note}")
+            found.append(f"{said}; {test.note}" + (f"; {test.test} p = {test.p_value:.3g}" if test.p_value else ""))
             continue
         verdict = "significant" if test.p_value < alpha else "not significant"
         found.append(
-            f"{said} ({test.low:.2f} to {test.high:.2f}), t({test.degrees_of_freedom}) = {test.t:.2f}, "
-            f"p = {test.p_value:.3g} ({verdict} at {alpha:g})"
+            f"{said} ({test.low:.2f} to {test.high:.2f}), t({test.degrees_of_freedom:.3g}) = {test.t:.2f}, "
+            f"p = {test.p_value:.3g} ({verdict} at {alpha:g}), over {test.generalises_to}"
         )
     return found

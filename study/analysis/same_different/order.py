@@ -25,7 +25,7 @@ class OrderTest:
     low: float | None = None
     high: float | None = None
     t: float | None = None
-    degrees_of_freedom: int | None = None
+    degrees_of_freedom: float | None = None
     p_value: float | None = None
     note: str = ""
 

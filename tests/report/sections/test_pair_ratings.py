@@ -63,7 +63,7 @@ def test_what_is_worse_is_called_worse_and_one_question_is_told_by_its_mean() ->
     (headline,) = section_of({"better": [0, 1, 1, 0, 1, 2]}).headlines
     assert headline.statement == (
         "Compared with old cut, new cut was rated 0.83 on average, on a scale of 0 to 4, where 2 means no difference; "
-        "across participants this is significant (p = .013)."
+        "across participants, for these motions, this is significant (p = .013)."
     )
     (both,) = section_of({"better": [0, 1, 1, 0], "natural": [1, 1, 0, 1]}).headlines
     assert "was rated below the middle of the scale in 2 of 2 questions" in both.statement

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from study.analysis.crossed import GeneralTest
 from study.analysis.estimates import MeanTest
 from study.analysis.ratings.analyse import Ratings
 from study.analysis.ratings.comparisons import MethodDifference, MixedDesign, Ordinal, Question, Ranks, rating_anova
@@ -17,7 +18,8 @@ from study.report.sections.section import About, Section
 def question(item: str, mean: float, f: float, p: float) -> Question:
     effect = VarianceEffect("method", f, 1, f, f, 48, p, partial_eta_squared=0.1)
     test = MeanTest(26, mean, 0.2, 0.0, 1.0, "", t=2.0, degrees_of_freedom=25, p_value=p)
-    difference = MethodDifference(**vars(test), of="cut-wang2003 minus cut-lee2002", test="Student's t", holm_p_value=p)
+    general = GeneralTest(**vars(test), test="Student's t over participants", generalises_to="participants")
+    difference = MethodDifference(**vars(general), of="cut-wang2003 minus cut-lee2002", holm_p_value=p)
     return Question(
         item=item,
         participants=26,
@@ -49,8 +51,8 @@ def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
     section = shown(Ratings(ROWS, questions, ()), About("cuts", "Cuts"))
     (headline,) = section.headlines
     assert "was rated higher than" in headline.statement
-    assert "in 2 of 2 questions, in 1 of them significantly at 0.05 across 26 participants" in headline.statement
-    start = "Natural: as published F(1, 48) = 6.39, p = .015; over participants 0.70 [0.00, 1.00], t(25) = "
+    assert "in 2 of 2 questions, in 1 of them significantly at 0.05 across participants" in headline.statement
+    start = "Natural: as published F(1, 48) = 6.39, p = .015; over participants: 0.70 [0.00, 1.00], t(25) = "
     assert headline.detail.startswith(start)
     assert "Smooth: as published F(1, 48) = 1.20, p = .28" in headline.detail
     assert [table.name for table in section.tables] == ["cuts_ratings", "cuts_anova", "cuts_differences"]
@@ -62,7 +64,7 @@ def test_the_worse_method_is_not_called_better() -> None:
     (headline,) = shown(result, About("cuts", "Cuts")).headlines
     assert headline.statement == (
         "Cut-lee2002 was rated 0.70 points higher than cut-wang2003 on average, on a scale of 0 to 4; across "
-        "participants this is significant (p = .015)."
+        "participants, this is significant (p = .015)."
     )
 
 
@@ -104,7 +106,8 @@ def test_three_methods_are_tested_together_and_in_pairs() -> None:
 def test_participants_who_all_differ_alike_are_tested_by_signs() -> None:
     section = section_of({"a": [5.0] * 12, "b": [1.0] * 12})
     assert "A was rated 4.00 points higher than b" in section.headlines[0].statement
-    assert "over participants −4.00 for every participant, exact sign test p < .001" in section.headlines[0].detail
+    told = "over participants, for these motions: −4.00 for every participant, exact sign test p < .001"
+    assert told in section.headlines[0].detail
     ordinal = next(table for table in section.folded if table.name == "s_ordinal")
     assert ordinal.rows[0]["odds_ratio"] is ordinal.rows[0]["value"] is None
     assert any("separate perfectly" in note for note in section.notes)

@@ -9,10 +9,12 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 from study.analysis.analyse import Analysis
+from study.analysis.crossed import OVER_BOTH
 from study.analysis.ratings.analyse import PairRatings
 from study.analysis.ratings.pairs import AllAnswers, PairQuestion, ScoreTest
 from study.counting import counted
 from study.report import tables, words
+from study.report.references import AS_SAMPLES, CLARK_1973, SATTERTHWAITE_1946
 from study.report.sections.pair_ratings.figures import likert_figure
 from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.tables import Table
@@ -72,7 +74,7 @@ def _headline(questions: Sequence[PairQuestion], top: int, alpha: float) -> Head
         statement = f"Compared with {_reference(first)}, {_other(first)} was rated {test.mean:.2f} on average, {scale}"
         if test.p_value is not None:
             told = "this is significant" if test.p_value < alpha else "this is not significant"
-            statement += f"; across participants {told} ({words.p(test.p_value)})"
+            statement += f"; across {test.generalises_to}, {told} ({words.p(test.p_value)})"
         return Headline(f"{statement}.", f"{_size(questions)}. {detail}")
     detail = f"{_size(questions)}, {scale}. {detail}"
     up = [test for test in known if (test.mean or 0.0) > first.middle]
@@ -103,12 +105,13 @@ def _in_words(question: PairQuestion) -> str:
 
 def _corrected(test: ScoreTest) -> str:
     """Mean and interval over participants, and the test against the middle."""
-    if test.t is None or test.p_value is None:
-        return f"{words.decimals(test.mean, 2)}, no test can be made"
+    if test.t is None:
+        told = "no test can be made" if test.p_value is None else f"{test.test} {words.p(test.p_value)}"
+        return f"{words.decimals(test.mean, 2)}, {told}"
     interval = words.bare_interval(test.low, test.high, 2)
     return (
-        f"{words.decimals(test.mean, 2)} [{interval}], t({test.degrees_of_freedom}) = {words.decimals(test.t, 2)}, "
-        f"{words.p(test.p_value)}"
+        f"{words.decimals(test.mean, 2)} [{interval}], t({test.degrees_of_freedom:.3g}) = {words.decimals(test.t, 2)}, "
+        f"{words.p(test.p_value or 0.0)}"
     )
 
 
@@ -146,9 +149,9 @@ def corrected_table(name: str, questions: Sequence[PairQuestion]) -> Table:
     """Return how the methods compare in each question, over participants."""
     return tables.make(
         f"{name}_corrected",
-        "Corrected: one mean score a participant. Mean with 95% interval, and tests against the middle of the scale, "
-        f"{questions[0].middle:g}, by Student’s t and by Wilcoxon’s signed ranks.",
-        "item participants mean low high t degrees_of_freedom p_value signed_rank_p_value",
+        "Corrected: mean score with 95% interval, and tests against the middle of the scale, "
+        f"{questions[0].middle:g}, by Student’s t and, of one mean a participant, by Wilcoxon’s signed ranks.",
+        "item test participants mean low high t degrees_of_freedom p_value signed_rank_p_value",
         [vars(question.participants) | {"item": _item(question)} for question in questions],
     )
 
@@ -200,12 +203,14 @@ def _folded(name: str, questions: Sequence[PairQuestion]) -> list[Table]:
 
 
 def _methods(found: Collection[PairRatings], analysis: Analysis) -> str:
-    del found, analysis
+    del analysis
+    both = any(question.participants.test == OVER_BOTH for result in found for question in result.questions)
     return (
         "The sign of comparisons on a scale was reversed where the order was reversed, so that scores compare the "
-        "comparison with the reference; each participant’s mean score was tested against the middle of the scale by "
-        "Student’s t and Wilcoxon’s signed ranks, and between the orders by analysis of variance."
+        "comparison with the reference. Mean scores were tested against the middle of the scale by Student’s t"
+        f"{f', {AS_SAMPLES},' if both else ''} and by Wilcoxon’s signed ranks over participants; between the orders by "
+        "analysis of variance."
     )
 
 
-KIND = SectionKind(pair_ratings_section, _methods, lambda _: {WANG_2003})
+KIND = SectionKind(pair_ratings_section, _methods, lambda _: {WANG_2003, CLARK_1973, SATTERTHWAITE_1946})

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from study.analysis.crossed import OVER_BOTH
 from study.analysis.preference.analyse import Comparison
-from study.analysis.preference.default_test import OVER_BOTH
 from study.report.drawing import (
     BLUE,
     INK,

@@ -11,14 +11,15 @@ from typing import Any
 
 from study.analysis.analyse import Analysis
 from study.analysis.confirmatory import ConfirmatoryTest
+from study.analysis.crossed import OVER_BOTH
 from study.analysis.estimates import Interval
 from study.analysis.preference.analyse import Comparison, Preference
 from study.analysis.preference.bradley_terry import BradleyTerry
-from study.analysis.preference.default_test import OVER_BOTH
 from study.analysis.preference.no_effect import NoEffect
 from study.counting import counted
 from study.report import tables, words
 from study.report.references import (
+    AS_SAMPLES,
     BRADLEY_1952,
     CLARK_1973,
     HOLM_1979,
@@ -323,10 +324,7 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
     tests = {compared.default.test for result in found for compared in result.comparisons}
     test = "Student’s t of each participant’s percentage against 50%, which holds for the motions shown"
     if OVER_BOTH in tests:
-        test = (
-            "Student’s t of the percentage against 50%, with participants and motions as samples (Clark 1973) and "
-            "Satterthwaite’s degrees of freedom (1946), made smaller for few motions"
-        )
+        test = f"Student’s t of the percentage against 50%, {AS_SAMPLES}"
         if len(tests) > 1:
             test += "; where fewer than three motions were shown, by Student’s t over participants"
     return (

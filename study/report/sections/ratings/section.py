@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
 
 from study.analysis.analyse import Analysis
+from study.analysis.crossed import OVER_BOTH
 from study.analysis.ratings.analyse import Ratings
 from study.analysis.ratings.comparisons import MethodDifference, Question
 from study.analysis.ratings.table import MeanRating, MethodRating
@@ -17,6 +18,7 @@ from study.analysis.variance.repeated_measures import WithinEffect
 from study.analysis.variance.two_way import VarianceEffect
 from study.counting import counted
 from study.report import tables, words
+from study.report.references import AS_SAMPLES, CLARK_1973, SATTERTHWAITE_1946
 from study.report.sections.ratings import figures
 from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.tables import Table
@@ -99,7 +101,7 @@ def _of_one(question: Question, difference: MethodDifference, points: int, alpha
         )
     if difference.p_value is not None:
         told = "this is significant" if difference.p_value < alpha else "this is not significant"
-        statement += f"; across participants {told} ({words.p(difference.p_value)})"
+        statement += f"; across {difference.generalises_to}, {told} ({words.p(difference.p_value)})"
     return Headline(f"{statement}.", f"{size}. {_tests([question])}")
 
 
@@ -117,7 +119,7 @@ def _of_several(known: Sequence[tuple[Question, MethodDifference]], alpha: float
     return Headline(
         f"{words.sentence(first)} was rated higher than {second} in {len(up)} of "
         f"{counted(len(known), 'question')}, in {clear or 'none'} of them significantly at {alpha:g} across "
-        f"{counted(known[0][0].participants, 'participant')}.",
+        f"{known[0][1].generalises_to}.",
         tests,
     )
 
@@ -134,7 +136,7 @@ def _tests(questions: Sequence[Question]) -> str:
     for question in questions:
         found = [f"as published {_f(question.anova[0], question.anova[0].p_value)}"] if question.anova else []
         if question.difference and question.difference.p_value is not None:
-            found.append(f"over participants {_difference(question.difference)}")
+            found.append(f"over {question.difference.generalises_to}: {_difference(question.difference)}")
         found += _omnibus(question)
         name = words.sentence(words.readable(question.item) or "rating")
         parts.append(f"{name}: {'; '.join(found) or 'no test can be made'}.")
@@ -166,7 +168,7 @@ def _difference(found: MethodDifference) -> str:
     if found.t is None:
         return text if found.p_value is None else f"{text} for every participant, {found.test} {words.p(found.p_value)}"
     interval = f"[{words.bare_interval(found.low, found.high, 2)}]"
-    return f"{text} {interval}, t({found.degrees_of_freedom}) = {words.decimals(found.t, 2)}, {_p_of(found)}"
+    return f"{text} {interval}, t({found.degrees_of_freedom:.3g}) = {words.decimals(found.t, 2)}, {_p_of(found)}"
 
 
 def _p_of(difference: MethodDifference) -> str:
@@ -235,9 +237,9 @@ def difference_table(name: str, questions: Sequence[Question]) -> Table:
     """Return the difference of the methods over participants."""
     return tables.make(
         f"{name}_differences",
-        "Corrected: difference between each participant’s ratings of two methods. Mean, 95% interval, and t test (the "
-        "exact sign test if all differences are equal); p-values of several pairs adjusted by Holm’s method.",
-        "item of mean low high t degrees_of_freedom p_value holm_p_value",
+        "Corrected: difference between each participant’s ratings of two methods, of the same motion where motions are "
+        "a sample too. Mean, 95% interval, and test; p-values of several pairs adjusted by Holm’s method.",
+        "item of test mean low high t degrees_of_freedom p_value holm_p_value",
         _by_question(questions, lambda question: question.differences),
     )
 
@@ -285,11 +287,14 @@ def _folded(name: str, result: Ratings) -> list[Table]:
 
 
 def _methods(found: Collection[Ratings], analysis: Analysis) -> str:
-    del found, analysis
+    del analysis
+    rows = [row for result in found for question in result.questions for row in question.differences]
+    several = f", {AS_SAMPLES}" if any(row.test == OVER_BOTH for row in rows) else ""
     return (
         "Ratings were compared by the two-way between-subjects analysis of variance of 2003 (method by order; type "
-        "III sums of squares), and by Student’s t of each participant’s difference."
+        "III sums of squares), and by Student’s t of each participant’s "
+        f"differences{several}."
     )
 
 
-KIND = SectionKind(ratings_section, _methods, lambda _: {WANG_2003})
+KIND = SectionKind(ratings_section, _methods, lambda _: {WANG_2003, CLARK_1973, SATTERTHWAITE_1946})

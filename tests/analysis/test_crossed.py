@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.preference.crossed import FEW_GROUPS, crossed
-from study.analysis.preference.default_test import OVER_BOTH, p_values_of_studies
+from study.analysis.crossed import FEW_GROUPS, OVER_BOTH, crossed, general_test
+from study.analysis.preference.default_test import p_values_of_studies
 from study.analysis.preference.participants import default_p_values
 
 
@@ -36,7 +37,7 @@ def test_a_complete_table_gives_the_quasi_f_of_clark() -> None:
     freedom = variance**2 / (
         ((1 + FEW_GROUPS / 19) * own) ** 2 / 19 + ((1 + FEW_GROUPS / 5) * other) ** 2 / 5 + rest**2 / 95
     )
-    assert found.share == pytest.approx(chosen.mean() / 4)
+    assert found.mean == pytest.approx(chosen.mean() / 4)
     assert found.error == pytest.approx(np.sqrt(variance / 120))
     assert found.freedom == pytest.approx(freedom)
     expected = 2 * stats.t.sf(abs(chosen.mean() / 4 - 0.5) / np.sqrt(variance / 120), freedom)
@@ -118,3 +119,27 @@ def test_the_default_test_of_many_studies_is_over_both_where_motions_are_enough(
         p_values_of_studies(alike, alike), default_p_values(alike.sum(axis=-1), alike.sum(axis=-1))
     )
     assert OVER_BOTH.startswith("Student")
+
+
+@pytest.mark.parametrize("motions_sd", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize(("people", "motions"), [(12, 3), (26, 8)])
+def test_means_of_ratings_keep_their_size(people: int, motions: int, motions_sd: float) -> None:
+    """Where a method suits some motions better (by normal deviates) and nothing else, errors at .05 stay below .08."""
+    rng = np.random.default_rng([people, motions, int(10 * motions_sd), 2])
+    size = (2500, people, motions)
+    lean = 0.3 * rng.standard_normal((2500, people, 1)) + motions_sd * rng.standard_normal((2500, 1, motions))
+    wrong = (crossed(lean + 1.3 * rng.standard_normal(size), np.ones(size)).p_values(0.0) < 0.05).mean()
+    assert 0.01 < wrong < 0.08
+
+
+def test_a_table_of_ratings_has_the_test_over_both_or_over_participants() -> None:
+    rng = np.random.default_rng(9)
+    table = rng.standard_normal((14, 1)) + rng.standard_normal((1, 5)) + 0.5 * rng.standard_normal((14, 5)) + 0.4
+    rows = pd.DataFrame(table, index=[f"p{row}" for row in range(14)]).stack()
+    found = general_test(rows)
+    own, other, rest = mean_squares(table)
+    assert found.standard_error == pytest.approx(np.sqrt((own + other - rest) / 70))
+    assert (found.test, found.generalises_to) == (OVER_BOTH, "participants and motions")
+    two = general_test(rows[rows.index.get_level_values(1) < 2])
+    assert two.p_value == pytest.approx(stats.ttest_1samp(table[:, :2].mean(axis=1), 0.0).pvalue)
+    assert two.generalises_to == "participants, for these motions"

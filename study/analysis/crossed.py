@@ -1,6 +1,6 @@
-"""A mean share that holds for other participants and other motions: counts in; estimate, error and freedom out.
+"""Means that hold for other participants and other motions: values by participant and motion in, tests out.
 
-Participants and motions are both samples (Clark 1973): the variance of the mean share is that between participants plus
+Participants and motions are both samples (Clark 1973): the variance of the mean is that between participants plus
 that between motions less what both contain of the rest, and Student's t takes the degrees of freedom of Satterthwaite
 1946. With three to eight motions the share of variance between them is hardly known, which two rules allow for:
 
@@ -15,11 +15,24 @@ Both were settled by simulation (`benchmarks/group_tests.py crossed`), which giv
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from study.analysis import estimates
+from study.analysis.headline import holds_for
+from study.analysis.rank_tests import signed_rank
 from study.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FEWEST_MOTIONS = 3
+"""Two can't say how far motions differ."""
+
+OVER_BOTH, STUDENT = "Student's t over participants and motions", "Student's t over participants"
+BOTH = "participants and motions"
 
 KEPT_BELOW = 0.5
 """The p-value of its F test below which a variance component is kept."""
@@ -30,53 +43,104 @@ _ROUNDS = 60
 """Rounds in which the means of participants and motions are found where answers are missing; far more than needed."""
 
 
+@dataclass(frozen=True)
+class GeneralTest(estimates.MeanTest):
+    """The mean against an expected value by the test that generalises furthest.
+
+    `test` is Student's t over participants and motions, or with fewer than three motions over participants; the exact
+    sign test where all values are the same. `generalises_to` is what it then holds for.
+    """
+
+    test: str
+    generalises_to: str
+
+
+def general_test(values: pd.Series[float], expected: float = 0.0, confidence: float = 0.95) -> GeneralTest:
+    """Test the mean of values that are indexed by participant, and by motion where motions are known."""
+    data = values.dropna()
+    own = data.groupby(level=0).mean()
+    people = estimates.mean_test(own, expected, confidence)
+    if data.index.nlevels > 1 and people.participants > 1 and data.index.unique(1).size >= FEWEST_MOTIONS:
+        table = data.groupby(level=[0, 1]).mean().unstack()
+        found = crossed(table.fillna(0.0), table.notna())
+        mean, error, freedom = (float(value) for value in (found.mean, found.error, found.freedom))
+        if error > 1e-9:
+            half, t = estimates.t_quantile(confidence, freedom) * error, (mean - expected) / error
+            p_value = estimates.t_probability(t, freedom)
+            return GeneralTest(
+                people.participants, mean, error, mean - half, mean + half, "", t, freedom, p_value, OVER_BOTH, BOTH
+            )
+    sign = signed_rank(own - expected) if people.p_value is None else None
+    test = "exact sign test" if sign is not None else "none" if people.p_value is None else STUDENT
+    told = vars(people) | {"p_value": people.p_value if sign is None else sign}
+    return GeneralTest(**told, test=test, generalises_to=holds_for(people.participants))
+
+
 @dataclass(frozen=True, eq=False)
 class Crossed:
-    """Mean shares of many studies, each with its standard error and degrees of freedom; shape (...) each.
+    """Means of many studies, each with its standard error and degrees of freedom; shape (...) each.
 
     The error is 0 where all answers are the same, and NaN with fewer than two participants or motions.
     """
 
-    share: FloatArray
+    mean: FloatArray
     error: FloatArray
     freedom: FloatArray
 
     def p_values(self, expected: float = 0.5) -> FloatArray:
-        """Two-sided p-values against an expected share; NaN where there is no spread."""
+        """Two-sided p-values against an expected mean; NaN where there is no spread."""
         from scipy.special import stdtr
 
         with np.errstate(divide="ignore", invalid="ignore"):
-            statistic = np.abs(self.share - expected) / self.error
+            statistic = np.abs(self.mean - expected) / self.error
         known = self.error > 1e-9
         return np.asarray(np.where(known, 2 * stdtr(self.freedom, -np.where(known, statistic, 0.0)), np.nan))
 
 
-def crossed(chosen: ArrayLike, shown: ArrayLike) -> Crossed:
-    """Estimate a share over participants and motions.
+def crossed(sums: ArrayLike, counts: ArrayLike) -> Crossed:
+    """Estimate a mean over participants and motions.
 
     Parameters
     ----------
-    chosen, shown : array_like, shape (..., participants, motions)
-        How often each participant favoured the first method in each motion (a tie is one half), of how many answers.
+    sums, counts : array_like, shape (..., participants, motions)
+        The sum of each participant's values in each motion, of how many values. Of a preference: how often the first
+        method was favoured (a tie is one half), of how many answers.
     """
-    yes, total = np.broadcast_arrays(np.asarray(chosen, dtype=np.float64), np.asarray(shown, dtype=np.float64))
+    yes, total = np.broadcast_arrays(np.asarray(sums, dtype=np.float64), np.asarray(counts, dtype=np.float64))
     there = total > 0
     answers = np.maximum(total.sum(axis=(-1, -2)), 1.0)
-    share = np.where(there, yes, 0.0).sum(axis=(-1, -2)) / answers
-    apart = np.where(there, yes - total * share[..., None, None], 0.0)
+    mean = np.where(there, yes, 0.0).sum(axis=(-1, -2)) / answers
+    apart = np.where(there, yes - total * mean[..., None, None], 0.0)
     cells = there.sum(axis=(-1, -2))
-    sums, groups = [], []
+    between, groups = [], []
     for axis in (-1, -2):
         count = there.any(axis=axis).sum(axis=-1)
         few = np.maximum(count - 1, 1)
-        sums.append((apart.sum(axis=axis) ** 2).sum(axis=-1) * count / few / answers**2)
+        between.append((apart.sum(axis=axis) ** 2).sum(axis=-1) * count / few / answers**2)
         groups.append(count)
     rest_freedom = np.maximum(cells - groups[0] - groups[1] + 1, 0)
     left = apart - total * _means(apart, total)
     rest = (left**2).sum(axis=(-1, -2)) * cells / np.maximum(rest_freedom, 1) / answers**2
-    error, freedom = _combined(sums, [np.maximum(count - 1, 1) for count in groups], rest, rest_freedom)
+    error, freedom = _combined(between, [np.maximum(count - 1, 1) for count in groups], rest, rest_freedom)
     known = (groups[0] > 1) & (groups[1] > 1)
-    return Crossed(share, np.where(known, error, np.nan), np.where(known, freedom, np.nan))
+    return Crossed(mean, np.where(known, error, np.nan), np.where(known, freedom, np.nan))
+
+
+def general_p_values(alone: FloatArray, sums: FloatArray, counts: FloatArray, expected: float = 0.0) -> FloatArray:
+    """Return the p-values of `general_test` of many studies at once, shape (...).
+
+    Parameters
+    ----------
+    alone : ndarray, shape (...)
+        Those over participants, for studies with fewer than three motions.
+    sums, counts : ndarray, shape (..., participants, motions)
+        As in `crossed`.
+    """
+    if counts.shape[-1] < FEWEST_MOTIONS:
+        return alone
+    both = crossed(sums, counts).p_values(expected)
+    enough = (counts > 0).any(axis=-2).sum(axis=-1) >= FEWEST_MOTIONS
+    return np.asarray(np.where(enough & ~np.isnan(both), both, alone))
 
 
 def _means(apart: FloatArray, total: FloatArray) -> FloatArray:
