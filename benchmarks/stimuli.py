@@ -1,11 +1,15 @@
 """Flaws of stimuli that their methods did not intend: skating, sunken and jumping feet, sudden changes of velocity.
 
     python benchmarks/stimuli.py [--protocol NAME]... [--library FOLDER]... [--folder FOLDER]... [--pairs N] [--json X]
+    python benchmarks/stimuli.py --methods [--library FOLDER]... [--pairs N]
 
 Every protocol is made on the synthetic library and on each `--library` that has its motions; of each `--folder`, random
 pairs of its motions are blended at random points over the geodesic length, a fixed one and a long one. Each stimulus is
 measured by `study.transitions.flaws` and, to check that, by the arithmetic below, which shares no code with it: forward
 kinematics with rotation matrices on the arrays of a clip.
+
+With `--methods`, every built-in method that takes given points joins the same random pairs of each library at the same
+random points, and all are measured over the same frames: those of the longest.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ import argparse
 import json
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -28,10 +33,14 @@ from study.experiment.stimuli.films import Film, plan_all
 from study.experiment.stimuli.ways import Ways
 from study.motion.clip import Clip, retarget, trim
 from study.motion.library import open_library
+from study.motion.synthetic import synthesize
 from study.transitions.blend_length import geodesic_length
+from study.transitions.comparison import own_pose_m
 from study.transitions.flaws import Flaws, find_flaws
 from study.transitions.methods.makes.blends import Blended
 from study.transitions.methods.method import Motions, Place
+from study.transitions.methods.points.shared import Shared
+from study.transitions.methods.registry import DIRECT, METHODS
 
 PROTOCOLS = sorted(path.stem for path in (Path(__file__).parents[1] / "protocols").glob("*.toml"))
 
@@ -47,7 +56,13 @@ def main() -> None:
     parser.add_argument("--fps", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--methods", action="store_true")
     options = parser.parse_args()
+    if options.methods:
+        for library in ["synthetic", *options.library]:
+            method_table(library, options.pairs, options.fps, np.random.default_rng(options.seed))
+        pose_costs()
+        return
     rows: list[dict[str, Any]] = []
     for library in ["synthetic", *options.library]:
         for protocol in options.protocol or PROTOCOLS:
@@ -84,36 +99,101 @@ def protocol_stimuli(name: str, library: str) -> Iterator[Measurable]:
 
 def folder_stimuli(folder: str, pairs: int, fps: float, rng: np.random.Generator) -> Iterator[Measurable]:
     """Blends between random motions of a folder that share a rig."""
-    library = open_library(folder)
-    clips: dict[str, Clip] = {}
-    for name in library.names():
+    for place in random_places(folder, fps, rng):
+        geodesic = geodesic_length(place.source, place.destination, place.start_frame, place.end_frame).blend_frames
+        lengths = {"geodesic": geodesic, "fixed": round(fps / 3), "long": round(0.8 * fps)}
+        found = []
         try:
-            clips[name] = library.clip(name, fps=fps)
-        except SegueError:
-            continue
-    usable = [name for name, clip in clips.items() if clip.seconds > 1.5]
-    made = tries = 0
-    while made < pairs and tries < 30 * pairs:
-        tries += 1
-        a, b = rng.choice(usable, 2, replace=False)
-        try:
-            source, destination = clips[a], retarget(clips[b], clips[a].skeleton)
-            start = int(rng.integers(round(0.3 * fps), source.frames - 5))
-            end = int(rng.integers(5, destination.frames - round(0.5 * fps)))
-            geodesic = geodesic_length(source, destination, start, end).blend_frames
-            lengths = {"geodesic": geodesic, "fixed": round(fps / 3), "long": round(0.8 * fps)}
-            place = Place("", (a, b), source, destination, start, end, Motions((), None, None, None, {}))
             for kind, frames in lengths.items():
                 began = time.perf_counter()
                 done = Blended((frames, frames), "linear", clean_feet=True).made(place)
-                seconds = time.perf_counter() - began
-                first = max(0, done.blend_start - round(fps))
-                clip = trim(done.clip, first, min(done.clip.frames, done.blend_stop + round(fps)))
-                blend = done.blend_start - first, done.blend_stop - first
-                yield f"{a}:{start} to {b}:{end} {kind} {frames}", clip, blend, (source, destination), seconds
-        except (SegueError, ValueError):
+                found.append((f"{kind} {frames}", done, time.perf_counter() - began))
+        except SegueError:
             continue
-        made += 1
+        for kind, done, seconds in found:
+            first = max(0, done.blend_start - round(fps))
+            clip = trim(done.clip, first, min(done.clip.frames, done.blend_stop + round(fps)))
+            blend = done.blend_start - first, done.blend_stop - first
+            yield f"{place.transition} {kind}", clip, blend, (place.source, place.destination), seconds
+        if not (pairs := pairs - 1):
+            return
+
+
+def random_places(folder: str, fps: float, rng: np.random.Generator) -> Iterator[Place]:
+    """Random points of random pairs of a folder's motions that share a rig, 1,200 of them."""
+    library = open_library(folder)
+    clips: dict[str, Clip] = {}
+    for name in library.names():
+        with suppress(SegueError):
+            clips[name] = library.clip(name, fps=fps)
+    usable = [name for name, clip in clips.items() if clip.seconds > 1.5]
+    hops = tuple(str(name) for name in rng.choice(usable, min(6, len(usable)), replace=False))
+
+    def fitted(name: str, like: Clip) -> Clip:
+        return retarget(clips[name], like.skeleton)
+
+    motions = Motions(hops, fitted, Path, lambda _: np.random.default_rng(0), {})
+    for _ in range(1200):
+        a, b = (str(name) for name in rng.choice(usable, 2, replace=False))
+        with suppress(SegueError, ValueError):
+            source, destination = clips[a], fitted(b, clips[a])
+            start = int(rng.integers(round(0.3 * fps), source.frames - 5))
+            end = int(rng.integers(5, destination.frames - round(0.5 * fps)))
+            yield Place(f"{a}:{start} to {b}:{end}", (a, b), source, destination, start, end, motions)
+
+
+def method_table(folder: str, pairs: int, fps: float, rng: np.random.Generator) -> None:
+    """Every method at the same places, as rows of a table."""
+    methods = {name: one for name, one in METHODS.items() if isinstance(one.points, Shared)}
+    rows: dict[str, list[list[float]]] = {name: [] for name in methods}
+    done = 0
+    for place in random_places(folder, fps, rng):
+        clips, points = (place.source, place.destination), (place.start_frame, place.end_frame)
+        made = {}
+        try:
+            for name, method in methods.items():
+                length = method.length.at(*clips, *points) if method.length.windows else None
+                way = method.make.way(place, length.windows if length else (0, 0))
+                made[name] = way.made(place), way.motions(place)
+        except SegueError:
+            continue
+        longest = max(one.blend_stop - one.blend_start for one, _ in made.values())
+        for name, (one, motions) in made.items():
+            blend = one.blend_start, min(one.blend_start + longest, one.clip.frames)
+            flaws = find_flaws(one.clip, blend, motions)
+            skating = 0.5 * (flaws.left.skating_share + flaws.right.skating_share)
+            limited = [float(getattr(flaws, f"{key}_times") > limit) for key, limit in _LIMITS]
+            shares = [flaws.unsupported_share, skating, flaws.toe_acceleration_times, *limited]
+            rows[name].append([*shares, 100 * own_pose_m(one.clip, blend, motions)])
+        if (done := done + 1) == pairs:
+            break
+    print(f"{Path(folder).name}: {done} transitions, each by every method")
+    print(
+        "| method | no foot stands | a foot skates | toe, median times | toe > 1.5 times, % | joint > 1, % "
+        "| root > 1, % | from own poses, cm |"
+    )
+    for name, found in rows.items():
+        values = np.array(found)
+        mean, toe = values.mean(axis=0), np.median(values[:, 2])
+        percent = " | ".join(f"{100 * share:.0f}" for share in mean[3:6])
+        print(f"| `{name}` | {mean[0]:.3f} | {mean[1]:.3f} | {toe:.2f} | {percent} | {mean[6]:.1f} |", flush=True)
+
+
+def pose_costs() -> None:
+    """What each make takes for a further pose, feet as they come: 60 blended frames less 1, the least of 100 times."""
+    walk, run = synthesize("walk", seconds=8.0), synthesize("run", seconds=8.0)
+    for name, make in DIRECT.items():
+        bare = make().with_settings({"clean_feet": False})
+        places = [Place("", ("", ""), walk, run, 60, 70 + frames) for frames in (1, 60)]
+        ways = [bare.way(place, (frames, frames)) for place, frames in zip(places, (1, 60), strict=True)]
+        least = [np.inf, np.inf]
+        for _ in range(100):
+            for k, (way, place) in enumerate(zip(ways, places, strict=True)):
+                began = time.perf_counter()
+                way.made(place)
+                least[k] = min(least[k], time.perf_counter() - began)
+        further = (least[1] - least[0]) / (ways[1].frames - ways[0].frames)
+        print(f"{name}: {1e3 * least[0]:.1f} ms for the first pose, {1e6 * further:.0f} us for a further one")
 
 
 def _shown(title: str, stimuli: Iterator[Measurable]) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Where and for how long to blend from one clip to another, with nothing given but the clips.
+"""Where, for how long and how to blend from one clip to another, with nothing given but the clips.
 
 In: two clips of one rig at one frame rate, and whether either moves in cycles. Out: `Advice`. The lengths are those of
 Wang & Bodenheimer 2004: geodesic where a motion is cyclic, for people see when a gait falls out of phase, velocity
@@ -10,7 +10,8 @@ it, by what the blend does to the motion: it bends poses by their distance (Eq. 
 other, that distance over the blend length to the velocities. As in the cost of Lee et al. the two are added, and the
 velocities weigh so much that poses and velocities of these clips vary alike: `cost (1 + (tau / (b + 1))^2)`, where tau
 is the time in which the motion goes through its own variation, about a sixth of a cycle. By the distance alone the
-shortest blends would always win, for a good match seldom lasts.
+shortest blends would always win, for a good match seldom lasts. How frames are made is then chosen by what each make
+does there (`comparison`).
 """
 
 from __future__ import annotations
@@ -25,8 +26,11 @@ from study.motion.clip import Clip, sample
 from study.motion.cycles import find_cycle
 from study.transitions.batch import geodesic_lengths, velocity_lengths
 from study.transitions.blend_length import FIXED_S, LONGEST_S, default_frames
+from study.transitions.comparison import Measured, compare, why
 from study.transitions.distances import distance_matrix, frame_distance, on_joints_of
 from study.transitions.methods.lengths.wang2004 import Fixed, Geodesic, Velocity
+from study.transitions.methods.makes.blends import Slerp
+from study.transitions.methods.method import Place
 from study.transitions.weights import joint_weights
 
 # 2004 section 5.1: differences that are noticed, 7 frames longer or 8 frames shorter, at 30 fps.
@@ -54,6 +58,10 @@ class Advice:
     """Name of the length: geodesic or velocity."""
     why: str
     """What it was chosen for."""
+    make: str
+    """Name of the make whose frames show least flaws there."""
+    make_why: str
+    """What it has over a plain blend."""
     start_frame: int
     end_frame: int
     """First blended frame of the source, last blended frame of the destination."""
@@ -69,6 +77,8 @@ class Advice:
     """How much longer the advised blend is; below zero, shorter."""
     jnd: float
     """That difference in just noticeable differences (2004 section 5.1); from 1 on, people see it."""
+    makes: tuple[Measured, ...]
+    """What each make does there, the advised one first; none for a rig without feet."""
     note: str = ""
     """What a reader should know."""
 
@@ -83,7 +93,7 @@ def is_cyclic(clip: Clip) -> bool:
 
 
 def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None = None) -> Advice:
-    """A transition point and a blend length.
+    """A transition point, a blend length and a make.
 
     Parameters
     ----------
@@ -113,11 +123,14 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
     start, end = int(starts[best]), int(ends[best])
     chosen, fixed = (each.at(source, destination, start, end) for each in (method, Fixed()))
     length, default = chosen.blend_frames, default_frames(source.fps, FIXED_S)
+    makes = compare(Place("", (source.name, destination.name), source, destination, start, end), length)
     return Advice(
         source.name,
         destination.name,
         method.name,
         _why(repeats),
+        makes[0].make if makes else Slerp.name,
+        why(makes),
         start,
         end,
         length,
@@ -127,6 +140,7 @@ def advise(source: Clip, destination: Clip, *, cyclic: tuple[bool, bool] | None 
         default,
         length - default,
         just_noticeable((length - default) / source.fps),
+        makes,
         "; ".join(filter(None, (*notes, chosen.note))),
     )
 

@@ -52,3 +52,17 @@ def test_warped_windows_keep_their_lengths(clips: tuple[Clip, Clip]) -> None:
     fine = remade(made, *clips)
     assert fine.source_frames == (4 * 59 + 1, 4 * 72)
     assert fine.destination_frames[1] - fine.destination_frames[0] == 4 * 9 - 1
+
+
+def test_a_registration_curve_brings_the_same_poses_into_step_at_every_rate(clips: tuple[Clip, Clip]) -> None:
+    source, destination = (resample(clip, 30.0) for clip in clips)
+    made = warped_blend(source, destination, 60, 100, 29, 29, in_step=True)
+    plain = blend(source, destination, 60, 100, 29)
+    coarse, even = joint_positions(made.clip), joint_positions(plain.clip)
+    apart = []
+    for rate in (60.0, 120.0):
+        fine = remade(made, *(resample(clip, rate) for clip in clips), in_step=True)
+        positions = joint_positions(fine.clip)[:: round(rate / 30)]
+        count = min(len(positions), len(coarse))
+        apart.append(np.linalg.norm(positions[:count] - coarse[:count], axis=-1).max())
+    assert max(apart) < 0.3 * np.linalg.norm(coarse - even, axis=-1).max(), "the warp is the same"

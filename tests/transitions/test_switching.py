@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from numpy.polynomial import Polynomial
+from numpy.polynomial import Chebyshev, Polynomial
 from scipy.integrate import quad, solve_ivp
 from walks import make_walk
 
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions, moved
-from study.transitions.blending import Transition, cut, facing
+from study.transitions.blending import Transition, blend_weights, cut, facing
 from study.transitions.switching import (
     SPRING_LEFT,
     Decay,
@@ -31,6 +33,11 @@ def at(decay: Decay, x: float, v: float, times: np.ndarray) -> np.ndarray:
     return decay(np.array([[x]]), np.array([[v]]), times)[:, 0, 0]
 
 
+def interpolated(function: Callable[[np.ndarray], np.ndarray], until: float) -> Chebyshev:
+    """A smooth function by a polynomial that differs from it by 1e-13 or so, and has derivatives."""
+    return Chebyshev.interpolate(function, 24, (0.0, until * (1 - 1e-15)))
+
+
 @pytest.mark.parametrize(("x", "v"), OFFSETS)
 def test_the_quintic_has_the_offset_and_a_falling_rate_at_the_switch_and_rests_at_the_end(x: float, v: float) -> None:
     seconds = 0.5
@@ -39,8 +46,9 @@ def test_the_quintic_has_the_offset_and_a_falling_rate_at_the_switch_and_rests_a
     times = np.linspace(0, until * (1 - 1e-12), 6)
     found = Polynomial.fit(times / until, at(quintic(seconds), x, v, times), 5).convert()
     assert found(0) == pytest.approx(x, abs=1e-9)
-    assert found.deriv(1)(0) / until == pytest.approx(min(v, 0), abs=1e-7)
-    assert [found.deriv(order)(1) for order in (0, 1, 2)] == pytest.approx([0, 0, 0], abs=1e-6)
+    assert found.deriv(1)(0) / until == pytest.approx(min(v, 0), abs=1e-9)
+    assert [found.deriv(order)(1) / until**order for order in (0, 1)] == pytest.approx([0, 0], abs=1e-9)
+    assert found.deriv(2)(1) == pytest.approx(0, abs=1e-9)
     path = at(quintic(seconds), x, v, np.linspace(0, 1, 2001))
     assert np.all(path >= -1e-12), "it never goes beyond the destination"
     assert np.all(np.diff(path) <= 1e-12), "and never back"
@@ -56,13 +64,10 @@ def test_the_spring_solves_its_equation_until_its_last_hundredth(x: float, v: fl
     motion = solve_ivp(lambda _, s: [s[1], -(stiffness**2) * s[0] - 2 * stiffness * s[1]], (0, 1), [x, v],
                        t_eval=times, rtol=1e-11, atol=1e-12)  # fmt: skip
     assert at(spring(halflife, seconds), x, v, times) == pytest.approx(motion.y[0], abs=1e-8)
-    short, step = spring_s(halflife), 1e-6
-    ended = spring(halflife, short)
-    assert at(ended, x, v, np.array([0.0]))[0] == x
-    near = at(ended, x, v, np.array([step, 2 * step]))
-    assert (4 * near[0] - near[1] - 3 * x) / (2 * step) == pytest.approx(v, abs=1e-4)
-    last = at(ended, x, v, np.array([short - 2 * step, short - step, short, short + 1]))
-    assert last == pytest.approx([0, 0, 0, 0], abs=1e-9)
+    short = spring_s(halflife)
+    ended = interpolated(lambda times: at(spring(halflife, short), x, v, times), short)
+    assert [ended(0), ended.deriv()(0), ended(short), ended.deriv()(short)] == pytest.approx([x, v, 0, 0], abs=1e-9)
+    assert at(spring(halflife, short), x, v, np.array([short, short + 1])).tolist() == [0, 0]
     assert at(spring(halflife, 100.0), 1.0, 0.0, np.array([short]))[0] == pytest.approx(SPRING_LEFT, rel=1e-4)
 
 
@@ -84,6 +89,22 @@ def test_the_source_is_moved_on_by_a_speed_that_halves_and_keeps_to_its_bounds()
     slowing = [[quad(lambda s, h=h, v=v: v * 0.5 ** (s / h), 0, t)[0] for h, v in
                 zip(on.halflives(way, speed)[0], speed[0], strict=True)] for t in times]  # fmt: skip
     assert on.moved(way, speed, times)[:, 0] == pytest.approx(np.array(slowing), abs=1e-9)
+
+
+@pytest.mark.parametrize(("way", "speed"), [(1.0, 2.0), (-1.0, 2.0), (1.0, 0.1), (0.2, 0.0), (0.3, -4.0)])
+def test_a_dead_blend_has_the_source_and_its_rate_at_the_switch_and_the_destination_and_its_rate_at_the_end(
+    way: float, speed: float
+) -> None:
+    """By the product rule from its two factors: the source moved on, and a weight that is level at both ends."""
+    ahead = interpolated(
+        lambda times: Extrapolation().moved(np.array([[way]]), np.array([[speed]]), times)[:, 0, 0], 0.1
+    )
+    assert [ahead(0), ahead.deriv()(0)] == pytest.approx([0, speed], abs=1e-9)
+    times = np.arange(1, 20) / 20
+    share = Polynomial.fit(times, blend_weights(19, "sigmoid"), 3).convert()
+    assert [share(0), share.deriv()(0), share(1), share.deriv()(1)] == pytest.approx([0, 0, 1, 0], abs=1e-9)
+    assert share(times) == pytest.approx(blend_weights(19, "sigmoid"), abs=1e-12)
+    assert share.integ()(1) - share.integ()(0) == pytest.approx(0.5), "as a linear blend, on average over time"
 
 
 BLEND_S, SWITCH_S, ENTERED_S = 0.8, 2.0, 1.0

@@ -1,4 +1,4 @@
-"""`segue advise`: for each pair of clips, where to blend and for how long."""
+"""`segue advise`: for each pair of clips, where to blend, for how long, and how the frames are made."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from study.transitions.advice import Advice
 
 HEADINGS = (
-    *("from", "to", "method", "start", "s", "in file", "end", "s", "in file"),
+    *("from", "to", "method", "make", "start", "s", "in file", "end", "s", "in file"),
     *("frames", "s", "than default", "JND", "cost", "cost at default"),
 )
 POINT = (("_frame", "d"), ("_s", ".2f"), ("_file_frame", ".5g"))
@@ -32,10 +32,11 @@ POINT = (("_frame", "d"), ("_s", ".2f"), ("_file_frame", ".5g"))
 @click.option("--no-strips", is_flag=True, help="Write only the tables.")
 @json_option
 def advise(motions: tuple[str, ...], library: str | None, fps: float, out: Path | None, no_strips: bool) -> None:
-    """A transition point and a blend length for each ordered pair of CLIPS, and its difference from ten frames.
+    """Where, how long and how to blend, for each ordered pair of CLIPS, and the difference from ten frames.
 
     CLIPS are motion files, or names of motions in --library; the whole library if none is named. The method suits
-    the motion (Wang & Bodenheimer 2004): geodesic if one of the two is cyclic, else velocity.
+    the motion (Wang & Bodenheimer 2004): geodesic if one of the two is cyclic, else velocity. The make is the one with
+    the steadiest feet, the smoothest toes and poses nearest to the clips' own.
     """
     from study.errors import SegueError
     from study.files import check_place
@@ -104,15 +105,15 @@ def _one(source: Clip, destination: Clip, cyclic: tuple[bool, bool], out: Path |
 
 
 def _strip(source: Clip, destination: Clip, found: Advice, folder: Path) -> Path:
-    """A strip of the advised blend with a second and a half on either side, feet planted."""
+    """A strip of the advised transition with a second and a half on either side, feet planted."""
     from study.motion.clip import trim
     from study.motion.drawing import draw_clip
-    from study.transitions.blending import blend
-    from study.transitions.footskate import plant_feet
+    from study.transitions.methods.method import Place
+    from study.transitions.methods.registry import MAKES
 
-    made = plant_feet(
-        blend(source, destination, found.start_frame, found.end_frame, found.blend_frames), source, destination
-    )
+    names, points = (found.source, found.destination), (found.start_frame, found.end_frame)
+    place = Place("", names, source, destination, *points)
+    made = MAKES[found.make]().way(place, (found.blend_frames, found.blend_frames)).made(place)
     around = round(1.5 * source.fps)
     start = max(0, made.blend_start - around)
     clip = trim(made.clip, start, min(made.clip.frames, made.blend_stop + around))
@@ -130,7 +131,8 @@ def _write(out: Path, result: dict[str, Any]) -> None:
     from study.files import write_whole
     from study.spreadsheets import safe_table
 
-    write_whole(out / "advice.csv", safe_table(pd.DataFrame(result["advice"])).to_csv(index=False))
+    table = pd.DataFrame(result["advice"]).drop(columns="makes", errors="ignore")
+    write_whole(out / "advice.csv", safe_table(table).to_csv(index=False))
     write_whole(out / "advice.json", json.dumps(to_json(result), indent=2, allow_nan=False) + "\n")
 
 
@@ -141,6 +143,7 @@ def _table(rows: Sequence[dict[str, Any]], fps: float, library: str | None) -> I
             row["source"],
             row["destination"],
             row["method"],
+            row["make"],
             *(f"{row[end + kind]:{form}}" for end in ("start", "end") for kind, form in POINT),
             str(row["blend_frames"]),
             f"{row['blend_s']:.2f}",
@@ -152,7 +155,7 @@ def _table(rows: Sequence[dict[str, Any]], fps: float, library: str | None) -> I
         for row in sorted(rows, key=lambda row: -row["jnd"])
     ]
     yield f"Frames at {fps:g} fps; 'in file' is the frame of the motion's own file, at the file's rate."
-    yield from columns([HEADINGS, *cells], left=(0, 1, 2))
+    yield from columns([HEADINGS, *cells], left=(0, 1, 2, 3))
     yield "JND: just noticeable differences of the blend length from the default; from 1 on, people see it."
     if cells:
         yield f"A row as a transition: segue transition {_arguments(cells[0], fps, library)} --out X.mp4"
@@ -163,4 +166,4 @@ def _arguments(row: Sequence[str], fps: float, library: str | None) -> str:
     from shlex import join
 
     given = [row[0], row[1], *(("--library", library) if library else ()), "--fps", f"{fps:g}"]
-    return join([*given, "--start", row[3], "--end", row[6], "--method", row[2]])
+    return join([*given, "--start", row[4], "--end", row[7], "--method", row[2], "--make", row[3]])

@@ -17,7 +17,7 @@ from study.apps.cli.moments import in_words, moment
 from study.counting import counted
 from study.transitions.methods.makes.blends import Registered, Slerp, Warped
 from study.transitions.methods.makes.inertialize import Switching
-from study.transitions.methods.registry import MAKES, METHODS
+from study.transitions.methods.registry import DIRECT, METHODS
 
 if TYPE_CHECKING:
     from study.motion.clip import Clip
@@ -30,7 +30,7 @@ LENGTHS = {
 }
 """Methods whose blend lies between two given frames, and the length of each."""
 
-SWITCHES = {name: make for name, make in MAKES.items() if issubclass(make, Switching)}
+SWITCHES = {name: make for name, make in DIRECT.items() if issubclass(make, Switching)}
 """Makes that switch to the destination at the start frame."""
 
 
@@ -127,7 +127,7 @@ def _check_two_windows(method: str, specification: str) -> None:
 @clip_options
 @click.option("--method", type=click.Choice(list(LENGTHS)), help="Choose the blend length by this method.")
 @click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
-@click.option("--make", type=click.Choice([Slerp.name, Registered.name, *SWITCHES]), default=Slerp.name,
+@click.option("--make", type=click.Choice(list(DIRECT)), default=Slerp.name,
               show_default=True,
               help="How frames are made: a blend, a blend in step, or a switch as game engines make it.")  # fmt: skip
 @click.option("--halflife", type=click.FloatRange(0.01, 2.0),

@@ -63,6 +63,14 @@ class Motions:
         return found
 
 
+def _no_study(*_: Any) -> Any:
+    raise AssertionError("a make that asks for more than two motions was used outside a study")
+
+
+NO_STUDY = Motions((), _no_study, _no_study, _no_study, {})
+"""For transitions outside a study, by makes that need no other motion."""
+
+
 @dataclass(frozen=True, eq=False)
 class Place:
     """Where a transition is made: its name in the protocol, the two motions by name and as clips of one rig and rate.
@@ -76,7 +84,7 @@ class Place:
     destination: Clip
     start_frame: int
     end_frame: int
-    motions: Motions
+    motions: Motions = NO_STUDY
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,11 @@ MAKES: Mapping[str, type[Make]] = {
     for part in (Slerp, Registered, Warped, Cut, Inertialize, InertializeQuintic, DeadBlend, OneHop, Given)
 }
 
+DIRECT: Mapping[str, type[Make]] = {
+    name: make for name, make in MAKES.items() if make.windows == 1 and make is not OneHop
+}
+"""Makes that join two motions over one length and need no third."""
+
 # Utilities by 2004 Table 2; of cuts at two optima, the distance that gives 2003's F of 6.39 in ratings. Of methods of
 # games no comparison is known: they are taken for as natural as a blend of fixed length.
 METHODS: Mapping[str, Method] = {
