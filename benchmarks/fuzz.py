@@ -190,6 +190,12 @@ def acclaim(generator: Generator, folder: Path) -> Callable[[], int]:
     return lambda: _inspected(folder / "1_1.amc")
 
 
+def gltf(generator: Generator, folder: Path) -> Callable[[], int]:
+    """A glTF file."""
+    (folder / "walk.glb").write_bytes(inputs.gltf(generator))
+    return lambda: _inspected(folder / "walk.glb")
+
+
 def _inspected(file: Path) -> int:
     from study.errors import SegueError
     from study.motion.readers.bvh_writing import write_bvh
@@ -283,13 +289,14 @@ def message(generator: Generator, folder: Path) -> Callable[[], int]:
 
 
 KINDS: Mapping[str, tuple[Callable[[Generator, Path], Callable[[], int]], float]] = {
-    "bvh": (motion, 0.34),
+    "bvh": (motion, 0.24),
     "acclaim": (acclaim, 0.16),
     "library": (library, 0.07),
     "protocol": (protocol, 0.20),
     "table": (table, 0.08),
     "results": (results, 0.05),
     "message": (message, 0.10),
+    "gltf": (gltf, 0.10),
 }
 """Each kind of input, and its share of the cases."""
 

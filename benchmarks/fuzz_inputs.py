@@ -5,10 +5,12 @@ Some of them are built, not damaged: deep or wide skeletons, one name many times
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import re
 import sqlite3
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -229,6 +231,35 @@ def bvh(generator: Generator) -> bytes:
 def sound_bvh(generator: Generator) -> bytes:
     """A BVH file without mistakes."""
     return _bvh_text(_tree(), 20, generator, turn=0.2)
+
+
+@functools.cache
+def _sound_glb() -> bytes:
+    """The same as a glTF file."""
+    from study.motion.readers.gltf_writing import write_glb
+    from study.motion.readers.registry import read_clip
+
+    with tempfile.TemporaryDirectory() as folder:
+        bvh_file, glb_file = Path(folder, "walk.bvh"), Path(folder, "walk.glb")
+        bvh_file.write_bytes(sound_bvh(np.random.default_rng(1)))
+        write_glb({"walk": read_clip(bvh_file, metres_per_unit=0.01)}, glb_file)
+        return glb_file.read_bytes()
+
+
+def gltf(generator: Generator) -> bytes:
+    """A glTF file with mistakes: in its JSON, in its numbers, or anywhere."""
+    from study.motion.readers.gltf_file import pack
+
+    content = _sound_glb()
+    if generator.random() < 0.1:
+        return damaged(generator, content)
+    end = 20 + int.from_bytes(content[12:16], "little")
+    text, binary = content[20:end], content[end + 8 :]
+    if generator.random() < 0.8:
+        text = damaged(generator, text, int(pick(generator, (1, 1, 2, 4))))
+    else:
+        binary = damaged(generator, binary)
+    return pack(text, binary)
 
 
 _LIBRARY = """\

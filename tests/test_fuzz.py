@@ -35,7 +35,7 @@ def test_what_was_found_once_stays_mended(fuzz: ModuleType, kind: str, number: i
 
 
 def test_a_case_is_the_same_each_time(fuzz: ModuleType, tmp_path: Path) -> None:
-    for kind in ("bvh", "acclaim", "library", "protocol", "table"):
+    for kind in ("bvh", "acclaim", "library", "protocol", "table", "gltf"):
         contents = []
         for name in ("one", "two"):
             folder = tmp_path / f"{kind}-{name}"

@@ -11,17 +11,18 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from study.errors import MotionError, MotionFileError
 from study.motion.clip import Clip, trim
-from study.motion.cmu import Boundary, IndexedMotion, Take, cmu_index
+from study.motion.cmu import Boundary, IndexedMotion, Take, cmu_index, is_trial
 from study.motion.defects import Defect, find_defects, told
 from study.motion.feet import faced, grounded
 from study.motion.library_file import FACTS, ClipTable, LibraryFile, absolute, composed, find_library_file, placed
 from study.motion.mending import mend
 from study.motion.mirror import mirror
+from study.motion.readers.gltf_file import bare_name, is_animation
 from study.motion.readers.registry import read_clip
 
 
@@ -40,7 +41,7 @@ class Entry:
     end: Boundary = ""
     """How it begins and ends: `"gait"`, `"still"`, or `""` where it can't be continued (or nobody looked)."""
     file: Path | None = None
-    """The file it comes from; None for synthetic motions."""
+    """The file it comes from, or its animation in a glTF file, `hero.glb/walk`; None for synthetic motions."""
     first_frame: int = 0
     last_frame: int | None = None
     """Usable frames of the file, both included, counted from 0 at the file's rate; `last_frame` None for the last."""
@@ -75,7 +76,7 @@ def motion_file(spec: str) -> Path | None:
     """
     path = Path(spec)
     try:
-        if path.is_file():
+        if path.is_file() or is_animation(path):
             return path
         beside = path.parent.iterdir() if path.parent.is_dir() else ()
         return next((file for file in beside if composed(file.name) == composed(path.name) and file.is_file()), None)
@@ -103,7 +104,7 @@ def entry_of_file(spec: str | Path) -> Entry:
             raise MotionFileError("Expected a motion file, found a folder. Name one of its files.", wanted)
         raise MotionFileError(f"Expected a motion file, found nothing there. {hint}", wanted)
     file = absolute(found)
-    return own_entry(file, composed(file.stem), file.name, find_library_file(file.parent))
+    return own_entry(file, composed(bare_name(file)), file.name, find_library_file(file.parent))
 
 
 def own_entry(file: Path, name: str, words: str, described: LibraryFile | None) -> Entry:
@@ -112,7 +113,7 @@ def own_entry(file: Path, name: str, words: str, described: LibraryFile | None) 
     It is the table that `library.toml` has under the file's own name, over what the index knows of the CMU trial where
     that is one motion and not mirrored, over the defaults of `library.toml`.
     """
-    takes = _takes().get(composed(file.stem), ())
+    takes = _takes().get(trial_of(file), ())
     plain = Entry(name, words=words, file=file, own=True)
     if len(takes) == 1 and not takes[0][1].mirrored:
         motion, take = takes[0]
@@ -141,8 +142,7 @@ def own_tables(file: Path, described: LibraryFile | None) -> tuple[ClipTable, ..
     """Those of them that bear a name of the file's own: `walk`, `outdoors/walk` or `outdoors/walk.bvh`."""
     if described is None:
         return ()
-    place = placed(file, described.path.parent)
-    own_names = (composed(file.stem), place, place.removesuffix(file.suffix))
+    own_names = ways_to(file, described.path.parent)
     return tuple(table for table in described.about(file) if table.name in own_names)
 
 
@@ -168,6 +168,11 @@ def _takes() -> Mapping[str, tuple[tuple[IndexedMotion, Take], ...]]:
         for take in motion.takes:
             takes[take.trial] = (*takes.get(take.trial, ()), (motion, take))
     return takes
+
+
+def trial_of(file: Path) -> str:
+    """The CMU trial that a file is by its name, else `""`; glTF files have been through another program."""
+    return file.stem if file.suffix.lower() in (".amc", ".bvh") and is_trial(file.stem) else ""
 
 
 def is_indexed(trial: str) -> bool:
@@ -207,24 +212,25 @@ def _said(entry: Entry, described: LibraryFile | None, said: Sequence[Mapping[st
     return replace(entry, **fields)
 
 
+def ways_to(file: Path, folder: Path) -> tuple[str, ...]:
+    """What a file may be called: without its suffix (`walk`), its place without it (`outdoors/walk`), its place."""
+    bare, place = composed(bare_name(file)), placed(file, folder)
+    return bare, str(PurePosixPath(place).with_name(bare)), place
+
+
 def own_names(files: Sequence[Path], folder: Path, given: Mapping[Path, str], taken: Iterable[str]) -> dict[Path, str]:
     """A name for each file: the one given, or the shortest of these that no other file has.
 
-    The name without its suffix (`walk`), the place in the folder without suffix (`outdoors/walk`), the place
-    (`outdoors/walk.bvh`), the place with accents as the disk has them. `taken` are names with another meaning.
+    After those of `ways_to`, the place with accents as the disk has them. `taken` are names with another meaning.
     """
-    ways: tuple[Callable[[Path], str], ...] = (
-        lambda file: composed(file.stem),
-        lambda file: composed(file.relative_to(folder).with_suffix("").as_posix()),
-        lambda file: composed(file.relative_to(folder).as_posix()),
-        lambda file: file.relative_to(folder).as_posix(),
-    )
+    ways = [{file: ways_to(file, folder)[k] for file in files} for k in range(3)]
+    ways.append({file: file.relative_to(folder).as_posix() for file in files})
     names = dict(given)
     used = {*taken, *names.values()}
     for way in ways:
         left = [file for file in files if file not in names]
-        times = Counter(way(file) for file in left)
-        named = {file: way(file) for file in left if times[way(file)] == 1 and way(file) not in used}
+        times = Counter(way[file] for file in left)
+        named = {file: way[file] for file in left if times[way[file]] == 1 and way[file] not in used}
         names |= named
         used |= set(named.values())
     return names

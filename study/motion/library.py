@@ -1,8 +1,8 @@
 """The library: motions by name, synthetic or from a folder of motion capture.
 
-In: `"synthetic"`, or a folder of `.bvh` and `.amc` files, nested or not, which may have a `library.toml`. Out: `Clip`s
-that are fit for use: defects dropped or mended, floor at zero, starting over the origin towards +Z, at the frame rate
-asked for. Every file has a name of its own; CMU trials have the names of the index as well. Protocols name motions,
+In: `"synthetic"`, or a folder of motion files, nested or not, which may have a `library.toml`. Out: `Clip`s that
+are fit for use: defects dropped or mended, floor at zero, starting over the origin towards +Z, at the frame rate asked
+for. Every file has a name of its own; CMU trials have the names of the index as well. Protocols name motions,
 not files, so that each runs on any library.
 """
 
@@ -20,7 +20,7 @@ from pathlib import Path
 from study.errors import MotionError, MotionFileError
 from study.motion import synthetic
 from study.motion.clip import Clip, resample
-from study.motion.cmu import CMU_ACKNOWLEDGEMENT, CMU_SITE, Boundary, IndexedMotion, cmu_index, is_trial
+from study.motion.cmu import CMU_ACKNOWLEDGEMENT, CMU_SITE, Boundary, IndexedMotion, cmu_index
 from study.motion.cycles import extend
 from study.motion.download import download_trial
 from study.motion.entries import (
@@ -34,8 +34,11 @@ from study.motion.entries import (
     own_names,
     own_tables,
     prepared,
+    trial_of,
+    ways_to,
 )
 from study.motion.library_file import LibraryFile, absolute, composed, find_library_file, placed
+from study.motion.readers.gltf_file import file_of, motions_in
 from study.motion.readers.other_formats import KNOWN, by_suffix
 from study.motion.readers.registry import SUFFIXES
 
@@ -205,11 +208,11 @@ class FolderLibrary(Library):
         self.name = str(folder)
         self.folder = absolute(folder)
         self.skipped: list[str] = []
-        self._files = sorted(_motion_files(self.folder, self.skipped))
+        self._files = [one for file in sorted(_motion_files(self.folder, self.skipped)) for one in motions_in(file)]
         if not self._files:
             raise MotionError(
-                f"Expected .bvh or .amc files in {folder} or its subfolders, {_only_others(folder)} Put motion files "
-                f"there, or fill it with `segue motions download`.{_also(self.skipped)}"
+                f"Expected {', '.join(SUFFIXES)} files in {folder} or its subfolders, {_only_others(folder)} Put "
+                f"motion files there, or fill it with `segue motions download`.{_also(self.skipped)}"
             )
         self._described = {at: find_library_file(at) for at in {file.parent for file in self._files}}
         self._check_tables()
@@ -220,8 +223,7 @@ class FolderLibrary(Library):
         self._by_place: defaultdict[str, list[str]] = defaultdict(list)
         for name, entry in self._entries.items():
             if entry.own and entry.file is not None:
-                place = placed(entry.file, self.folder)
-                for way in {composed(entry.file.stem), place, place.removesuffix(entry.file.suffix)}:
+                for way in set(ways_to(entry.file, self.folder)):
                     self._by_place[way].append(name)
 
     def _description(self, file: Path) -> LibraryFile | None:
@@ -285,7 +287,8 @@ class FolderLibrary(Library):
 
     def files(self) -> tuple[Path, ...]:
         described = {one.path for one in self._described.values() if one is not None}
-        return (*self._files, *sorted(described))
+        files = dict.fromkeys(map(file_of, self._files))
+        return (*files, *sorted(described))
 
     def trials(self) -> tuple[str, ...]:
         """The CMU trials that are there; each can be asked for by its number as well."""
@@ -359,8 +362,8 @@ def _trials(files: Iterable[Path]) -> dict[str, Path]:
     """CMU trials by number: the original where a conversion is there, too."""
     trials: dict[str, Path] = {}
     for file in files:
-        if is_trial(file.stem) and (file.stem not in trials or file.suffix.lower() == ".amc"):
-            trials[file.stem] = file
+        if (trial := trial_of(file)) and (trial not in trials or file.suffix.lower() == ".amc"):
+            trials[trial] = file
     return dict(sorted(trials.items()))
 
 

@@ -54,7 +54,7 @@ def test_rates_and_units_that_are_none_are_refused(path: Path, given: dict[str, 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("a.fbx", r"Expected a motion file \(\.bvh, \.amc\), found an FBX file.*Blender"),
+        ("a.fbx", r"Expected a motion file \(\.bvh, \.amc, \.glb, \.gltf\), found an FBX file.*Blender"),
         ("a", "no suffix"),
         ("a.asf", r"name the \.amc"),
     ],

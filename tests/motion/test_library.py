@@ -203,7 +203,9 @@ def test_missing_empty_and_mistaken_folders(tmp_path: Path, plain_folder: Path) 
     with pytest.raises(MotionError, match=r"found nothing at .*nowhere"):
         open_library(tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(MotionError, match=r"Expected .bvh or .amc files in .*empty or its subfolders, found none"):
+    with pytest.raises(
+        MotionError, match=r"Expected .bvh, .amc, .glb, .gltf files in .*empty or its subfolders, found none"
+    ):
         open_library(tmp_path / "empty")
     with pytest.raises(MotionError, match=r"found the file .*stroll.bvh. Name its folder"):
         open_library(plain_folder / "stroll.bvh")

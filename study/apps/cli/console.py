@@ -45,7 +45,7 @@ json_option = kept_flag("--json", "Print one JSON object on standard output.")
 library_option = click.option(
     "--library",
     metavar="NAME|FOLDER",
-    help="Where motions come from: 'synthetic' (default), or a folder of .bvh or .asf/.amc files such as CMU's.",
+    help="Where motions come from: 'synthetic' (default), or a folder of .bvh, .asf/.amc (CMU's), .glb or .gltf files.",
 )
 database_option = click.option(
     "--database",

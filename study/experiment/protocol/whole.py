@@ -60,7 +60,9 @@ class Protocol(Content):
 
     def files_read(self) -> tuple[Path, ...]:
         """The files that the protocol's own methods read, from the folder of the protocol's own file."""
-        return tuple(self.path_of(file) for own in self.methods for file in own.method({}).make.files_read())
+        from study.motion.readers.gltf_file import file_of
+
+        return tuple(file_of(self.path_of(file)) for own in self.methods for file in own.method({}).make.files_read())
 
     def path_of(self, file: str) -> Path:
         """A file that the protocol names, from the folder of the protocol's own file."""

@@ -56,6 +56,7 @@ def read_motion_header(source: Source, offset: int) -> tuple[FrameTime, int | No
 _COMMON_FPS = tuple(Fraction(f) for f in (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 200, 240))
 _NTSC_FPS = tuple(Fraction(f * 1000, 1001) for f in (24, 30, 48, 60, 120, 240))
 _COMMON_WITHIN = Fraction(2, 100)
+_SINGLE = 1e-5
 # A second or more between frames is no motion capture, but frames per second or milliseconds. Milliseconds are often
 # printed without decimals, which puts them off by as much as this; some numbers can be either.
 _SLOWEST_S, _ROUNDED_MS = 1.0, Fraction(5, 100)
@@ -86,6 +87,12 @@ def stated_rate(source: Source, frame_time: FrameTime) -> float:
         f"{words}, so at {rates[0]:g} fps"
     )
     return rates[0]
+
+
+def tidy_rate(fps: float) -> float:
+    """A rate found from times in single precision: the common, NTSC or whole one that it is up to that; else itself."""
+    rates = (*_COMMON_FPS, *_NTSC_FPS, Fraction(round(fps)))
+    return next((float(rate) for rate in rates if abs(fps / float(rate or 1) - 1.0) < _SINGLE), fps)
 
 
 def frame_rate(printed: str) -> float:

@@ -22,8 +22,6 @@ _NO_MOTION = "Give the motion capture itself: a .bvh file, or an .amc file with 
 # What a suffix stands for, and what to do.
 _SUFFIXES = {
     ".fbx": ("an FBX file", _BLENDER),
-    ".glb": ("a glTF file", _BLENDER),
-    ".gltf": ("a glTF file", _BLENDER),
     ".vrm": ("a VRM file", _BLENDER),
     ".vrma": ("a VRM animation", _BLENDER),
     ".dae": ("a Collada file", _BLENDER),
@@ -61,7 +59,7 @@ KNOWN = tuple(_SUFFIXES)
 _BEGINNINGS = (
     (b"Kaydara FBX Binary", _SUFFIXES[".fbx"]),
     (b"; FBX", _SUFFIXES[".fbx"]),
-    (b"glTF", _SUFFIXES[".glb"]),
+    (b"glTF", ("a glTF file", "Let its name end in .glb")),
     (b"BLENDER", _SUFFIXES[".blend"]),
     (b"#usda", _SUFFIXES[".usda"]),
     (b"PXR-USDC", _SUFFIXES[".usdc"]),

@@ -10,6 +10,8 @@ from study.errors import MotionError, MotionFileError
 from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip
 from study.motion.readers.amc import read_amc
 from study.motion.readers.bvh import read_bvh
+from study.motion.readers.gltf import read_gltf
+from study.motion.readers.gltf_file import file_of
 from study.motion.readers.other_formats import by_suffix
 from study.motion.upright import put_upright
 
@@ -28,7 +30,7 @@ class Reader(Protocol):
         """Read the file, whichever axis of it is up."""
 
 
-READERS: dict[str, Reader] = {".bvh": read_bvh, ".amc": read_amc}
+READERS: dict[str, Reader] = {".bvh": read_bvh, ".amc": read_amc, ".glb": read_gltf, ".gltf": read_gltf}
 SUFFIXES = tuple(READERS)
 
 
@@ -44,11 +46,13 @@ def read_clip(
     Parameters
     ----------
     path
-        A `.bvh` file, or an `.amc` file with its `.asf` beside it.
+        A `.bvh` file, an `.amc` file with its `.asf` beside it, a `.glb` or `.gltf` file with one animation, or an
+        animation in one with several, `hero.glb/walk`.
     metres_per_unit
         Metres in a unit of the file; by default found from the body, and said in the clip's history.
     fps
-        Frames per second in place of what the file says (AMC files don't say; 120 is assumed).
+        Frames per second in place of what the file says (AMC files don't say; 120 is assumed); of a glTF file, whose
+        keys have times, those at which it is sampled.
     mapping
         Joint names by role (`{"hip.L": "bone_12"}`), where the roles found are wrong or missing.
 
@@ -64,7 +68,7 @@ def read_clip(
     ):
         if value is not None and not low <= value <= high:
             raise MotionError(f"Expected {label} above 0, from {low:.0e} to {high:.0e}, for {path}, got {value}.")
-    suffix = path.suffix.lower()
+    suffix = file_of(path).suffix.lower()
     if suffix in READERS:
         return put_upright(READERS[suffix](path, metres_per_unit=metres_per_unit, fps=fps, mapping=mapping))
     hint = "; name the .amc file, and its .asf is found beside it" if suffix == ".asf" else ""

@@ -48,6 +48,23 @@ class Source:
         return self.raw[start:stop].decode("utf-8", "replace").lstrip("\ufeff")
 
 
+def read_raw(path: Path | str, kind: str) -> bytes:
+    """The bytes of the file at `path`, which should be of a `kind`, such as `"a BVH file"`.
+
+    Raises
+    ------
+    MotionFileError
+        Where the file can't be read.
+    """
+    try:
+        return Path(path).read_bytes()
+    except OSError as problem:
+        reason = problem.strerror or type(problem).__name__
+        raise MotionFileError(
+            f"Expected {kind}, but it can't be read ({reason}). Check the path and its permissions.", path
+        ) from problem
+
+
 def read_source(path: Path | str, kind: str) -> Source:
     """The file at `path`; refused where it can't be read, is empty, or is not text.
 
@@ -58,14 +75,7 @@ def read_source(path: Path | str, kind: str) -> Source:
     kind
         What it should be, for messages: `"a BVH file"`.
     """
-    path = Path(path)
-    try:
-        raw = path.read_bytes()
-    except OSError as problem:
-        reason = problem.strerror or type(problem).__name__
-        raise MotionFileError(
-            f"Expected {kind}, but it can't be read ({reason}). Check the path and its permissions.", path
-        ) from problem
+    path, raw = Path(path), read_raw(path, kind)
     for mark, encoding in ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
         if raw.startswith(mark):
             raw = raw.decode(encoding, "replace").encode()
