@@ -44,6 +44,7 @@ VERBS = {
     "analyse": "study:analyse",
     "report": "study:report",
     "export": "export:export",
+    "export-engine": "export_engine:export_engine",
     "fit": "fit:fit",
     "power": "power:power",
     "doctor": "doctor:doctor",

@@ -23,7 +23,7 @@ def one_hop() -> None:
     """The best transitions through an intermediate clip, for every triggered frame (Koyama & Goto 2019)."""
 
 
-def load_clips(specs: tuple[str, ...], library: str | None, fps: float) -> tuple[Clip, ...]:
+def load_clips(specs: tuple[str, ...], library: str | None, fps: float | None) -> tuple[Clip, ...]:
     """Clips as `load_clip` takes them, on the body of the first, named by file or motion."""
     from dataclasses import replace
 

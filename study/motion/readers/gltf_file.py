@@ -28,7 +28,7 @@ from study.motion.readers.source import LARGEST, Source, read_raw
 KIND = "a glTF 2.0 file"
 GLTF_SUFFIXES = (".glb", ".gltf")
 _HEADER, _CHUNK, _MAGIC, _JSON, _BINARY = struct.Struct("<4sII"), struct.Struct("<I4s"), b"glTF", b"JSON", b"BIN\0"
-_LONGEST_NAME = 200
+_LONGEST_NAME = 1000
 _WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 # Component types with the divisor of those that stand for numbers up to 1.
 _COMPONENTS = {5126: ("<f4", 0), 5120: ("i1", 127), 5121: ("u1", 255), 5122: ("<i2", 32767), 5123: ("<u2", 65535)}

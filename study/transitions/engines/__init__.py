@@ -1,0 +1,1 @@
+"""Motions and their transitions for game engines."""

@@ -1,0 +1,301 @@
+"""What engines get: times against the blends that they stand for, Godot's poses and C# look-ups against ours."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from parts import unavailable
+
+from study.apps.cli import run
+from study.errors import TransitionError
+from study.motion.clip import Clip, joint_positions, retarget
+from study.motion.library import Library, open_library
+from study.motion.readers.registry import read_clip
+from study.transitions.blending import blend, blend_weights
+from study.transitions.engines.export import Advised, export, read_advice
+from study.transitions.one_hop.problem import Alignment
+from study.transitions.one_hop.table import OneHopTable, Row
+from tests.walks import make_walk
+
+ROOT = Path(__file__).parents[2]
+IMPORTERS = ROOT / "study" / "transitions" / "engines" / "importers"
+VALIDATOR = ROOT / "build" / "node_modules" / "gltf-validator"
+
+
+def pair(library: Library, source: str, destination: str) -> dict[str, Clip]:
+    first, second = library.clip(source, fps=30.0), library.clip(destination, fps=30.0)
+    return {source: first, destination: retarget(second, first.skeleton)}
+
+
+def walks() -> dict[str, Clip]:
+    first = make_walk(90, name="slow walk")
+    return {"slow walk": first, "out/run": retarget(make_walk(80, cadence=1.4, name="out/run"), first.skeleton)}
+
+
+# -- The folder -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("start", "end", "blend_frames"), [(30, 40, 10), (12, 20, 5), (1, 30, 31), (0, 30, 8)])
+def test_the_fade_has_the_shares_of_the_blend_at_every_frame(
+    tmp_path: Path, start: int, end: int, blend_frames: int
+) -> None:
+    clips = walks()
+    advice = [Advised("slow walk", "out/run", "velocity", "slerp", start, end, blend_frames)]
+    machine = export(tmp_path / "out", clips, list(clips.values()), advice, None)
+    assert json.loads((tmp_path / "out" / "state_machine.json").read_text()) == machine
+    (one,) = machine["transitions"]
+    made = blend(clips["slow walk"], clips["out/run"], start, end, blend_frames)
+    # What an engine does: the share grows evenly over the duration, and the destination plays from its offset on.
+    times = np.arange(start, start + blend_frames) / 30.0
+    shares = (times - one["start_s"]) / one["duration_s"]
+    if start > 0 and end - blend_frames >= 0:
+        assert np.allclose(shares, blend_weights(blend_frames), atol=1e-12)
+    assert np.allclose((times - one["start_s"] + one["offset_s"]) * 30.0, np.arange(end - blend_frames + 1, end + 1))
+    assert one["start_normalised"] == pytest.approx(one["start_s"] / (89 / 30))
+    assert one["offset_normalised"] == pytest.approx(one["offset_s"] / (79 / 30))
+    root = np.array(one["root"])
+    first = round(one["start_s"] * 30)
+    assert len(root) == round(one["duration_s"] * 30) + 1
+    assert np.abs(root[:, :3] - made.clip.root_positions[first : first + len(root)]).max() < 1e-6
+
+
+def test_clips_and_animations_keep_their_names_apart(tmp_path: Path) -> None:
+    clips = walks()
+    again = replace(clips["out/run"], name="out_run")
+    machine = export(tmp_path / "out", {**clips, "out_run": again}, [*clips.values(), again], [], None)
+    assert [state["animation"] for state in machine["states"]] == ["slow walk", "out_run", "out_run_2"]
+    for state, clip in zip(machine["states"], [*clips.values(), again], strict=True):
+        read = read_clip(tmp_path / "out" / "clips.glb" / state["animation"])
+        assert (read.frames - 1) / read.fps == pytest.approx(state["length_s"])
+        order = [read.skeleton.names.index(name) for name in clip.skeleton.names]
+        assert np.abs(joint_positions(read)[:, order] - joint_positions(clip)).max() < 1e-5
+    assert {file.name for file in IMPORTERS.iterdir()} < {file.name for file in (tmp_path / "out").iterdir()}
+
+
+def test_the_verb_takes_what_advise_and_one_hop_write(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run(["advise", "walk", "run", "--no-strips", "--out", str(tmp_path / "advice")]) == 0
+    found, out = tmp_path / "advice" / "advice.json", tmp_path / "game"
+    capsys.readouterr()
+    assert run(["export-engine", str(found), "--out", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["transitions"], [state["name"] for state in told["states"]]) == (2, ["walk", "run"])
+    arguments = ["dance", "box", "--pair", "dance", "box", "--fps", "15", "--weight", "0.0005"]
+    assert run(["one-hop", "build", *arguments, "--out", str(tmp_path / "t.npz")]) == 0
+    assert run(["export-engine", str(tmp_path / "t.npz"), "--out", str(out), "--native"]) == 0
+    machine = json.loads((out / "state_machine.json").read_text())
+    assert [state["fps"] for state in machine["states"]] == [30.0, 30.0], "native, not the table's 15"
+    assert machine["one_hop"] == {"table": "one_hop.bin", "header": "one_hop.json"}
+    capsys.readouterr()
+    assert run(["one-hop", "show", str(out / "one_hop.bin")]) == 0
+    assert run(["export-engine", str(found), "walk", "--out", str(out)]) == 2
+    assert "expected 2 clips (walk, run), found 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "said", [[], {"advice": []}, {"advice": [{"source": 1}], "fps": 30}, {"advice": 3, "fps": "x"}]
+)
+def test_other_json_is_refused(said: Any) -> None:
+    with pytest.raises(TransitionError, match=r"x.json: expected .* (found|none)"):
+        read_advice(Path("x.json"), said)
+
+
+# -- Programs that read it --------------------------------------------------------------------------------------------
+
+
+def ran(*command: object, cwd: Path) -> str:
+    done = subprocess.run(
+        [*map(str, command)], cwd=cwd, capture_output=True, text=True, check=False, timeout=120,
+        env={**os.environ, "HOME": str(cwd)},
+    )  # fmt: skip
+    return done.stdout + done.stderr
+
+
+DRIVE = """extends SceneTree
+
+func _init():
+	var model = load("res://clips.glb").instance()
+	get_root().add_child(model)
+	var player = load("res://segue_player.gd").new()
+	player.setup(model, "res://state_machine.json", "SOURCE")
+	var skeleton = player._skeleton
+	var out = {"travelled": player.travel("DESTINATION"), "names": [], "frames": [], "states": []}
+	for bone in range(skeleton.get_bone_count()):
+		out["names"].append(skeleton.get_bone_name(bone))
+	for frame in range(FRAMES):
+		if frame > 0:
+			player.advance(1.0 / 30.0)
+		out["states"].append(player.state)
+		var row = []
+		for bone in range(skeleton.get_bone_count()):
+			var place = (model.transform * skeleton.transform * skeleton.get_bone_global_pose(bone)).origin
+			row.append([place.x, place.y, place.z])
+		out["frames"].append(row)
+	out["again"] = player.travel("DESTINATION")
+	player.free()
+	var file = File.new()
+	file.open("res://out.json", 2)
+	file.store_string(JSON.print(out))
+	file.close()
+	quit()
+"""
+# Keys as they are, not sampled anew at 15 a second and thinned out, as Godot does unless told otherwise.
+IMPORT = (
+    """[remap]\nimporter="scene"\ntype="PackedScene"\n[params]\nanimation/fps=30\nanimation/optimizer/enabled=false\n"""
+)
+
+
+def in_godot(folder: Path, clips: dict[str, Clip], row: Advised) -> None:
+    """Godot plays a transition: its joints are where ours are in every frame, to a millimetre."""
+    if shutil.which("godot3-server") is None:
+        unavailable("Godot", "apt-get install godot3-server", "godot3-server")
+    made = blend(clips[row.source], clips[row.destination], row.start_frame, row.end_frame, row.blend_frames)
+    frames = min(made.clip.frames, made.blend_stop + 60)
+    export(folder, clips, list(clips.values()), [row], None)
+    (folder / "project.godot").write_text("config_version=4\n")
+    (folder / "clips.glb.import").write_text(IMPORT)
+    drive = DRIVE.replace("SOURCE", row.source).replace("DESTINATION", row.destination).replace("FRAMES", str(frames))
+    (folder / "drive.gd").write_text(drive)
+    said = ran("godot3-server", "--path", ".", "-e", "--quit", cwd=folder)
+    said += ran("godot3-server", "--path", ".", "-s", "drive.gd", cwd=folder)
+    assert "SCRIPT ERROR" not in said, said
+    found = json.loads((folder / "out.json").read_text())
+    assert (found["travelled"], found["again"]) == (True, False)
+    assert found["states"] == [row.source] * made.blend_stop + [row.destination] * (frames - made.blend_stop)
+    # Godot 3 writes names of bones in its own way.
+    plain = [re.sub(r"[^a-z0-9]", "", name.lower()) for name in found["names"]]
+    order = [plain.index(re.sub(r"[^a-z0-9]", "", name.lower())) for name in made.clip.skeleton.names]
+    apart = np.linalg.norm(np.array(found["frames"])[:, order] - joint_positions(made.clip)[:frames], axis=-1)
+    assert apart.max() < 1e-3, f"{1000 * apart.max():.3f} mm in frame {apart.max(axis=1).argmax()}"
+
+
+def test_godot_plays_a_synthetic_transition_as_we_do(tmp_path: Path) -> None:
+    clips = pair(open_library("synthetic"), "walk", "run")
+    in_godot(tmp_path / "game", clips, Advised("walk", "run", "geodesic", "slerp", 52, 63, 8))
+
+
+@pytest.mark.mocap
+def test_godot_plays_a_captured_transition_as_we_do(mocap: Path, tmp_path: Path) -> None:
+    clips = pair(open_library(mocap / "cmu"), "walk_turn_left", "run")
+    in_godot(tmp_path / "game", clips, Advised("walk_turn_left", "run", "velocity", "slerp", 40, 30, 21))
+
+
+@pytest.mark.parametrize("motions", [("walk", "run"), ("dance", "box")])
+def test_the_khronos_validator_finds_nothing(tmp_path: Path, motions: tuple[str, str]) -> None:
+    if not VALIDATOR.is_dir():
+        how = "npm install --prefix build gltf-validator"
+        unavailable("the glTF validator", how) if shutil.which("npm") else pytest.skip(how)
+    clips = pair(open_library("synthetic"), *motions)
+    export(tmp_path / "out", clips, list(clips.values()), [], None)
+    script = (
+        f"require('{VALIDATOR}').validateBytes(new Uint8Array(require('fs').readFileSync('out/clips.glb')))"
+        ".then(found => console.log(JSON.stringify(found)))"
+    )
+    found = json.loads(ran("node", "-e", script, cwd=tmp_path))
+    assert found["issues"]["messages"] == []
+    assert found["info"]["animationCount"] == 2
+
+
+MAIN = """using System;
+using System.IO;
+public static class Program {
+    public static void Main() {
+        var header = new SegueOneHop.Header {
+            entries = ENTRIES, blend_frames = 30, columns = new string[WIDTH],
+            transitions = new[] { ROWS }
+        };
+        var table = new SegueOneHop(header, File.ReadAllBytes("one_hop.bin"));
+        foreach (string line in File.ReadAllLines("asked.txt")) {
+            string[] asked = line.Split(' ');
+            SegueOneHop.Entry e;
+            bool found = table.TryLookUp(int.Parse(asked[0]), int.Parse(asked[1]), int.Parse(asked[2]), out e);
+            Console.WriteLine(found ? String.Join(" ", e.Hop, e.Offset, e.StaySource, e.StayHop, e.BlendFirst,
+                e.BlendSecond) : "none");
+        }
+    }
+}
+"""
+
+
+@pytest.mark.parametrize("width", [4, 6])
+def test_the_look_up_in_c_sharp_finds_what_ours_finds(tmp_path: Path, width: int) -> None:
+    if shutil.which("mcs") is None or shutil.which("mono") is None:
+        unavailable("Mono", "apt-get install mono-mcs", "mono-mcs")
+    rng = np.random.default_rng(8)
+    entries = rng.integers(-(2**31), 2**31 - 1, (20, width)).astype(np.int32)
+    entries[:, 0] = rng.integers(-1, 3, 20)
+    rows = (Row(0, 1, Alignment(offset=0), 2, 12, 0), Row(2, 0, Alignment(offset=0), 0, 8, 12))
+    nowhere = np.full(20, np.inf)
+    table = OneHopTable(("a", "b", "c"), (20,) * 3, 60.0, 30, rows, entries, nowhere, nowhere, 1e-4, "cost")
+    clips = {name: make_walk(20, name=name) for name in "abc"}
+    clips = {name: retarget(clip, clips["a"].skeleton) for name, clip in clips.items()}
+    export(tmp_path / "out", clips, list(clips.values()), [], table)
+    asked = [(row.source, row.destination, frame) for row in rows for frame in range(15)] + [(1, 0, 3)]
+    (tmp_path / "out" / "asked.txt").write_text("\n".join(" ".join(map(str, one)) for one in asked))
+    said = ", ".join(
+        f"new SegueOneHop.Row {{ source = {r.source}, destination = {r.destination}, "
+        f"first_trigger = {r.first_trigger}, triggers = {r.triggers}, first_entry = {r.first_entry} }}"
+        for r in rows
+    )
+    main = MAIN.replace("ENTRIES", "20").replace("WIDTH", str(width)).replace("ROWS", said)
+    (tmp_path / "out" / "Program.cs").write_text(main)
+    said = ran("mcs", "-warnaserror", "-out:look.exe", "Program.cs", "SegueOneHop.cs", cwd=tmp_path / "out")
+    assert said == ""
+    answers = ran("mono", "look.exe", cwd=tmp_path / "out").splitlines()
+    for (source, destination, frame), answer in zip(asked, answers, strict=True):
+        try:
+            entry = table.look_up(source, destination, frame)
+        except TransitionError:
+            entry = None
+        if entry is None:
+            assert answer == "none"
+        else:
+            blends = [30 if own is None else own for own in (entry.blend_first, entry.blend_second)]
+            numbers = [entry.hop, entry.offset, entry.stay_source, entry.stay_hop, *blends]
+            assert answer == " ".join(map(str, numbers))
+
+
+def test_importers_can_be_parsed() -> None:
+    import tree_sitter
+    import tree_sitter_c_sharp
+    import tree_sitter_gdscript  # of Godot 4
+
+    for language, suffix, count in ((tree_sitter_c_sharp, "cs", 2), (tree_sitter_gdscript, "gd", 1)):
+        parser = tree_sitter.Parser(tree_sitter.Language(language.language()))
+        files = list(IMPORTERS.glob(f"*.{suffix}"))
+        assert len(files) == count
+        for file in files:
+            assert not parser.parse(file.read_bytes()).root_node.has_error, file
+        assert parser.parse(b"class {{ func (").root_node.has_error
+    ast.parse((IMPORTERS / "segue-unreal.py").read_text())
+
+
+def test_importers_ask_for_keys_that_are_there(tmp_path: Path) -> None:
+    clips = walks()
+    machine = export(tmp_path / "out", clips, list(clips.values()),
+                     [Advised("slow walk", "out/run", "velocity", "slerp", 30, 40, 10)], None)  # fmt: skip
+    keys = {*machine, *machine["states"][0], *machine["transitions"][0]}
+    read = (IMPORTERS / "SegueImporter.cs").read_text()
+    fields = re.findall(r"^\s+public (?:string|float|State\[\]|Transition\[\]) ([\w, ]+);", read, re.MULTILINE)
+    for file, used in (
+        ("SegueImporter.cs", {name for line in fields for name in line.split(", ")}),
+        (
+            "segue_player.gd",
+            set(re.findall(r"(?:_next|one|machine)\[\"(\w+)\"\]", (IMPORTERS / "segue_player.gd").read_text())),
+        ),
+        (
+            "segue-unreal.py",
+            set(re.findall(r"(?:row|machine)\[[\"'](\w+)[\"']\]", (IMPORTERS / "segue-unreal.py").read_text())),
+        ),
+    ):
+        assert len(used) >= 5, file
+        assert used <= keys, file
