@@ -142,8 +142,8 @@ def _matched(protocol: Protocol, film: Film, reference: Film) -> Film:
     cut = (film.way.frames == 0) - (reference.way.frames == 0)
     return replace(
         film,
-        start_frame=film.start_frame - before,
-        end_frame=film.end_frame + after + cut,
+        start_frame=reference.start_frame - before,
+        end_frame=reference.end_frame + after + cut,
         frames_before=-before,
         frames_on=film.frames_on - after,
     )
@@ -167,4 +167,5 @@ def _film(study: StudySpec, settled: Settled, method: str, difference: int, ways
     if lacking := way.lacking(ways.protocol.entry_frames, ways.protocol.exit_frames + on):
         raise StimulusError(f"transition {settled.transition.name!r}, {method}: {lacking}.")
     added = (settled.source.added_before, settled.destination.added_before)
-    return Film(settled.transition.name, own.start_frame, own.end_frame, added, way, on)
+    points = methods[method].make.placed(own.start_frame, own.end_frame, way.frames)
+    return Film(settled.transition.name, *points, added, way, on)

@@ -75,7 +75,7 @@ class _Asked:
 
     def lengths(self, methods: Iterable[Method], start: int, end: int) -> dict[str, BlendLength | WarpLength]:
         """The blend length of each of some methods at two points."""
-        return {each.name: each.length.at(self.source.clip, self.destination.clip, start, end) for each in methods}
+        return {each.name: each.length_at(self.source.clip, self.destination.clip, start, end) for each in methods}
 
 
 Alike = Callable[[StudySpec, "Settled"], bool]
@@ -126,12 +126,19 @@ def _room(methods: Iterable[Method], fps: float, longest_frames: int | None) -> 
     return Room(*(max(getattr(room, key) for room in rooms) for key in ("blend", "search", "entry", "stay", "after")))
 
 
+def _half(methods: Iterable[Method], longest: int) -> int:
+    """Frames of the longest blend on either side of points that meet in its middle; 0 if no method has them so."""
+    return (longest + 1) // 2 if any(method.make.centred for method in methods) else 0
+
+
 def _needs(protocol: Protocol, study: StudySpec, points: Points, methods: Iterable[Method]) -> tuple[Needs, Needs]:
     """What the source needs around its point, and the destination around its."""
     methods = tuple(methods)
     room = _room(methods, protocol.fps, points.longest_frames)
     entry, after = max(protocol.entry_frames, room.entry), protocol.exit_frames + room.after
     longest = room.blend + max((0, *study.differences_frames)) + room.stay
+    half = _half(methods, longest)
+    entry, after = entry + half, after + half
     plenty = max(longest, room.search)
     blend = f"blends of up to {counted(longest, 'frame')}"
     whole = any(isinstance(method.points, OwnPoints) for method in methods)
@@ -232,7 +239,8 @@ def _room_problem(asked: _Asked, settled: Settled) -> str:
     own = [length.blend_frames for length in settled.lengths.values()]
     reference = settled.lengths[asked.study.reference].blend_frames
     longest = max(*own, *(reference + d for d in asked.study.differences_frames), 0) + room.stay
-    entry, after = asked.protocol.entry_frames, asked.protocol.exit_frames + room.after
+    half = _half(asked.methods.values(), longest)
+    entry, after = asked.protocol.entry_frames + half, asked.protocol.exit_frames + room.after + half
     rooms = (
         ("entry", entry, settled.start_frame, settled.source),
         ("the longest blend", longest, settled.source.clip.frames - settled.start_frame, settled.source),

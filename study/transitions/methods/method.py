@@ -261,6 +261,20 @@ class Make(MethodPart):
         """What the make needs around the points; by default what the length needs."""
         return length.room(fps, longest_frames)
 
+    @property
+    def centred(self) -> bool:
+        """Whether the transition points meet in the middle of the blend rather than begin and end it."""
+        return False
+
+    def placed(self, start_frame: int, end_frame: int, frames: int) -> tuple[int, int]:
+        """The first blended frame of the source and the last of the destination, for transition points and a length."""
+        if not self.centred:
+            return start_frame, end_frame
+        from study.transitions.windows import window
+
+        blend = window(start_frame, end_frame, frames, "centre")
+        return blend.source_start, blend.destination_stop - 1
+
     def usual_s(self, length: Length, fps: float) -> float:
         """Seconds that it takes, as far as can be told before points are known."""
         del length, fps
@@ -308,6 +322,11 @@ class Method:
             length=self.length.with_settings(settings),
             make=self.make.with_settings(settings),
         )
+
+    def length_at(self, source: Clip, destination: Clip, start_frame: int, end_frame: int) -> BlendLength | WarpLength:
+        """The length at two points, which begin and end the blend or meet in its middle, as the make has them."""
+        options = {"specification": "centre"} if self.make.centred else {}
+        return self.length.at(source, destination, start_frame, end_frame, **options)
 
     def in_words(self, fps: float) -> str:
         """What a Methods section calls its transitions, at a frame rate."""

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from toys import ToyLibrary
 
 from study.errors import StimulusError
 from study.experiment.protocol.whole import Protocol, find_protocol, load_protocol, parse_protocol
-from study.experiment.stimuli.films import alike
+from study.experiment.stimuli.drafts import Draft, add_drafts
+from study.experiment.stimuli.films import Film, alike, plan_all
 from study.experiment.stimuli.points import settle
 from study.experiment.stimuli.prepare import check, prepare
 from study.experiment.stimuli.ways import Ways
 from study.motion.library import open_library
+from study.transitions.blend_length import geodesic_length
+from study.transitions.blending import blend
 from study.transitions.methods.makes.blends import Blended
 from study.transitions.methods.makes.one_hop import Hop
 
@@ -139,3 +143,57 @@ def test_no_captured_one_hop_transition_stands_beside_itself(mocap: Path) -> Non
     second = settle(protocol, study, transition, library, lambda one, points: alike(one, points, ways))
     assert second.tried > first.tried
     assert isinstance(ways.of(study, second, "one-hop"), Hop)
+
+
+CENTRED = TEXT.replace('"preference"\nreference = "geodesic"\ncomparison = "fixed"',
+    '"same-different"\nreference = "centred"\ndifferences_frames = [-4, 0, 7]') + """
+[points]
+shortest_frames = 6
+
+[[methods]]
+name = "centred"
+length = "geodesic"
+make = "slerp"
+specification = "centre"
+"""  # fmt: skip
+
+
+def test_centre_aligned_blends_meet_at_the_points_whatever_their_length() -> None:
+    """Each film has the frames that blending about the two points gives, and the length is that of such blends."""
+    protocol, library = parse_protocol(CENTRED), open_library("synthetic")
+    ways = Ways(protocol, library)
+    (planned,), problems = plan_all(protocol, library, ways)
+    assert problems == []
+    settled = planned.settled
+    clips, points = (settled.source.clip, settled.destination.clip), (settled.start_frame, settled.end_frame)
+    length = settled.lengths["centred"].blend_frames
+    assert length == geodesic_length(*clips, *points, specification="centre").blend_frames
+    drafts: dict[Film, Draft] = {}
+    add_drafts(protocol, planned, drafts, ways)
+    assert {film.way.frames - length for film in drafts} == {-4, 0, 7}
+    for film, draft in drafts.items():
+        frames = film.way.frames
+        assert (film.start_frame, film.end_frame) == (points[0] - frames // 2, points[1] + frames - 1 - frames // 2)
+        assert draft.blend == (30, 30 + frames)
+        assert draft.clip.frames == 60 + frames
+        wanted = blend(*clips, *points, frames, specification="centre").clip
+        first = film.start_frame - 30
+        np.testing.assert_allclose(draft.clip.rotations[:30], wanted.rotations[first : first + 30], atol=1e-12)
+        arms = [settled.source.clip.skeleton.role(f"shoulder.{side}") for side in "LR"]  # feet are planted, arms not
+        shown, made = (clip.rotations[:, arms] for clip in (draft.clip, wanted))
+        np.testing.assert_allclose(shown, made[first : first + draft.clip.frames], atol=1e-12)
+
+
+def test_with_equal_durations_both_specifications_show_the_same_moments() -> None:
+    text = CENTRED.replace("exit_s = 1.0", 'exit_s = 1.0\nmatch = "duration"')
+    library = open_library("synthetic")
+    for text_of_one in (text, text.replace('reference = "centred"', 'reference = "geodesic"')):
+        protocol = parse_protocol(text_of_one)
+        (planned,), problems = plan_all(protocol, library, Ways(protocol, library))
+        assert problems == []
+        for showing in planned.showings:
+            reference, other = showing.films
+            longer = other.way.frames - reference.way.frames
+            assert other.start_frame == reference.start_frame - longer // 2
+            assert other.end_frame == reference.end_frame + longer - longer // 2
+            assert other.frames(protocol) == reference.frames(protocol)

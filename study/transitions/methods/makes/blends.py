@@ -99,19 +99,40 @@ class Blending(CleaningFeet):
         return f"{self.weight} weight, {super().details()}"
 
 
-class Slerp(Blending):
-    """A blend by spherical linear interpolation (2004 section 3)."""
+class Interpolating(Blending):
+    """What makes by spherical linear interpolation have in common."""
 
-    name = "slerp"
     words = "blends {length} {points}"
     sources: ClassVar[tuple[str, ...]] = (SHOEMAKE_1985,)
-    levels = True
-    moves = True
 
     def way(self, place: Place, windows: tuple[int, int]) -> Way:
         """A blend of that many frames."""
         del place
         return Blended(windows, self.weight, self.clean_feet)
+
+
+@dataclass(frozen=True)
+class Slerp(Interpolating):
+    """A blend by spherical linear interpolation (2004 section 3)."""
+
+    name = "slerp"
+    levels = True
+    moves = True
+
+    specification: Literal["start-end", "centre"] = setting(
+        "start-end",
+        "Make `slerp`: `start-end` if the transition points are the blend's first and last frame, so that a longer "
+        "blend begins earlier in the destination; `centre` if they meet in its middle.",
+    )
+
+    @property
+    def centred(self) -> bool:
+        """As the specification says."""
+        return self.specification == "centre"
+
+    def details(self) -> str:
+        """The specification, where points meet in the middle; the weight and the feet."""
+        return ("centre-aligned, " if self.centred else "") + super().details()
 
 
 class InStep(Blended):
@@ -120,14 +141,12 @@ class InStep(Blended):
     in_step = True
 
 
-class Registered(Slerp):
+class Registered(Interpolating):
     """A blend of two windows of one length, brought into step (Kovar & Gleicher 2003)."""
 
     name = "registration-curve"
     words = "blends along registration curves {length} {points}"
     sources = (SHOEMAKE_1985, KOVAR_2003)
-    levels = False
-    moves = False
 
     def way(self, place: Place, windows: tuple[int, int]) -> Way:
         """A blend of that many frames of each clip."""
@@ -140,13 +159,12 @@ class Registered(Slerp):
         return replace(room, blend=room.blend + 1, search=room.search + 1, entry=max(room.entry, 1))
 
 
-class Warped(Slerp):
+class Warped(Interpolating):
     """A blend of two windows of different length, the shorter one slowed (2004 section 3.1.4)."""
 
     name = "timewarp"
     words = "time-warped blends (2004) {points}"
     windows = 2
-    levels = False
     sets_span = True
 
 
