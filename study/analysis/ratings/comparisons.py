@@ -158,7 +158,9 @@ def _means(part: pd.DataFrame, *within: str) -> pd.DataFrame:
 
 def _differences(part: pd.DataFrame, confidence: float) -> tuple[MethodDifference, ...]:
     """The difference of each two methods, p-values adjusted over the pairs by Holm's method."""
-    means, cells = _means(part), _means(part, "motion") if "motion" in part.columns else None
+    means, cells = _means(part), None
+    if "motion" in part.columns:  # of some methods it may be unknown
+        cells = _means(part, "motion").reindex(columns=means.columns)
     rows = [_difference(means, cells, one, other, confidence) for one, other in combinations(sorted(means.columns), 2)]
     adjusted = estimates.holm([row.p_value for row in rows])
     return tuple(replace(row, holm_p_value=p) for row, p in zip(rows, adjusted, strict=True))
