@@ -29,7 +29,7 @@ from study.motion.skeleton import Skeleton
 _FLOAT, _SHORT = 5126, 5123
 _VERTICES, _INDICES = 34962, 34963
 # A bone's corners: along it, and to both sides of it; its middle is this far along, and this wide, of its length.
-_ALONG, _WIDE = 0.15, 0.06
+_ALONG, _WIDE = 0.2, 0.1
 _FACES = np.array([[0, 2, 1], [0, 3, 2], [0, 4, 3], [0, 1, 4], [5, 1, 2], [5, 2, 3], [5, 3, 4], [5, 4, 1]])
 
 

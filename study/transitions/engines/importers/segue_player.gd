@@ -7,6 +7,8 @@
 #     character.travel("run")  # fades at the point that Segue chose; false where the clip is past it
 extends Node
 
+const CLOSE = 1e-5  # seconds, to which times are the same
+
 var machine = {}
 var state = ""
 var time = 0.0
@@ -61,7 +63,7 @@ func _process(delta):
 
 func travel(to):
 	for one in machine["transitions"]:
-		if one["source"] == state and one["destination"] == to and time <= one["start_s"]:
+		if one["source"] == state and one["destination"] == to and time < one["start_s"] + CLOSE:
 			_next = one
 			_graph.get_node("destination").animation = _animations[to]
 			return true
@@ -70,7 +72,7 @@ func travel(to):
 
 func advance(delta):
 	time += delta
-	if _next != null and time >= _next["start_s"] + _next["duration_s"]:
+	if _next != null and time > _next["start_s"] + _next["duration_s"] - CLOSE:
 		time += _next["offset_s"] - _next["start_s"]
 		_placed = _placed * _moved(_next["turn_radians"], _next["shift_m"])
 		state = _next["destination"]
@@ -83,17 +85,35 @@ func advance(delta):
 
 func _show(share):
 	_graph.get_node("source").animation = _animations[state]
-	_seek("source_at", min(time, _lengths[state]))
-	_seek("destination_at", 0.0 if _next == null else max(0.0, time - _next["start_s"] + _next["offset_s"]))
-	_tree.set("parameters/fade/blend_amount", share)
-	_tree.advance(0.0)
+	_pose_tree(share)
 	_model.transform = _start * _placed
 	if share > 0.0:
+		if _four:
+			# Trees of Godot 4 blend rotations about the rest pose, off by centimetres; this is the shortest way.
+			var from = _rotations(0.0)
+			var to = _rotations(1.0)
+			for bone in range(_skeleton.get_bone_count()):
+				_skeleton.set_bone_pose_rotation(bone, from[bone].slerp(to[bone], share))
 		# Engines blend places; Segue blends steps, whose path is in the file. The root is put on it.
 		var at = (time - _next["start_s"]) * _next["fps"]
 		var before = int(min(floor(at), len(_next["root"]) - 2))
 		var root = _pose(_next["root"][before]).interpolate_with(_pose(_next["root"][before + 1]), at - before)
 		_model.transform = _start * _placed * root * _skeleton.get_bone_global_pose(0).affine_inverse()
+
+
+func _pose_tree(share):
+	_seek("source_at", min(time, _lengths[state]))
+	_seek("destination_at", 0.0 if _next == null else max(0.0, time - _next["start_s"] + _next["offset_s"]))
+	_tree.set("parameters/fade/blend_amount", share)
+	_tree.advance(0.0)
+
+
+func _rotations(share):
+	_pose_tree(share)
+	var found = []
+	for bone in range(_skeleton.get_bone_count()):
+		found.append(_skeleton.get_bone_pose_rotation(bone))
+	return found
 
 
 func _seek(node, seconds):
