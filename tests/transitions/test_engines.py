@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
+import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -41,6 +43,10 @@ def pair(library: Library, source: str, destination: str) -> dict[str, Clip]:
 def walks() -> dict[str, Clip]:
     first = make_walk(90, name="slow walk")
     return {"slow walk": first, "out/run": retarget(make_walk(80, cadence=1.4, name="out/run"), first.skeleton)}
+
+
+ROW = {"source": "a", "destination": "b", "method": "m", "make": "slerp", "start_frame": 1, "end_frame": 9,
+       "blend_frames": 5}  # fmt: skip
 
 
 # -- The folder -------------------------------------------------------------------------------------------------------
@@ -103,11 +109,17 @@ def test_the_verb_takes_what_advise_and_one_hop_write(capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize(
-    "said", [[], {"advice": []}, {"advice": [{"source": 1}], "fps": 30}, {"advice": 3, "fps": "x"}]
+    "said",
+    [
+        *([], {"advice": []}, {"advice": [{"source": 1}], "fps": 30}, {"advice": 3, "fps": "x"}),
+        {"advice": [{**ROW, "start_frame": "3"}], "fps": 30.0},
+        {"advice": [ROW], "fps": -1},
+    ],
 )
 def test_other_json_is_refused(said: Any) -> None:
-    with pytest.raises(TransitionError, match=r"x.json: expected .* (found|none)"):
+    with pytest.raises(TransitionError, match=r"x.json: expected the advice.json of .* found neither"):
         read_advice(Path("x.json"), said)
+    assert read_advice(Path("x.json"), {"advice": [ROW], "fps": 30})[1] == [Advised(**ROW)]  # type: ignore[arg-type]
 
 
 # -- Programs that read it --------------------------------------------------------------------------------------------
@@ -136,7 +148,7 @@ func _init():
 	for frame in range(FRAMES):
 		if frame > 0:
 			player.advance(1.0 / 30.0)
-		if wishes and player._next == null and player.travel(wishes[0]):
+		if wishes and player.coming == null and player.travel(wishes[0]):
 			wishes.pop_front()
 		out["states"].append(player.state)
 		var row = []
@@ -298,7 +310,34 @@ def test_importers_can_be_parsed() -> None:
         for file in files:
             assert not parser.parse(file.read_bytes()).root_node.has_error, file
         assert parser.parse(b"class {{ func (").root_node.has_error
-    ast.parse((IMPORTERS / "segue-unreal.py").read_text())
+
+
+def test_the_importer_for_unreal_sets_the_transition_of_each_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a stand-in for Unreal's module, which notes what it is told."""
+
+    class Node:
+        def __init__(self, number: int) -> None:
+            self.told: dict[str, object] = {"priority_order": number}
+            self.get_editor_property, self.set_editor_property = self.told.__getitem__, self.told.__setitem__
+
+    nodes, unreal, blueprint = [Node(number) for number in (2, 1, 7)], MagicMock(), MagicMock()
+    unreal.AnimStateTransitionNode, unreal.AnimBlueprint = Node, MagicMock
+    unreal.EditorUtilityLibrary.get_selected_assets.return_value = [blueprint]
+    graphs = [MagicMock(**{"get_outer.return_value": node}) for node in (*nodes, object())]
+    unreal.BlueprintEditorLibrary.list_graphs.return_value = graphs
+    monkeypatch.setitem(sys.modules, "unreal", unreal)
+    clips = walks()
+    there = Advised("slow walk", "out/run", "velocity", "slerp", 30, 40, 10)
+    back = Advised("out/run", "slow walk", "velocity", "dead-blend", 20, 30, 7)
+    machine = export(tmp_path / "out", clips, list(clips.values()), [there, back], None)
+    runpy.run_path(str(tmp_path / "out" / "segue-unreal.py"))
+    durations = [one["duration_s"] for one in machine["transitions"]]
+    assert [node.told.get("crossfade_duration") for node in nodes] == [durations[1], durations[0], None]
+    assert nodes[0].told["logic_type"] is unreal.TransitionLogicType.TLT_INERTIALIZATION
+    assert nodes[1].told["logic_type"] is unreal.TransitionLogicType.TLT_STANDARD_BLEND
+    unreal.BlueprintEditorLibrary.compile_blueprint.assert_called_once_with(blueprint)
 
 
 def test_importers_ask_for_keys_that_are_there(tmp_path: Path) -> None:
@@ -307,12 +346,12 @@ def test_importers_ask_for_keys_that_are_there(tmp_path: Path) -> None:
                      [Advised("slow walk", "out/run", "velocity", "slerp", 30, 40, 10)], None)  # fmt: skip
     keys = {*machine, *machine["states"][0], *machine["transitions"][0]}
     read = (IMPORTERS / "SegueImporter.cs").read_text()
-    fields = re.findall(r"^\s+public (?:string|float|State\[\]|Transition\[\]) ([\w, ]+);", read, re.MULTILINE)
+    fields = re.findall(r"public (?:string|float|State\[\]|Transition\[\]) ([\w, ]+);", read, re.MULTILINE)
     for file, used in (
         ("SegueImporter.cs", {name for line in fields for name in line.split(", ")}),
         (
             "segue_player.gd",
-            set(re.findall(r"(?:_next|one|machine)\[\"(\w+)\"\]", (IMPORTERS / "segue_player.gd").read_text())),
+            set(re.findall(r"(?:coming|one|machine)\[\"(\w+)\"\]", (IMPORTERS / "segue_player.gd").read_text())),
         ),
         (
             "segue-unreal.py",
