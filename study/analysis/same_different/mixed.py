@@ -5,12 +5,10 @@ log-normal over people, so that "typical" is the median observer. The mean curve
 anybody's, and crosses 75% further out than the typical observer does; one curve fitted to all answers follows neither
 quite. This model says both: the typical observer's threshold, and where the mean of all people's curves crosses.
 
-The integral over people is a sum over an even grid of standard scores, which is exact to rounding as long as the grid
-is finer than what the answers of one participant tell (Trefethen & Weideman 2014).
-
 Where motions are known, each has its own sensitivity on each side. Thresholds are those of a motion whose logarithm is
 the mean, so that motions that differ don't flatten the curve; with three or more the interval takes them for a
-sample (`crossed.between_motions`).
+sample (`crossed.between_motions`). Log sensitivities that answers leave open (a motion that everybody tells) are kept
+in reach of the others' mean by a normal penalty with a standard deviation of 1, which hardly moves the rest.
 """
 
 from __future__ import annotations
@@ -29,22 +27,27 @@ from study.analysis.same_different.counts import (
     Counts,
     Side,
     Threshold,
-    all_motions,
     both_sides,
-    frames_by_side,
     log_threshold,
 )
 from study.analysis.same_different.model import why_no_fit
-from study.arrays import BoolArray, FloatArray
+from study.analysis.same_different.observers import (
+    ALIKE,
+    AVOIDANCE,
+    LARGEST_SPREAD,
+    REACH,
+    People,
+    covariance_of,
+    curves,
+    gradient_of,
+    maximise,
+    people_of,
+)
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
-from study.models.differencing import ROOT_TWO, Kind, criterion_free_delta, density, detected
+from study.models.differencing import Kind, criterion_free_delta
 
 FEWEST_PEOPLE = 3
-FARTHEST_SCORE = 4.2
-COARSEST_STEP = 0.35
-LARGEST_SPREAD = 1.5
-ALIKE = 1e-3
-AVOIDANCE = 0.5
 METHOD = "mixed differencing model; Student interval of the logarithm"
 NO_SAMPLE = BetweenMotions(0.0, 0.0, 0.0)
 """Motions that stand for themselves alone."""
@@ -76,7 +79,8 @@ class MixedThresholds:
     """`criterion`, `lapse`: the typical observer's criterion, and everybody's lapse rate."""
     log_likelihood: float
     alike_log_likelihood: float
-    """`log_likelihood`, `alike_log_likelihood`: of this model, and of one without individual differences."""
+    """`log_likelihood`, `alike_log_likelihood`: of this model (with its penalty), and of one without individual
+    differences."""
     curve: tuple[tuple[float, float], ...]
     """The median observer's: points (difference in frames, percent) for drawing."""
     alike_p_value: float
@@ -84,18 +88,6 @@ class MixedThresholds:
     of the time 0; the mixture of chi-square distributions takes that into account."""
     note: str = ""
     """What to be careful about."""
-
-
-@dataclass(frozen=True, eq=False)
-class _People:
-    """Counts by participant, the regressors, and the grid of standard scores with the logarithms of its masses."""
-
-    frames: FloatArray
-    different: FloatArray
-    shown: FloatArray
-    sensitivity: FloatArray
-    criterion: FloatArray
-    log_mass: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,32 +130,28 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
         reason = f"{few} too few to estimate individual differences; at least {FEWEST_PEOPLE}"
     if reason:
         return reason
-    people, sides, motions = _people(counts, answered)
-    start = fits.fit(people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None])
-    if start.held[0, 2:].any() or start.held[0, 0]:
-        if motions > 1:
-            found = fit_mixed_thresholds(all_motions(counts), level=level, confidence=confidence)
-            few = "a motion has too few answers for a sensitivity of its own"
-            return found if isinstance(found, str) else replace(found, note="; ".join(filter(None, (few, found.note))))
+    people, sides = people_of(counts, answered)
+    together = replace(people, frames=_by_side(people, len(sides)))
+    group, alike = (_one_curve(part) for part in (together, people))
+    if group.held[0, 2:].any() or group.held[0, 0]:
         return "the group's sensitivity or criterion is at its bound: individual differences cannot be estimated"
-    slopes = np.log(start.slopes[0])
-    begin = np.concatenate([np.log(start.criterion), start.lapse, slopes, [0.2, 0.2]])
+    slopes = np.log(group.slopes[0])[people.side_of]
+    slopes = np.clip(np.log(alike.slopes[0]), slopes - 1.5 * REACH, slopes + 1.5 * REACH)
+    begin = np.concatenate([np.log(group.criterion), group.lapse, slopes, [0.2, 0.2]])
     bounds = [(math.log(1e-3), math.log(9.0)), (0.0, fits.LARGEST_LAPSE), *((slope - 3, slope + 3) for slope in slopes)]
-    point, value, settled = _maximise(people, begin, [*bounds, *[(0.0, LARGEST_SPREAD)] * 2], 0.0)
+    point, value, settled = maximise(people, begin, [*bounds, *[(0.0, LARGEST_SPREAD)] * 2], 0.0)
     near = np.concatenate([point[:-2], np.maximum(point[-2:-1], 0.1), point[-1:]])
-    wary, _, _ = _maximise(people, near, [*bounds, (2 * ALIKE, LARGEST_SPREAD), (0.0, LARGEST_SPREAD)], AVOIDANCE)
-    doubt = _doubt(wary, people, len(sides), motions)
-    mean = _of_mean_motion(len(sides), motions) @ point
-    frames = people.frames.reshape(len(people.frames), len(sides), motions).sum(axis=2)
-    everybody = replace(people, frames=frames)
-    median = replace(everybody, sensitivity=np.zeros(1), criterion=np.zeros(1), log_mass=np.zeros(1))
+    wary, _, _ = maximise(people, near, [*bounds, (2 * ALIKE, LARGEST_SPREAD), (0.0, LARGEST_SPREAD)], AVOIDANCE)
+    doubt = _doubt(wary, people, len(sides))
+    mean = _of_mean_motion(people.side_of) @ point
+    median = replace(together, sensitivity=np.zeros(1), criterion=np.zeros(1), log_mass=np.zeros(1))
     here = replace(doubt, motions=(NO_SAMPLE,) * len(sides))
-    alike = float(start.log_likelihood[0])
-    sampled = motions >= FEWEST_MOTIONS
+    ratio = 2 * (value - float(alike.log_likelihood[0]))
+    sampled = bool(np.bincount(people.side_of).min() >= FEWEST_MOTIONS)
     return MixedThresholds(
         typical=_thresholds(mean, doubt, median, sides, level, confidence),
         criterion_free=_thresholds(mean, doubt, median, sides, level, confidence, "criterion_free"),
-        population=_thresholds(mean, doubt, everybody, sides, level, confidence),
+        population=_thresholds(mean, doubt, together, sides, level, confidence),
         these_motions=_thresholds(mean, here, median, sides, level, confidence),
         generalises_to=BOTH if sampled else holds_for(len(people.shown)),
         motion_spread={side: one.deviation for side, one in zip(sides, doubt.motions, strict=True) if sampled},
@@ -173,147 +161,47 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
         lapse=float(point[1]),
         curve=_curve(mean, median, counts.differences, sides),
         log_likelihood=value,
-        alike_log_likelihood=alike,
-        alike_p_value=_alike_probability(max(2 * (value - alike), 0.0)),
+        alike_log_likelihood=float(alike.log_likelihood[0]),
+        alike_p_value=_alike_probability(max(ratio, 0.0)),
         note="" if settled else "the search for the maximum did not converge",
     )
 
 
 def _curve(
-    point: FloatArray, median: _People, differences: FloatArray, sides: list[Side]
+    point: FloatArray, median: People, differences: FloatArray, sides: list[Side]
 ) -> tuple[tuple[float, float], ...]:
     line = np.linspace(differences.min(), differences.max(), 201)
-    share = _curves(point, median, both_sides(line)[:, [SIDES.index(side) for side in sides]])[0][0]
+    share = curves(point, median, both_sides(line)[:, [SIDES.index(side) for side in sides]])[0][0]
     return tuple((float(x), 100 * float(y)) for x, y in zip(line, share, strict=True))
 
 
-def _of_mean_motion(sides: int, motions: int) -> FloatArray:
-    """What turns parameters with a log slope for each side and motion into those with its mean over motions."""
-    turned = np.zeros((sides + 4, sides * motions + 4))
+def _one_curve(people: People) -> fits.Fits:
+    """The differencing model of all answers as one person's."""
+    return fits.fit(people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None])
+
+
+def _by_side(people: People, sides: int) -> FloatArray:
+    """Sizes of the differences with one column a side, shape (levels, sides)."""
+    return np.asarray(people.frames @ (people.side_of[:, None] == np.arange(sides)))
+
+
+def _of_mean_motion(side_of: IntArray) -> FloatArray:
+    """What turns parameters with a log slope for each motion of a side into those with the mean of these."""
+    sides = int(side_of.max()) + 1
+    turned = np.zeros((sides + 4, len(side_of) + 4))
     turned[:2, :2] = turned[-2:, -2:] = np.eye(2)
-    turned[2:-2, 2:-2] = np.kron(np.eye(sides), np.full(motions, 1 / motions))
+    turned[2:-2, 2:-2] = (np.arange(sides)[:, None] == side_of) / np.bincount(side_of)[:, None]
     return turned
 
 
-def _doubt(point: FloatArray, people: _People, sides: int, motions: int) -> _Doubt:
-    covariance, turned = _covariance(point, people), _of_mean_motion(sides, motions)
-    places = [np.arange(2 + side * motions, 2 + (side + 1) * motions) for side in range(sides)]
+def _doubt(point: FloatArray, people: People, sides: int) -> _Doubt:
+    covariance, turned = covariance_of(point, people), _of_mean_motion(people.side_of)
+    places = [2 + np.flatnonzero(people.side_of == side) for side in range(sides)]
     between = tuple(between_motions(point[own], covariance[np.ix_(own, own)]) for own in places)
     return _Doubt(turned @ covariance @ turned.T, turned @ point, len(people.shown), between)
 
 
-def _people(counts: Counts, answered: BoolArray) -> tuple[_People, list[Side], int]:
-    """What is fitted, the sides shown, and the number of motions; slopes are those of each side, motion by motion."""
-    present = counts.shown.sum(axis=0) > 0
-    shown = counts.shown[answered][:, present]
-    by_side, sides = frames_by_side(counts.differences[present])
-    motions = np.array(counts.motions or [""] * len(present))[present]
-    names = np.unique(motions[by_side.any(axis=1)])
-    frames = by_side[:, :, None] * (motions[:, None, None] == names)
-    # One participant's answers tell the scores to about 2 / sqrt(answers); the grid has to be finer.
-    step = min(COARSEST_STEP, 2.5 / math.sqrt(float(shown.sum(axis=1).max())))
-    half = np.arange(0, FARTHEST_SCORE + step, step)
-    scores = np.concatenate([-half[:0:-1], half])
-    first, second = (part.ravel() for part in np.meshgrid(scores, scores, indexing="ij"))
-    near = first**2 + second**2 <= FARTHEST_SCORE**2
-    first, second = first[near], second[near]
-    log_mass = -(first**2 + second**2) / 2
-    people = _People(
-        frames.reshape(len(frames), -1),
-        counts.different[answered][:, present],
-        shown,
-        first,
-        second,
-        log_mass - np.log(np.exp(log_mass).sum()),
-    )
-    return people, [SIDES[index] for index in sides], len(names)
-
-
-def _curves(point: FloatArray, people: _People, frames: FloatArray) -> tuple[FloatArray, ...]:
-    """P("different") of the people on the grid, shape (people, levels), with its derivatives by the logarithms of the
-    criterion, by the lapse rate, and by the logarithm of d-prime.
-
-    Parameters are log criterion, lapse, log slopes, and the spreads of log sensitivity and log criterion.
-    """
-    slopes, lapse = np.exp(point[2:-2]), point[1]
-    criterion = np.exp(point[0] + point[-1] * people.criterion)[:, None]
-    delta = np.exp(point[-2] * people.sensitivity)[:, None] * (frames @ slopes)
-    above, below = (delta - criterion) / ROOT_TWO, (delta + criterion) / ROOT_TWO
-    dense_above, dense_below = density(above), density(below)
-    share = detected(delta, criterion)
-    by_criterion = -(1 - lapse) * (dense_above + dense_below) / ROOT_TWO * criterion
-    by_delta = (1 - lapse) * (dense_above - dense_below) / ROOT_TWO * delta
-    return lapse / 2 + (1 - lapse) * share, by_criterion, 0.5 - share, by_delta
-
-
-def _gradient(
-    weights: FloatArray, by: tuple[FloatArray, ...], point: FloatArray, people: _People, frames: FloatArray
-) -> FloatArray:
-    """Derivatives by the parameters of a sum over people and levels of `weights` times P("different")."""
-    by_criterion, by_lapse, by_delta = (weights * one for one in by)
-    slopes = np.exp(point[2:-2])
-    # A level's share of each slope: 1 for its own side and motion, where there is a difference at all.
-    parts = frames * slopes / np.maximum(frames @ slopes, 1e-300)[:, None]
-    each, own = by_delta.sum(axis=1), by_criterion.sum(axis=1)
-    tail = [each @ people.sensitivity, own @ people.criterion]
-    return np.concatenate([[own.sum(), by_lapse.sum()], by_delta.sum(axis=0) @ parts, tail])
-
-
-def _log_likelihood(point: FloatArray, people: _People) -> tuple[float, FloatArray]:
-    """Marginal log likelihood and its gradient."""
-    share, *by = _curves(point, people, people.frames)
-    share = np.clip(share, fits.SMALLEST_PROBABILITY, 1 - fits.SMALLEST_PROBABILITY)
-    value = np.log(share) @ people.different.T + np.log1p(-share) @ (people.shown - people.different).T
-    value += people.log_mass[:, None]
-    highest = value.max(axis=0)
-    mass = np.exp(value - highest)
-    total = mass.sum(axis=0)
-    mass /= total
-    # Each grid point answers for the participants by their posterior masses there.
-    yes, asked = mass @ people.different, mass @ people.shown
-    weights = (yes - asked * share) / (share * (1 - share))
-    return float((highest + np.log(total)).sum()), _gradient(weights, tuple(by), point, people, people.frames)
-
-
-def _maximise(
-    people: _People, begin: FloatArray, bounds: list[tuple[float, float]], avoidance: float
-) -> tuple[FloatArray, float, bool]:
-    """The highest point of the likelihood times the spread of sensitivity to the power `avoidance`."""
-    from scipy.optimize import minimize
-
-    def loss(point: FloatArray) -> tuple[float, FloatArray]:
-        value, gradient = _log_likelihood(point, people)
-        if avoidance:
-            value += avoidance * math.log(point[-2])
-            gradient[-2] += avoidance / point[-2]
-        return -value, -gradient
-
-    found = minimize(loss, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 200, "ftol": 1e-10})
-    return np.asarray(found.x, dtype=np.float64), -float(found.fun), bool(found.success)
-
-
-def _covariance(point: FloatArray, people: _People) -> FloatArray:
-    """Inverse of the curvature, avoidance included; parameters at a bound are held there."""
-    step, size, here = 1e-5, len(point), _log_likelihood(point, people)[1]
-    curvature = np.empty((size, size))
-    for place in range(size):
-        moved = np.zeros(size)
-        moved[place] = step
-        curvature[place] = (here - _log_likelihood(point + moved, people)[1]) / step
-    curvature = (curvature + curvature.T) / 2
-    curvature[-2, -2] += AVOIDANCE / point[-2] ** 2
-    held = np.zeros(size, dtype=bool)
-    held[1] = point[1] <= 2e-4 or point[1] >= fits.LARGEST_LAPSE - 1e-9
-    held[-2:] = (point[-2:] <= ALIKE) | (point[-2:] >= LARGEST_SPREAD - 1e-9)
-    free = np.flatnonzero(~held)
-    result = np.zeros((size, size))
-    result[np.ix_(free, free)] = np.linalg.pinv(curvature[np.ix_(free, free)], hermitian=True)
-    return result
-
-
-def _log_threshold(
-    point: FloatArray, people: _People, place: int, level: float, kind: Kind
-) -> tuple[float, FloatArray]:
+def _log_threshold(point: FloatArray, people: People, place: int, level: float, kind: Kind) -> tuple[float, FloatArray]:
     """Log threshold (frames) of the people on the grid, and its derivatives; infinite where there is none.
 
     Where the mean curve m crosses at x, d log x / d parameter = -(d m / d parameter) / (d m / d log x), and a change of
@@ -326,8 +214,8 @@ def _log_threshold(
 
     def mean_at(log_frames: float) -> tuple[float, FloatArray]:
         alone[0, place] = math.exp(log_frames)
-        share, *by = _curves(point, people, alone)
-        return float((mass * share).sum()), _gradient(mass, tuple(by), point, people, alone)
+        share, *by = curves(point, people, alone)
+        return float((mass * share).sum()), gradient_of(mass, tuple(by), point, people, alone)
 
     low, high = -float(point[2 + place]) - 5.0, -float(point[2 + place]) + 4.0
     if mean_at(low)[0] >= level or mean_at(high)[0] < level:
@@ -342,7 +230,7 @@ def _log_threshold(
 def _thresholds(
     point: FloatArray,
     doubt: _Doubt,
-    people: _People,
+    people: People,
     sides: list[Side],
     level: float,
     confidence: float,

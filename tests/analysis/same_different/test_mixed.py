@@ -201,17 +201,33 @@ def of_one(counts: Counts, motion: str) -> Counts:
     return Counts(counts.participants, counts.differences[kept], counts.different[:, kept], counts.shown[:, kept])
 
 
-def test_two_motions_hold_for_these_and_too_little_of_one_for_all_together() -> None:
+def test_two_motions_hold_for_these_alone() -> None:
     two = fitted(several_motions(np.random.default_rng(10), [0.8, 1.2], 20, 6))
     assert (two.generalises_to, two.motion_spread) == ("participants, for these motions", {})
     assert two.typical == two.these_motions
-    sparse = several_motions(np.random.default_rng(11), [1.0, 1.0, 1.0], 20, 2)
-    of_last = np.array(
-        [name == "m2" and level > 0 for name, level in zip(sparse.motions, LEVELS.tolist() * 3, strict=True)]
+
+
+def test_a_motion_that_everybody_tells_stays_in_reach_of_the_others() -> None:
+    counts = several_motions(np.random.default_rng(11), [1.0, 1.0, 1.0], 20, 2)
+    longer_of_last = np.array(
+        [name == "m2" and level > 0 for name, level in zip(counts.motions, [*LEVELS] * 3, strict=False)]
     )
-    found = fitted(replace(sparse, different=np.where(of_last, 0.0, sparse.different)))
-    assert "too few answers for a sensitivity of its own" in found.note
-    assert found.generalises_to == "participants, for these motions"
+    found = fitted(replace(counts, different=np.where(longer_of_last, counts.shown, counts.different)))
+    frames = found.typical["longer"].frames
+    assert frames is not None
+    assert crossing(0.45) / 3 < frames < crossing(0.45)
+    assert found.generalises_to == "participants and motions"
+    assert 0.3 < found.motion_spread["longer"] < 1.5
+
+
+def test_motions_that_are_shown_on_one_side_only_count_there() -> None:
+    counts = several_motions(np.random.default_rng(12), [1.0] * 6, 20, 4)
+    place = np.array([int(name[1]) for name in counts.motions])
+    shown = np.where((np.tile(LEVELS, 6) < 0) == (place < 3), counts.shown, 0.0)
+    found = fitted(replace(counts, shown=shown, different=np.minimum(counts.different, shown)))
+    for side, slope in (("shorter", 0.4), ("longer", 0.45)):
+        assert found.typical[side].frames == pytest.approx(crossing(slope), rel=0.15)
+    assert found.generalises_to == "participants and motions"
 
 
 def test_the_criterion_free_threshold_rests_on_sensitivity_alone() -> None:
