@@ -79,6 +79,8 @@ def test_the_fade_has_the_shares_of_the_blend_at_every_frame(
 def test_clips_and_animations_keep_their_names_apart(tmp_path: Path) -> None:
     clips = walks()
     again = replace(clips["out/run"], name="out_run")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "game.txt").write_text("mine")
     machine = export(tmp_path / "out", {**clips, "out_run": again}, [*clips.values(), again], [], None)
     assert [state["animation"] for state in machine["states"]] == ["slow walk", "out_run", "out_run_2"]
     for state, clip in zip(machine["states"], [*clips.values(), again], strict=True):
@@ -87,6 +89,7 @@ def test_clips_and_animations_keep_their_names_apart(tmp_path: Path) -> None:
         order = [read.skeleton.names.index(name) for name in clip.skeleton.names]
         assert np.abs(joint_positions(read)[:, order] - joint_positions(clip)).max() < 1e-5
     assert {file.name for file in IMPORTERS.iterdir()} < {file.name for file in (tmp_path / "out").iterdir()}
+    assert (tmp_path / "out" / "game.txt").read_text() == "mine"
 
 
 def test_the_verb_takes_what_advise_and_one_hop_write(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

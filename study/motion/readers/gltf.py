@@ -290,8 +290,7 @@ def _measured(
         if number in above or number in parents:  # what a leaf's scale does, no joint shows
             sizes[number] = sizes[node.parent] * _scale(document, tracks, number, node)
     offsets = {n: quat.rotate(turns[nodes[n].parent], nodes[n].translation * sizes[nodes[n].parent]) for n in joints}
-    still = {n for n in joints if (n, "rotation") not in tracks and (n, "translation") not in tracks}
-    ends = [n for n in joints[1:] if n in still and n not in parents and called[n].lower().endswith(END)]
+    ends = [n for n in joints[1:] if n not in parents and called[n].lower().endswith(END)]
     kept = [number for number in joints if number not in ends]
     index = {number: j for j, number in enumerate(kept)}
     paths, rotations = {}, np.empty((len(kept), len(times), 4))

@@ -112,7 +112,8 @@ def _unit(source: Source, skeleton: Skeleton, stated: float | None, history: lis
         return stated
     history.append(scale.note)
     if scale.by_legs and not (scale.plausible and stated in (None, scale.metres_per_unit)):
-        source.warn(f"{scale.note}; a person or the format has another size: say `unit` in library.toml")
+        why = "the format has another" if scale.plausible else "a person has another size"
+        source.warn(f"{scale.note}; {why}: say `unit` in library.toml")
     return scale.metres_per_unit
 
 

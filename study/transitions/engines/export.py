@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
@@ -22,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from study.errors import TransitionError
-from study.files import whole_folder
+from study.files import write_whole
 from study.motion.clip import Clip
 from study.motion.readers.gltf_writing import write_glb
 from study.motion.readers.rigid import unique
@@ -66,12 +65,12 @@ def read_advice(path: Path, said: Any) -> tuple[float, list[Advised]]:
 def export(
     folder: Path, clips: Mapping[str, Clip], shown: Sequence[Clip], advice: Sequence[Advised], table: OneHopTable | None
 ) -> dict[str, Any]:
-    """Write the folder, whole or not at all, and give the state machine.
+    """Write the files, each whole or not at all, and give the state machine.
 
     Parameters
     ----------
     folder
-        It takes the place of one that is there.
+        Other files in it stay, since it may be a game's.
     clips
         The states by name, on one skeleton, at the frame rate of the advice or the table.
     shown
@@ -94,13 +93,12 @@ def export(
     }
     # A line for each key, and for each list of numbers.
     text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda m: f"[{' '.join(m[1].split())}]", json.dumps(machine, indent=1))
-    with whole_folder(folder) as unfinished:
-        write_glb(animations, unfinished / "clips.glb")
-        (unfinished / "state_machine.json").write_text(f"{text}\n", encoding="utf-8")
-        if table is not None:
-            write_table(table, unfinished / "one_hop.bin")
-        for file in sorted((Path(__file__).parent / "importers").iterdir()):
-            shutil.copyfile(file, unfinished / file.name)
+    write_glb(animations, folder / "clips.glb")
+    write_whole(folder / "state_machine.json", f"{text}\n")
+    if table is not None:
+        write_table(table, folder / "one_hop.bin")
+    for file in filter(Path.is_file, (Path(__file__).parent / "importers").iterdir()):
+        write_whole(folder / file.name, file.read_bytes())
     return machine
 
 
