@@ -15,7 +15,7 @@ from study.analysis.registry import ANALYSES, analysis_of
 from study.analysis.study_result import Settings, StudyResult
 from study.analysis.to_json import to_json
 from study.errors import AnalysisError
-from study.models.up_down import UpDown
+from study.models.tracks import Rule
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,8 +47,8 @@ class Decided(Protocol):
         """Points of the scale of each rating study."""
 
     @property
-    def staircases(self) -> Mapping[str, UpDown]:
-        """The rule of each study whose trials were chosen by staircases."""
+    def tracks(self) -> Mapping[str, Rule]:
+        """The rule of each study whose trials were chosen in tracks."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def analyse_folder(
         resamples=resamples,
         margin=decided.equivalence_points / 100.0,
         scale_points=protocol.scale_points,
-        staircases=protocol.staircases,
+        tracks=protocol.tracks,
     )
     rules = rules or rules_of(decided.exclusions)
     return analyse(answers, settings, family=decided.confirmatory or None, rules=rules, checks=checks)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from study.analysis.preference.no_effect import MARGIN
-from study.models.up_down import UpDown
+from study.models.tracks import Rule
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,8 +52,8 @@ class Settings:
     """How far from an even split a preference may lie and count as none; 0.1 is 40 to 60%."""
     scale_points: Mapping[str, int] = field(default_factory=dict)
     """Points of the scale of each rating study, by its name; needed where pairs were rated."""
-    staircases: Mapping[str, UpDown] = field(default_factory=dict)
-    """The rule of each study whose trials were chosen by staircases, by its name."""
+    tracks: Mapping[str, Rule] = field(default_factory=dict)
+    """The rule of each study whose trials were chosen in tracks, by its name."""
 
 
 @dataclass(frozen=True)

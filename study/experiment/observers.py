@@ -15,7 +15,7 @@ from study.experiment.chance import generator
 from study.experiment.protocol.whole import Protocol
 from study.experiment.steps import Step
 from study.models.population import LEAST_CRITERION
-from study.models.up_down import target
+from study.models.up_down import UpDown
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.registry import task_of, task_of_trial
 from study.tasks.trial import Trial
@@ -40,8 +40,9 @@ def truth(protocol: Protocol, settings: ObserverSettings) -> dict[str, Any]:
     for study in protocol.studies:
         task = task_of(study)
         found = task.truth(settings, study, protocol.analysis.threshold)
-        if found is not None and study.procedure.rule is not None:
-            found = {**found, "staircase": task.truth(settings, study, target(study.procedure.rule))}
+        rule = study.procedure.rule_of(study.task)
+        if found is not None and isinstance(rule, UpDown):
+            found = {**found, "staircase": task.truth(settings, study, rule.target)}
         if found is not None:
             studies[study.name] = found
     return {"observer": asdict(settings), "studies": studies}

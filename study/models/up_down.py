@@ -8,12 +8,19 @@ weighted rules make steps up and down of different sizes (Kaernbach 1991). Level
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from study.models.tracks import Found, Rule
 
 
 @dataclass(frozen=True)
-class UpDown:
-    """A rule."""
+class UpDown(Rule):
+    """A rule. A trial that shows no difference moves no staircase."""
+
+    title: ClassVar[str] = "staircase"
 
     start: int
     """Level of the first trial."""
@@ -32,6 +39,47 @@ class UpDown:
     """`reversals`, `trials`: a staircase stops after so many changes of direction, or after so many trials."""
     averaged: int = 6
     """Its threshold is the mean of so many reversals, the last ones."""
+
+    @property
+    def target(self) -> float:
+        """The probability of a right answer at the level around which a staircase settles."""
+        return target(self)
+
+    @property
+    def estimate(self) -> str:
+        """How a staircase's threshold is found."""
+        return f"mean of the last {self.averaged} reversals"
+
+    def begin(self) -> Track:
+        """A staircase at its start."""
+        return Track(self.start)
+
+    def due(self, track: Track) -> int:
+        """Where it stands."""
+        return track.level
+
+    def after(self, track: Track, level: int, right: bool | None) -> Track:
+        """One step from the level that was shown, or none."""
+        return moved(replace(track, level=level), self, right)
+
+    def over(self, track: Track) -> bool:
+        """After its reversals, or its most trials."""
+        return stopped(track, self)
+
+    def asked(self, track: Track) -> int:
+        """All trials so far."""
+        return track.trials
+
+    def found(self, track: Track) -> Found | None:
+        """Mean and standard deviation of the last reversals, once there are as many."""
+        last = track.reversals[-self.averaged :]
+        if len(last) < self.averaged:
+            return None
+        return Found(float(np.mean(last)), float(np.std(last, ddof=1)) if len(last) > 1 else None)
+
+    def turns(self, track: Track) -> int:
+        """Its reversals."""
+        return len(track.reversals)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ EFFECTS: Mapping[str, Make] = {
     "oddity": oddity_effect,
 }
 
-OF_PROCEDURES: Mapping[str, Make] = {"staircase": staircase_effect}
+OF_PROCEDURES: Mapping[str, Make] = {"staircase": staircase_effect, "quest-plus": staircase_effect}
 """By the procedure, where trials depend on the responses."""
 
 

@@ -1,7 +1,7 @@
-"""The effect of a study with staircases: the thresholds that they aim at, to be told with a stated precision.
+"""The effect of a study with staircases or QUEST+: the thresholds of their tracks, to be told with a stated precision.
 
-Participants go through the rule of the study's own procedure, staircase by staircase; the analysis of reversals reads
-their responses as it reads stored ones. How staircases are interleaved changes nothing of what each of them asks.
+Participants go through the rule of the study's own procedure, track by track; the analysis of tracks reads
+their responses as it reads stored ones. How tracks are interleaved changes nothing of what each of them asks.
 """
 
 from __future__ import annotations
@@ -21,12 +21,11 @@ from study.analysis.same_different.staircases import Staircases, staircase_thres
 from study.arrays import BoolArray, FloatArray
 from study.errors import AnalysisError
 from study.experiment.observers import person
-from study.experiment.procedures.staircase import Staircase
+from study.experiment.procedures.interleaved import Interleaving
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.oddity import CHANCE
 from study.models.population import SameDifferentObserver, probability_different, probability_odd_found
-from study.models.up_down import Track, moved, stopped
 from study.power.curve import Run
 from study.power.design import Design, Effect, times
 from study.power.oddity import oddity_observer
@@ -50,10 +49,13 @@ def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: An
     if study.task not in OBSERVERS:
         raise AnalysisError(f"{study.name}: expected one of the tasks {', '.join(OBSERVERS)}, found {study.task!r}")
     precision = options["precision"]
+    rule = study.procedure.rule_of(study.task)
+    assert rule is not None, "the registry asks for studies with tracks"
+    tracks = f"{rule.title}s"
     return Effect(
         **threshold_numbers(OBSERVERS[study.task], options),
-        test="width of the 95% intervals of the staircases' thresholds, Student's t over participants",
-        aim=f"tell the thresholds of the staircases to ± {precision:g} frames",
+        test=f"width of the 95% intervals of the {tracks}' thresholds, Student's t over participants",
+        aim=f"tell the thresholds of the {tracks} to ± {precision:g} frames",
         study=lambda design: staircase_study(design, precision),
         found=lambda analysis: staircases_found(analysis, study.name, precision),
         answers=trials_each,
@@ -72,41 +74,37 @@ def _told(found: Staircases, precision: float) -> bool:
 
 def trials_each(design: Design) -> int:
     """Return how many trials a participant answers on average, those without a difference among them."""
-    procedure = _procedure(design)
     rng = np.random.default_rng(0)
-    moved_by = np.mean([sum(1 for _ in _responses(design, procedure, seed, 0, rng)) for seed in range(100)])
-    every = procedure.catch_every
-    return round(float(moved_by) * (every / (every - 1) if every else 1))
+    return round(float(np.mean([sum(1 for _ in _responses(design, seed, 0, rng)) for seed in range(100)])))
 
 
-def _procedure(design: Design) -> Staircase:
+def _procedure(design: Design) -> Interleaving:
     procedure = design.study.procedure
-    assert isinstance(procedure, Staircase), "the registry asks for studies with staircases"
+    assert isinstance(procedure, Interleaving), "the registry asks for studies with tracks"
     return procedure
 
 
 def staircase_study(design: Design, precision: float) -> Run:
     """Whether the intervals of the staircases' thresholds are as narrow as asked (half their width, in frames)."""
-    procedure = _procedure(design)
+    rule = _procedure(design).rule_of(design.study.task)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
         verdicts = np.zeros((studies, len(sizes)), dtype=bool)
         for number in range(studies):
             seed = int(rng.integers(2**31))
-            parts = [pd.DataFrame(_responses(design, procedure, seed, who, rng)) for who in range(max(sizes))]
+            parts = [pd.DataFrame(_responses(design, seed, who, rng)) for who in range(max(sizes))]
             for place, size in enumerate(sizes):
                 kept, _ = exclude(pd.concat(parts[:size], ignore_index=True), design.rules)
-                verdicts[number, place] = _told(staircase_thresholds(kept, procedure.rule), precision)
+                verdicts[number, place] = _told(staircase_thresholds(kept, rule), precision)
         return verdicts
 
     return run
 
 
-def _responses(
-    design: Design, procedure: Staircase, seed: int, who: int, rng: np.random.Generator
-) -> Iterator[dict[str, object]]:
-    """The rows of one participant's responses, staircase after staircase."""
-    name, rule = f"power-{who:03}", procedure.rule
+def _responses(design: Design, seed: int, who: int, rng: np.random.Generator) -> Iterator[dict[str, object]]:
+    """The rows of one participant's responses, track after track, with those without a difference among them."""
+    name, procedure = f"power-{who:03}", _procedure(design)
+    rule = procedure.rule_of(design.study.task)
     observer = person(design.settings, name, seed).settings.same_different
     probability, hardest = RIGHT[design.study.task]
     course = next(course for course in design.plans[who].courses if course.study == design.study.name)
@@ -114,20 +112,31 @@ def _responses(
 
     @cache
     def right_at(difference: int) -> float:
-        return float(probability(observer, np.array(float(difference))))
+        """Without a difference the right answer is that there is none."""
+        share = float(probability(observer, np.array(float(difference))))
+        return share if difference else 1 - share
+
+    def row(motion: str, repeat: int, difference: int) -> dict[str, object]:
+        share = right_at(difference)
+        response_s, given = times(design, rng, np.array(abs(share - hardest) / (1 - hardest)))
+        return {
+            "participant": name, "motion": motion, "repeat": repeat, "difference_frames": difference,
+            "answer": "given" if given else None, "correct": bool(rng.random() < share) if given else None,
+            "response_s": float(response_s) if given else np.nan, "shown_well": True,
+        }  # fmt: skip
 
     trial = 0
     for repeat in range(1, course.repeats + 1):
         for motion, longer in sorted(asked):
-            track, sign = Track(rule.start), SIGNS["longer" if longer else "shorter"]
-            while not stopped(track, rule):
-                share = right_at(sign * track.level)
-                response_s, given = times(design, rng, np.array(abs(share - hardest) / (1 - hardest)))
-                right = bool(rng.random() < share) if given else None
+            track, sign = rule.begin(), SIGNS["longer" if longer else "shorter"]
+            while not rule.over(track):
                 trial += 1
-                yield {
-                    "participant": name, "trial": trial, "motion": motion, "repeat": repeat,
-                    "difference_frames": sign * track.level, "answer": "given" if given else None,
-                    "correct": right, "response_s": float(response_s) if given else np.nan, "shown_well": True,
-                }  # fmt: skip
-                track = moved(track, rule, right)
+                if procedure.catch_every and trial % procedure.catch_every == 0:
+                    response = row(motion, 1, 0)
+                    if response["correct"] is not None:
+                        track = rule.beside(track, bool(response["correct"]))
+                else:
+                    level = rule.due(track)
+                    response = row(motion, repeat, sign * level)
+                    track = rule.after(track, level, response["correct"])  # type: ignore[arg-type]
+                yield {**response, "trial": trial}

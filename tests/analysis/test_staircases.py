@@ -116,7 +116,8 @@ def test_runs_that_stopped_early_have_no_threshold_and_it_is_said() -> None:
     assert [one.frames is None for one in found.runs].count(True) == 1
     threshold = found.thresholds["longer"]
     assert (threshold.status, threshold.standard_error) == ("reached", None)
-    assert threshold.note == "one participant: no spread to estimate; 1 of 2 staircases stopped before 6 reversals"
+    early = "stopped too early for the mean of the last 6 reversals"
+    assert threshold.note == f"one participant: no spread to estimate; 1 of 2 staircases {early}"
     none = staircase_thresholds(table_of({("p2", "walk", 1): [(20, "different")] * 3}), RULE)
     assert none.thresholds["longer"].frames is None
-    assert "nothing (1 of 1 staircase stopped before 6 reversals)" in none.in_words()
+    assert f"nothing (1 of 1 staircase {early})" in none.in_words()

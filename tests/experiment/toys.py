@@ -214,13 +214,23 @@ most_trials = 14
 catch_every = 4
 """
 
+QUEST = """
+[studies.procedure]
+name = "quest-plus"
+most_frames = 8
+threshold_frames = 4.0
+narrow = 2.5
+least_trials = 4
+most_trials = 9
+"""
 
-def with_staircases(text: str = TOY_PROTOCOL, keys: str = "") -> str:
-    """A protocol's text with staircases in place of the differences of its study `jnd`."""
+
+def with_staircases(text: str = TOY_PROTOCOL, keys: str = "", table: str = STAIRCASE) -> str:
+    """A protocol's text with staircases, or another procedure, in place of the differences of its study `jnd`."""
     text = text.replace('differences_frames = [-3, 0, 5]\norder = "both"\n', keys)
     head, study = text.split('name = "jnd"', 1)
     own, *others = study.split("\n[[studies]]")
-    return "\n[[studies]]".join([f'{head}name = "jnd"{own}{STAIRCASE}', *others])
+    return "\n[[studies]]".join([f'{head}name = "jnd"{own}{table}', *others])
 
 
 TOY_PAIR_RATING = """

@@ -83,7 +83,7 @@ class Oddity:
             f"The odd one of three was found in {best.percent:.0f}% of the trials at {best.difference_frames:+d} "
             f"frames, where chance gives {100 * CHANCE:.0f}%."
         ]
-        told += [self.staircases.in_words("right")] if self.staircases else []
+        told += [self.staircases.in_words()] if self.staircases else []
         return [*told, *(f"Blends that are {side}: {found.answer}" for side, found in self.functions.items())]
 
 
@@ -119,8 +119,8 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
         own = trials[trials["difference_frames"].astype(float) * SIGNS[side] > 0]
         if len(own):
             functions[side] = analyse_psychometric(own, model, confidence=settings.confidence)
-    rule = settings.staircases.get(name)
-    staircases = None if rule is None else staircase_thresholds(answers, rule, settings.confidence)
+    rule = settings.tracks.get(name)
+    staircases = None if rule is None else staircase_thresholds(answers, rule, settings.confidence, "right")
     return Oddity(tuple(_levels(trials, settings.confidence)), functions, staircases)
 
 

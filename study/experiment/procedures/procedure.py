@@ -16,7 +16,7 @@ from typing import Protocol as Shape
 
 import numpy as np
 
-from study.models.up_down import UpDown
+from study.models.tracks import Rule
 from study.tasks.answer import Answer
 from study.tasks.task import Asked
 from study.tasks.trial import Pair, Trial
@@ -91,9 +91,9 @@ class Settings(ABC):
     title: ClassVar[str]
     sources: ClassVar[tuple[str, ...]] = ()
 
-    @property
-    def rule(self) -> UpDown | None:
-        """The rule by which it goes up and down, so that the analysis can follow it; None for other procedures."""
+    def rule_of(self, task: str) -> Rule | None:
+        """The rule of its tracks in a study with this task, so that the analysis can follow it; None without tracks."""
+        del task
         return None
 
     def problems(self, asked: Asked) -> Iterator[tuple[str, str]]:

@@ -8,10 +8,11 @@ from typing import Any
 
 from study.experiment.procedures.constant_stimuli import Constant
 from study.experiment.procedures.procedure import Course, Settings
+from study.experiment.procedures.quest_plus import Quest
 from study.experiment.procedures.staircase import Staircase
 from study.tasks.trial import Pair
 
-PROCEDURES: Mapping[str, type[Settings]] = {member.name: member for member in (Constant, Staircase)}
+PROCEDURES: Mapping[str, type[Settings]] = {member.name: member for member in (Constant, Staircase, Quest)}
 
 
 def course_to_json(course: Course) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from study.experiment.protocol.methods import OwnMethod
 from study.experiment.protocol.stimuli import Points, Screen, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Listed, Part, Slug, Texts
-from study.models.up_down import UpDown
+from study.models.tracks import Rule
 from study.tasks.registry import task_of
 from study.transitions.methods.method import Method
 from study.transitions.methods.registry import METHODS
@@ -112,9 +112,10 @@ class Content(Part):
         return round(self.stimuli.exit_s * self.fps)
 
     @property
-    def staircases(self) -> dict[str, UpDown]:
-        """The rule of each study whose procedure goes up and down, by its name."""
-        return {study.name: rule for study in self.studies if (rule := study.procedure.rule) is not None}
+    def tracks(self) -> dict[str, Rule]:
+        """The rule of each study whose procedure has tracks, by its name."""
+        rules = {study.name: study.procedure.rule_of(study.task) for study in self.studies}
+        return {name: rule for name, rule in rules.items() if rule is not None}
 
     @property
     def scale_points(self) -> dict[str, int]:

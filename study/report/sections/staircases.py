@@ -1,4 +1,4 @@
-"""Staircases on the page, for any task that they run: their tracks as small multiples, and a table of them all."""
+"""Tracks on the page, of staircases and of QUEST+: their courses as small multiples, and a table of them all."""
 
 from __future__ import annotations
 
@@ -22,25 +22,26 @@ MOST_DRAWN = 40
 
 
 def staircase_table(name: str, found: Staircases) -> Table:
-    """Return every staircase."""
+    """Return every track."""
+    reversals, interval = ("reversals ", "") if found.averaged else ("", " low high")
     return make(
         f"{name}_staircases",
-        f"Every staircase: mean and standard deviation of its last {found.averaged} reversals, in frames. A dash where "
-        "it stopped before it had as many.",
-        "participant motion side repeat trials reversals frames spread",
+        f"Every {found.title}: the {found.estimate}, in frames. A dash where it stopped too early for it.",
+        f"participant motion side repeat trials {reversals}frames spread{interval}",
         [{**vars(run), "motion": words.readable(run.motion)} for run in found.runs],
         headings={"spread": "standard deviation"},
     )
 
 
 def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
-    """Draw the difference that each trial of each staircase showed, participant by participant."""
+    """Draw the difference that each trial of each track showed, participant by participant."""
     people = sorted({run.participant for run in found.runs})
     drawn = people[:MOST_DRAWN]
     of_all = "" if drawn == people else f" The first {len(drawn)} of {counted(len(people), 'participant')} are drawn."
+    points = "Points are reversals; the dashed lines are" if found.averaged else "The dashed lines are"
     caption = (
-        "The course of every staircase: the difference from k in each of its trials. Points are reversals; the dashed "
-        f"lines are the mean of the last {found.averaged}, over the staircases of a participant and a side.{of_all}"
+        f"The course of every {found.title}: the difference from k in each of its trials. {points} the "
+        f"{found.estimate}, over all of a participant and a side.{of_all}"
     )
     columns = min(len(drawn), COLUMNS)
     lines = -(-len(drawn) // columns)
@@ -54,7 +55,7 @@ def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
         for axes in grid.flat[max(len(drawn) - columns, 0) : len(drawn)]:
             axes.tick_params(labelbottom=True)
             axes.set_xlabel("trial")
-        svg = to_svg(figure, f"study-{name}-tracks", "The course of every staircase", _spoken(drawn, found), mark)
+        svg = to_svg(figure, f"study-{name}-tracks", f"The course of every {found.title}", _spoken(drawn, found), mark)
     return Drawing(f"{name}_tracks", svg, caption)
 
 
@@ -77,6 +78,7 @@ def _spoken(people: Sequence[str], found: Staircases) -> str:
     for participant in people:
         runs = [run for run in found.runs if run.participant == participant]
         trials, turns = sum(run.trials for run in runs), sum(run.reversals for run in runs)
-        told = counted(len(runs), "staircase"), counted(trials, "trial"), counted(turns, "reversal")
+        told = [counted(len(runs), found.title), counted(trials, "trial")]
+        told += [counted(turns, "reversal")] if found.averaged else []
         parts.append(f"{participant}: {', '.join(told)}")
     return "; ".join(parts)

@@ -38,10 +38,10 @@ def line_of(text: str, beginning: str) -> int:
             "[studies.procedure]",
             "start_frames: expected this key, found",
         ),
-        ("", '"staircase"', '"stairs"', "name = ", "expected 'constant' or 'staircase', found 'stairs'"),
+        ("", '"staircase"', '"stairs"', "name = ", "expected 'constant' or 'staircase' or 'quest-plus', found"),
         ("", "averaged = 2", "averaged = 4", "averaged", "expected at most the 3 reversals, found 4; lower it"),
         ("differences_frames = [1]\n", "", "", "differences_frames", "expected no differences_frames with 'staircase'"),
-        ('order = "both"\n', "", "", "order", "expected 'random' or 'by-group' with staircases"),
+        ('order = "both"\n', "", "", "order", "expected 'random' or 'by-group' with 'staircase'"),
         ("attention_checks = 1\n", "", "", "attention_checks", "catch_every tells who looks; remove it"),
     ],
 )
@@ -58,7 +58,7 @@ def test_what_does_not_fit_is_refused_at_its_line(keys: str, old: str, new: str,
 
 def test_only_studies_of_differences_have_staircases() -> None:
     table = '\n[studies.procedure]\nname = "staircase"\nstart_frames = 3\nmost_frames = 5\n'
-    with pytest.raises(ProtocolError, match=r"expected a same-different.* task with staircases in the study 'liking'"):
+    with pytest.raises(ProtocolError, match=r"expected a same-different.* task with 'staircase' in the study 'liking'"):
         parse_protocol(with_staircases() + table)
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from toys import STAIRCASE, TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
+from toys import QUEST, STAIRCASE, TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
 
 from study.experiment.observers import person, respond
 from study.experiment.plan import draw_plan, plan_from_json
@@ -21,7 +21,7 @@ from study.experiment.simulation import simulate
 from study.experiment.store.responses import open_responses
 from study.tasks.observer import default_observer
 
-EXAMPLES = {"constant": TOY_PROTOCOL, "staircase": with_staircases()}
+EXAMPLES = {"constant": TOY_PROTOCOL, "staircase": with_staircases(), "quest-plus": with_staircases(table=QUEST)}
 """A protocol whose study `jnd` is run by each procedure."""
 
 

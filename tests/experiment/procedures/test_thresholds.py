@@ -71,7 +71,9 @@ def test_the_answer_and_the_report_say_which_threshold_is_which(found: SameDiffe
     assert len(tables["jnd_staircases"].rows) == 48
     tracks = next(drawing for drawing in section.drawings if drawing.name == "jnd_tracks")
     assert tracks.svg.count(" reversals") == 24  # each participant is read out
-    assert section.notes[0].startswith("Trials were chosen by staircases that aim at 70.7% “different”.")
+    assert section.notes[0].startswith(
+        "Trials were chosen by staircases. Their threshold is where 70.7% of the responses are “different”: the mean"
+    )
 
 
 def test_json_has_the_staircases_and_constant_stimuli_have_none() -> None:

@@ -42,7 +42,7 @@ def oddity_section(result: Oddity, about: About) -> Section | None:
         ),
         tables=(_levels_table(name, result), _threshold_table(name, result, about.fps), *known),
         notes=(
-            *([result.staircases.in_words("right")] if result.staircases else []),
+            *([result.staircases.in_words()] if result.staircases else []),
             *(f"Blends that are {side}: {found.answer}" for side, found in result.functions.items()),
         ),
         folded=(staircase_table(name, result.staircases),) if result.staircases else (),

@@ -1,0 +1,105 @@
+"""QUEST+: each trial asks the difference whose answer is expected to tell most of the threshold (Watson 2017)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from annotated_types import Ge, Gt, Le
+
+from study.experiment.procedures.interleaved import Interleaving
+from study.models.quest_plus import QuestRule
+from study.settings import SettingsError, required, setting
+
+
+@dataclass(frozen=True)
+class Quest(Interleaving):
+    """The keys of `[studies.procedure]` with `name = "quest-plus"`."""
+
+    name: ClassVar[str] = "quest-plus"
+    title: ClassVar[str] = "QUEST+"
+    sources: ClassVar[tuple[str, ...]] = (
+        "Watson, A. B. (2017). QUEST+: A general multidimensional Bayesian adaptive psychometric method. Journal of "
+        "Vision, 17(3):10, 1–27.",
+    )
+
+    most_frames: Annotated[int, Ge(1), Le(400)] = required("Largest difference that is shown. [frames]")
+    least_frames: Annotated[int, Ge(1), Le(400)] = setting(1, "Smallest difference that is shown. [frames]")
+    step_frames: Annotated[int, Ge(1), Le(400)] = setting(
+        1, "From one difference that may be shown to the next; every one is a stimulus to render. [frames]"
+    )
+    threshold_frames: Annotated[float, Gt(0), Le(400)] = setting(
+        8.0, "Prior of the threshold: its median. In a same-different study the threshold is criterion-free. [frames]"
+    )
+    threshold_spread: Annotated[float, Ge(0.1), Le(3)] = setting(
+        0.8, "Prior of the threshold: standard deviation of its natural logarithm; 0.7 is a factor of two."
+    )
+    criterion: Annotated[float, Gt(0), Le(10)] = setting(
+        2.0, "Prior of a same-different criterion: its mean, in standard deviations of one percept."
+    )
+    criterion_spread: Annotated[float, Ge(0.05), Le(5)] = setting(
+        1.0, "Prior of a same-different criterion: its standard deviation."
+    )
+    most_lapses: Annotated[float, Ge(0.001), Le(0.5)] = setting(
+        0.1, "Prior of the lapse rate: all values up to this one are as likely."
+    )
+    side: Literal["both", "shorter", "longer"] = setting("both", "Which blends are compared with the reference.")
+    narrow: Annotated[float, Ge(1), Le(100)] = setting(
+        1.0,
+        "A track stops once the upper end of its threshold's 95% interval is at most so many times the lower; 1 for "
+        "never.",
+    )
+    least_trials: Annotated[int, Ge(1), Le(1000)] = setting(12, "Trials before which no track stops. [trials]")
+    most_trials: Annotated[int, Ge(2), Le(1000)] = setting(40, "Trials after which a track stops. [trials]")
+    catch_every: Annotated[int, Ge(0), Le(1000)] = setting(
+        4, "One trial in this number shows no difference; 0 for none. [trials]"
+    )
+
+    def __post_init__(self) -> None:
+        if self.least_frames > self.most_frames:
+            raise SettingsError(
+                "least_frames", f"expected at most most_frames, {self.most_frames}, found {self.least_frames}; lower it"
+            )
+        if self.least_trials > self.most_trials:
+            raise SettingsError(
+                "least_trials", f"expected at most most_trials, {self.most_trials}, found {self.least_trials}; lower it"
+            )
+        if self.catch_every == 1:
+            raise SettingsError(
+                "catch_every", "expected 0 or 2 and more, found 1, which leaves no other trial; raise it"
+            )
+
+    def levels(self) -> tuple[int, ...]:
+        """All differences, the largest among them."""
+        stepped = range(self.least_frames, self.most_frames, self.step_frames)
+        return (*stepped, self.most_frames)
+
+    def fewest(self) -> int:
+        """The trials of a track that soon knows enough."""
+        return self.least_trials if self.narrow > 1 else self.most_trials
+
+    def rule_of(self, task: str) -> QuestRule:
+        """The rule of its tracks."""
+        return QuestRule(
+            task,
+            self.levels(),
+            self.threshold_frames,
+            self.threshold_spread,
+            self.criterion,
+            self.criterion_spread,
+            self.most_lapses,
+            self.least_trials,
+            self.most_trials,
+            self.narrow,
+        )
+
+    def in_words(self) -> str:
+        """What is varied, the priors, and when a track stops."""
+        stops = f"after {self.most_trials} trials"
+        if self.narrow > 1:
+            stops = f"once the 95% interval of its threshold was narrower than a factor of {self.narrow:g}, or {stops}"
+        return (
+            f"QUEST+ with {self.range_in_words()}, a log-normal prior of the threshold (median "
+            f"{self.threshold_frames:g} frames, standard deviation {self.threshold_spread:g} in natural logarithms), "
+            f"and criterion and lapse rate as nuisance parameters; each track stopped {stops}"
+        )

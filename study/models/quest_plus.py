@@ -1,0 +1,225 @@
+"""QUEST+: after each answer, ask the level whose answer is expected to tell most about the parameters (Watson 2017).
+
+A grid of parameters, a prior over it and the chance of a "yes" at each level and point come in; counts of answers give
+the posterior, and the posterior gives the next level. Watson asks for the least expected entropy of the posterior. That
+is the level with the most mutual information between its answer and the parameters, the entropy of the answer less its
+mean entropy at each point, which takes two products of a matrix and a vector instead of a posterior for every answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from study.arrays import FloatArray, IntArray
+from study.models.differencing import criterion_free_delta, detected
+from study.models.oddity import CHANCE, HALFWAY, d_prime_of, oddity_correct
+from study.models.population import LEAST_CRITERION
+from study.models.tracks import Found, Rule
+
+TINY = 1e-12
+
+ROUNDED = 10
+"""Digits of the information that count: levels that tell the same, but for rounding, are alike on every machine."""
+
+
+@dataclass(frozen=True, eq=False)
+class QuestPlus:
+    """What is asked and what may be true: levels, and a grid of parameters."""
+
+    axes: tuple[FloatArray, ...]
+    """The values of each parameter; a point of the grid is one of each, the last axis changing fastest."""
+    chances: FloatArray
+    """`(levels, points)`: probability of a "yes" at each level and point, above 0 and below 1."""
+    prior: FloatArray
+    """`(points,)`: adds to one."""
+
+    @cached_property
+    def _logs(self) -> tuple[FloatArray, FloatArray]:
+        return np.log(self.chances), np.log1p(-self.chances)
+
+    @cached_property
+    def _entropies(self) -> FloatArray:
+        return entropy(self.chances)
+
+    def posterior(self, yes: IntArray, no: IntArray) -> FloatArray:
+        """Return the mass at each point, shape (points,), after so many answers at each level, shape (levels,)."""
+        with np.errstate(divide="ignore"):
+            log = np.log(self.prior) + yes @ self._logs[0] + no @ self._logs[1]
+        mass = np.exp(log - log.max())
+        return np.asarray(mass / mass.sum())
+
+    def information(self, posterior: FloatArray) -> FloatArray:
+        """Return what an answer at each level is expected to tell of the parameters, in nats, shape (levels,)."""
+        return entropy(self.chances @ posterior) - self._entropies @ posterior
+
+    def information_on(self, axis: int, posterior: FloatArray) -> FloatArray:
+        """Return what an answer is expected to tell of one parameter, whatever it tells of the others (Prins 2013)."""
+        joint = (self.chances * posterior).reshape(len(self.chances), *map(len, self.axes))
+        others = tuple(place + 1 for place in range(len(self.axes)) if place != axis)
+        mass = self.marginal(posterior, axis)
+        yes = joint.sum(axis=others) / np.maximum(mass, TINY)
+        return entropy(yes @ mass) - entropy(yes) @ mass
+
+    def next_level(self, posterior: FloatArray) -> int:
+        """Return the number of the level to ask; of several that tell as much, the first."""
+        return int(np.argmax(np.round(self.information(posterior), ROUNDED)))
+
+    def marginal(self, posterior: FloatArray, axis: int) -> FloatArray:
+        """Return the mass at each value of one parameter."""
+        shape = tuple(len(values) for values in self.axes)
+        others = tuple(place for place in range(len(shape)) if place != axis)
+        return np.asarray(posterior.reshape(shape).sum(axis=others))
+
+
+def entropy(yes: FloatArray) -> FloatArray:
+    """Return the entropy in nats of an answer that is "yes" with this probability."""
+    yes = np.clip(yes, TINY, 1 - TINY)
+    return -(yes * np.log(yes) + (1 - yes) * np.log1p(-yes))
+
+
+def quantiles(values: FloatArray, mass: FloatArray, shares: FloatArray) -> FloatArray:
+    """Return where a marginal has come to each share, linear between the middles of its steps."""
+    return np.interp(shares, np.cumsum(mass) - mass / 2, values)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Where a track of QUEST+ stands: answers right and wrong at each level, those without a difference first."""
+
+    right: tuple[int, ...]
+    wrong: tuple[int, ...]
+    trials: int = 0
+    """Of its own, those without an answer among them."""
+
+
+@dataclass(frozen=True)
+class QuestRule(Rule):
+    """QUEST+ over differences of blend length, in a task with a model of deciding.
+
+    The threshold is sought, criterion and lapse rate are nuisances that are summed over. Trials that show no difference
+    tell of the nuisances, and count for every track of a participant.
+    """
+
+    title: ClassVar[str] = "QUEST+ track"
+    task: str
+    """`same-different`: the differencing model; the threshold is criterion-free. `oddity`: which of three differs."""
+    levels: tuple[int, ...]
+    """The differences that may be asked, in frames, from the least."""
+    threshold_frames: float
+    threshold_spread: float
+    """`threshold_frames`, `threshold_spread`: median of the prior, and standard deviation of the natural logarithm."""
+    criterion: float
+    criterion_spread: float
+    """`criterion`, `criterion_spread`: mean and standard deviation of the prior, for same-different."""
+    most_lapses: float
+    """Lapse rates up to this are as likely as one another."""
+    least_trials: int
+    trials: int
+    narrow: float
+    """`least_trials`, `trials`, `narrow`: a track stops after at least and at most so many trials, between them once
+    the upper end of its threshold's 95% interval is at most so many times the lower; 1 for never."""
+
+    @property
+    def target(self) -> float:
+        """Half of the way from chance to never wrong."""
+        return TARGETS[self.task]
+
+    @property
+    def estimate(self) -> str:
+        """How a track's threshold is found."""
+        return "median of the posterior"
+
+    def meaning(self, right: str) -> str:
+        """What holds at the threshold: in same-different, whatever a participant's own criterion is."""
+        if self.task == "oddity":
+            return super().meaning(right)
+        return f"an observer with the best criterion would be right in {100 * self.target:.0f}% of the pairs"
+
+    def begin(self) -> Asked:
+        """Nothing was asked."""
+        none = (0,) * (len(self.levels) + 1)
+        return Asked(none, none)
+
+    def due(self, track: Asked) -> int:
+        """The level that is expected to tell most."""
+        return _summary(self, track.right, track.wrong)[0]
+
+    def after(self, track: Asked, level: int, right: bool | None) -> Asked:
+        """One answer more at this level."""
+        place = self.levels.index(level) + 1
+        return replace(self._counted(track, place, right), trials=track.trials + 1)
+
+    def beside(self, track: Asked, right: bool) -> Asked:
+        """One answer more where there was no difference."""
+        return self._counted(track, 0, right)
+
+    def _counted(self, track: Asked, place: int, right: bool | None) -> Asked:
+        if right is None:
+            return track
+        counts = list(track.right if right else track.wrong)
+        counts[place] += 1
+        return replace(track, right=tuple(counts)) if right else replace(track, wrong=tuple(counts))
+
+    def over(self, track: Asked) -> bool:
+        """After its most trials, or once it knows enough."""
+        if track.trials >= self.trials or track.trials < self.least_trials:
+            return track.trials >= self.trials
+        found = self.found(track)
+        return (found.high or np.inf) <= self.narrow * (found.low or 0.0)
+
+    def asked(self, track: Asked) -> int:
+        """All trials of its own so far."""
+        return track.trials
+
+    def found(self, track: Asked) -> Found:
+        """Median, standard deviation and 95% interval of the posterior of the threshold."""
+        return _summary(self, track.right, track.wrong)[1]
+
+
+TARGETS = {"same-different": 0.75, "oddity": HALFWAY}
+"""The share of right answers at threshold: of an observer with the best criterion, in same-different."""
+
+THRESHOLDS, CRITERIA, LAPSES = 41, 15, 4
+WIDE = 3.0
+ENDS = np.array([0.025, 0.5, 0.975])
+
+
+@lru_cache(maxsize=64)
+def _grid(rule: QuestRule) -> QuestPlus:
+    """The grid of a rule: the logarithm of the threshold, the criterion where there is one, the lapse rate."""
+    steps = np.linspace(-WIDE, WIDE, THRESHOLDS)
+    logs = np.log(rule.threshold_frames) + rule.threshold_spread * steps
+    lapses = rule.most_lapses * (np.arange(LAPSES) + 0.5) / LAPSES
+    criteria = np.maximum(rule.criterion + rule.criterion_spread * np.linspace(-2.5, 3.0, CRITERIA), LEAST_CRITERION)
+    if rule.task == "oddity":
+        criteria = np.array([rule.criterion])
+    threshold, criterion, lapse = (part.ravel() for part in np.meshgrid(np.exp(logs), criteria, lapses, indexing="ij"))
+    frames = np.array([0, *rule.levels], dtype=np.float64)[:, None]
+    if rule.task == "oddity":
+        d_prime = d_prime_of(HALFWAY)
+        assert d_prime is not None
+        right = lapse * CHANCE + (1 - lapse) * oddity_correct(d_prime * frames / threshold)
+    else:
+        delta = criterion_free_delta(TARGETS[rule.task]) * frames / threshold
+        right = lapse / 2 + (1 - lapse) * detected(delta, criterion)
+        right[0] = 1 - right[0]
+    prior = np.exp(-0.5 * (((np.log(threshold) - logs.mean()) / rule.threshold_spread) ** 2))
+    prior *= np.exp(-0.5 * ((criterion - rule.criterion) / rule.criterion_spread) ** 2)
+    return QuestPlus((logs, criteria, lapses), np.clip(right, 1e-9, 1 - 1e-9), prior / prior.sum())
+
+
+@lru_cache(maxsize=20_000)
+def _summary(rule: QuestRule, right: tuple[int, ...], wrong: tuple[int, ...]) -> tuple[int, Found]:
+    """The level to ask next, and the threshold so far: remembered, since a session is folded anew at each answer."""
+    quest = _grid(rule)
+    posterior = quest.posterior(np.array(right), np.array(wrong))
+    told = np.round(quest.information_on(0, posterior)[1:], ROUNDED)
+    mass = quest.marginal(posterior, 0)
+    low, middle, high = np.exp(quantiles(quest.axes[0], mass, ENDS))
+    frames = np.exp(quest.axes[0])
+    spread = float(np.sqrt(mass @ frames**2 - (mass @ frames) ** 2))
+    return rule.levels[int(np.argmax(told))], Found(float(middle), spread, float(low), float(high))

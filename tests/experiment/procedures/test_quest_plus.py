@@ -1,0 +1,157 @@
+"""QUEST+ in a session, answered by observers who share no code with it: two percepts with noise, and a criterion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from study.experiment.procedures.interleaved import Interleaved
+from study.experiment.procedures.procedure import Course
+from study.experiment.procedures.quest_plus import Quest
+from study.experiment.protocol.errors import KeyMismatchError
+from study.experiment.protocol.studies import procedure_of
+from study.models.quest_plus import Asked
+from study.tasks.answer import Answer
+from study.tasks.trial import Pair, Trial
+
+SETTINGS = Quest(most_frames=40)
+
+
+def begun(
+    settings: Quest, seed: int, task: str = "same-different", motions: tuple[str, ...] = ("walk",)
+) -> Interleaved:
+    slots = ((0, 1), (1, 0)) if task == "same-different" else ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    pairs = tuple(
+        Pair(
+            f"jnd/{motion}/{level:+d}",
+            "jnd",
+            task,
+            motion,
+            motion,
+            (f"{motion}-k", f"{motion}{level:+d}"),
+            ("g", "g"),
+            level,
+        )
+        for motion in motions
+        for level in settings.differences()
+    )
+    course = Course("jnd", 1, settings.trials(len(motions), 1)[1], settings, pairs, slots, 1)
+    return settings.begun(course, np.random.default_rng(seed))
+
+
+def best_share(delta: float) -> float:
+    """The share of right answers of an observer with the best criterion, half of whose pairs differ by `delta`."""
+    criteria = np.linspace(0, 8, 4001)
+    hits = norm.cdf((delta - criteria) / 2**0.5) + norm.cdf((-delta - criteria) / 2**0.5)
+    return float(0.5 + 0.5 * (hits - 2 * norm.cdf(-criteria / 2**0.5)).max())
+
+
+DELTA = brentq(lambda delta: best_share(delta) - 0.75, 0.5, 5)
+
+
+class Observer:
+    """Takes the difference of two noisy percepts; each frame adds so much that the threshold is at `frames`."""
+
+    def __init__(self, rng: np.random.Generator, frames: dict[bool, float], criterion: float, lapse: float) -> None:
+        self.rng, self.frames, self.criterion, self.lapse = rng, frames, criterion, lapse
+
+    def __call__(self, trial: Trial) -> str:
+        difference = trial.difference_frames or 0
+        apart = DELTA * abs(difference) / self.frames[difference > 0]
+        first, second = self.rng.normal([0, apart])
+        if self.rng.random() < self.lapse:
+            return ("same", "different")[int(self.rng.integers(2))]
+        return "different" if abs(first - second) > self.criterion else "same"
+
+
+def run(procedure: Interleaved, observer: Observer) -> list[Answer]:
+    answers: list[Answer] = []
+    while due := procedure.next(answers):
+        answers.append(Answer(due[0].trial, "", 1, observer(due[0]), 1.0))
+    return answers
+
+
+def tracks(procedure: Interleaved, answers: list[Answer]) -> dict[bool, Asked]:
+    return {key.longer: track for key, track in procedure._tracks(answers).items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("criterion", "lapse"), [(1.2, 0.02), (2.0, 0.0), (2.0, 0.1), (2.8, 0.02)])
+def test_thresholds_are_found_and_their_intervals_hold_them(criterion: float, lapse: float) -> None:
+    """Over 250 people, two thresholds each, whose criterion and lapses are not the prior's."""
+    ratios, held = [], []
+    for seed in range(250):
+        rng = np.random.default_rng([seed, 11])
+        frames = {longer: 8 * float(np.exp(0.5 * rng.standard_normal())) for longer in (False, True)}
+        procedure = begun(SETTINGS, seed)
+        for longer, track in tracks(procedure, run(procedure, Observer(rng, frames, criterion, lapse))).items():
+            found = procedure.rule.found(track)
+            assert found is not None
+            assert found.low is not None
+            assert found.high is not None
+            ratios.append(found.frames / frames[longer])
+            held.append(found.low <= frames[longer] <= found.high)
+    assert np.median(ratios) == pytest.approx(1, abs=0.1)
+    assert 0.93 <= np.mean(held) <= 0.99
+
+
+def test_the_same_answers_give_the_same_trials_from_any_place_on() -> None:
+    procedure = begun(replace(SETTINGS, narrow=2.0), 4, motions=("walk", "run"))
+    observer = Observer(np.random.default_rng(4), {False: 6.0, True: 10.0}, 2.0, 0.02)
+    answers = run(procedure, observer)
+    again = begun(replace(SETTINGS, narrow=2.0), 4, motions=("walk", "run"))
+    for place in range(0, len(answers) - 1, 5):
+        (trial,) = again.next(answers[:place])
+        assert trial.trial == answers[place].trial
+        assert again.next(answers[: place + 1])[0] in again.candidates(answers[:place])
+    assert again.next(answers) == ()
+    assert again.progress(answers)[0] == again.progress(answers)[1]
+
+
+def test_a_track_stops_when_it_knows_enough_and_not_before_its_least_trials() -> None:
+    settings = replace(SETTINGS, narrow=2.0, least_trials=15, most_trials=200)
+    procedure = begun(settings, 1)
+    answers = run(procedure, Observer(np.random.default_rng(1), {False: 5.0, True: 12.0}, 2.0, 0.0))
+    for track in tracks(procedure, answers).values():
+        found = procedure.rule.found(track)
+        assert found is not None
+        assert found.low is not None
+        assert found.high is not None
+        assert found.high <= 2.0 * found.low
+        assert 15 <= track.trials < 200
+
+
+def test_trials_without_a_difference_tell_every_track_and_missed_ones_none() -> None:
+    procedure = begun(replace(SETTINGS, catch_every=2), 7)
+    answers: list[Answer] = []
+    while len(answers) < 30:
+        (trial,) = procedure.next(answers)
+        answers.append(Answer(trial.trial, "", 1, None if len(answers) % 3 == 0 else "different", 1.0))
+    kinds = [procedure._due(procedure._tracks(answers[:n]), n)[1].difference_frames for n in range(30)]
+    same = sum(not kind and answers[n].value is not None for n, kind in enumerate(kinds))
+    assert same > 5
+    for track in tracks(procedure, answers).values():
+        assert (track.wrong[0], track.right[0]) == (same, 0)
+    told = sum(sum(track.right) + sum(track.wrong[1:]) for track in tracks(procedure, answers).values())
+    assert told == sum(bool(kind) and answers[n].value is not None for n, kind in enumerate(kinds))
+
+
+def test_settings_say_what_is_wrong() -> None:
+    table = {"name": "quest-plus", "most_frames": 40}
+    assert procedure_of(table) == SETTINGS
+    assert SETTINGS.levels() == tuple(range(1, 41))
+    assert replace(SETTINGS, least_frames=2, step_frames=5, most_frames=20).levels() == (2, 7, 12, 17, 20)
+    for bad, key, words in (
+        ({"least_frames": 50}, "least_frames", "at most most_frames, 40, found 50"),
+        ({"least_trials": 50}, "least_trials", "at most most_trials, 40, found 50"),
+        ({"catch_every": 1}, "catch_every", "leaves no other trial"),
+        ({"narrow": 0.5}, "narrow", "expected at least 1"),
+        ({"threshold_frames": 0}, "threshold_frames", "expected above 0"),
+    ):
+        with pytest.raises(KeyMismatchError, match=words) as raised:
+            procedure_of(table | bad)
+        assert raised.value.location[0] == key
