@@ -3,6 +3,7 @@
     python benchmarks/figure_sizes.py                                  every protocol of protocols/, synthetic motions
     python benchmarks/figure_sizes.py --library path/to/cmu demo       one protocol on a library of files
     python benchmarks/figure_sizes.py --sheets folder                  one picture a protocol: a row for each transition
+    python benchmarks/figure_sizes.py transitions_today --sheets folder --transition walk_run       a row for each film
 
 Every frame of every film is drawn at a quarter of its size. Rows and columns that differ from the background are the
 figure; the camera's own projection isn't asked. Written for each protocol: the least height in any frame, the least
@@ -33,8 +34,13 @@ ROOT = Path(__file__).parents[1]
 POSES = 10
 
 
-def measured(stimulus: Stimulus, fps: float) -> tuple[dict[str, NDArray[np.float64]], list[NDArray[np.uint8]]]:
-    """Height, distance of the middle and touched edges of each frame, and some frames as RGB."""
+def measured(
+    stimulus: Stimulus, fps: float, entry: int | None = None
+) -> tuple[dict[str, NDArray[np.float64]], list[NDArray[np.uint8]]]:
+    """Height, distance of the middle and touched edges of each frame, and some frames as RGB.
+
+    The frames are spread over the film, or every third from shortly before the end of the `entry`, without their sides.
+    """
     width, height = stimulus.camera.size
     camera = replace(
         stimulus.camera, size=(width // 8 * 2, height // 8 * 2), focal_pixels=stimulus.camera.focal_pixels / 4
@@ -48,26 +54,35 @@ def measured(stimulus: Stimulus, fps: float) -> tuple[dict[str, NDArray[np.float
         rows["height"].append((up[-1] - up[0] + 1) / len(luma))
         rows["aside"].append(abs((across[0] + across[-1] + 1) / 2 / seen.shape[1] - 0.5))
         rows["touches"].append(seen[[0, -1]].any() or seen[:, [0, -1]].any())
+    figures = {key: np.array(values, dtype=float) for key, values in rows.items()}
+    if entry is not None:
+        side = camera.size[0] // 4
+        return figures, [nv12_to_rgb(frames[entry - 3 + 3 * i])[:, side:-side] for i in range(POSES)]
     shown = np.linspace(0, len(frames) - 1, POSES).round().astype(int)
-    return {key: np.array(values, dtype=float) for key, values in rows.items()}, [nv12_to_rgb(frames[i]) for i in shown]
+    return figures, [nv12_to_rgb(frames[i])[::2, ::2] for i in shown]
 
 
-def protocol_sizes(path: Path, library: str, sheets: Path | None) -> dict[str, float | str]:
-    """One row of the table; the contact sheet is written beside."""
+def protocol_sizes(path: Path, library: str, sheets: Path | None, transition: str | None) -> dict[str, float | str]:
+    """One row of the table; the contact sheet is written beside, of all films or of the first of each transition."""
     stimuli = prepare(load_protocol(path), open_library(library))
     found, strips = [], []
     groups: set[str] = set()
     for stimulus in stimuli.stimuli:
-        sizes, frames = measured(stimulus, stimuli.protocol.fps)
+        label = stimulus.record.group if transition is None else stimulus.record.method
+        if transition not in (None, stimulus.record.transition):
+            continue
+        entry = None if transition is None else stimuli.protocol.entry_frames
+        sizes, frames = measured(stimulus, stimuli.protocol.fps, entry)
         found.append(sizes)
-        if stimulus.record.group not in groups:
-            groups.add(stimulus.record.group)
-            strip = Image.fromarray(np.concatenate([frame[:, ::2][::2] for frame in frames], axis=1))
-            ImageDraw.Draw(strip).text((4, 2), stimulus.record.group, fill=(0, 0, 0))
+        if label not in groups:
+            groups.add(label)
+            strip = Image.fromarray(np.concatenate(frames, axis=1))
+            ImageDraw.Draw(strip).text((4, 2), label, fill=(0, 0, 0))
             strips.append(np.asarray(strip))
     if sheets is not None:
         sheets.mkdir(parents=True, exist_ok=True)
-        Image.fromarray(np.concatenate(strips)).save(sheets / f"{path.stem}_{Path(library).name}.png")
+        shown = "" if transition is None else f"_{transition}"
+        Image.fromarray(np.concatenate(strips)).save(sheets / f"{path.stem}{shown}_{Path(library).name}.png")
     return {
         "protocol": path.stem,
         "library": Path(library).name,
@@ -85,12 +100,13 @@ def main() -> None:
     parser.add_argument("protocols", nargs="*", help="names or files; all of protocols/ by default")
     parser.add_argument("--library", default="synthetic")
     parser.add_argument("--sheets", type=Path, help="folder for contact sheets")
+    parser.add_argument("--transition", help="only its films, each in a row of the sheet")
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     paths = [Path(p) if p.endswith(".toml") else ROOT / "protocols" / f"{p}.toml" for p in asked.protocols]
     table = []
     for path in paths or sorted((ROOT / "protocols").glob("*.toml")):
-        table.append(protocol_sizes(path, asked.library, asked.sheets))
+        table.append(protocol_sizes(path, asked.library, asked.sheets, asked.transition))
         if not asked.json:
             print(
                 "  ".join(f"{k} {v:.2f}" if isinstance(v, float) else str(v) for k, v in table[-1].items()), flush=True

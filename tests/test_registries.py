@@ -44,6 +44,8 @@ class Study:
     repeats: int = 1
     scale_points: int = 5
     items: tuple[Item, ...] = ()
+    others: tuple[str, ...] = ()
+    sets: int | None = None
 
 
 def study_of(task: Task) -> Study:

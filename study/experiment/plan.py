@@ -21,6 +21,7 @@ from study.experiment.procedures.constant_stimuli import ConstantStimuli, drawn_
 from study.experiment.procedures.procedure import Adaptive, Course, Draw, Procedure
 from study.experiment.procedures.registry import course_from_json, course_to_json
 from study.experiment.protocol.whole import Protocol, StudySpec
+from study.experiment.sets import own_set
 from study.tasks.registry import task_of
 from study.tasks.trial import Pair, Trial, trial_from_json, trial_of
 
@@ -115,7 +116,7 @@ def draw_plan(
     seed
         Instead of the protocol's own.
     group
-        For studies whose order is `by-group`.
+        For studies whose order is `by-group`, and for those whose pairs are divided into sets.
     """
     if not participant.strip():
         raise SessionError("Expected a participant's name, found none; write one, such as p01.")
@@ -137,6 +138,8 @@ def draw_plan(
             raise SessionError(
                 f"Expected pairs for the study {study.name!r}, found none; prepare this protocol's stimuli."
             )
+        if study.sets:
+            own = own_set(own, study.sets, group)
         draw = Draw(study.name, tuple(own), task_of(study).orders, study.order, study.repeats, group)
         shown = study.procedure.drawn(draw, rng)
         # Practice and checks draw from generators of their own, so that they leave the trials as they are.
@@ -185,13 +188,14 @@ def _with_checks(study: StudySpec, trials: Sequence[Trial], rng: np.random.Gener
 
 
 def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
-    """How many groups of participants the orders `by-group` tell apart; 1 where there are none."""
+    """How many groups of participants orders `by-group` and sets tell apart; 1 where there are none."""
     groups = 1
     for study in protocol.studies:
         if study.order == "by-group":
             own = len(_pairs_of(study, pairs)[0])
             orders = len(task_of(study).orders)
             groups = math.lcm(groups, orders if orders > 1 else max(own, 1))
+        groups = math.lcm(groups, study.sets or 1)
     return groups
 
 

@@ -11,12 +11,13 @@ from scipy.special import expit
 
 from study.analysis.analyse import Analysis
 from study.analysis.preference.analyse import Preference
+from study.analysis.preference.bradley_terry import fit_bradley_terry
 from study.analysis.preference.default_test import p_values_of_studies
 from study.arrays import BoolArray, FloatArray
 from study.errors import AnalysisError
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
-from study.models.choice import PreferenceObserver
+from study.models.choice import PreferenceObserver, lean
 from study.power.curve import Run
 from study.power.design import Design, Effect, kept_of, motions_of, times
 from study.tasks.observer import ObserverSettings, default_observer
@@ -25,6 +26,18 @@ from study.tasks.observer import ObserverSettings, default_observer
 def preference_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
     """Return a mean share over participants, their correlation, and what being shown first adds."""
     share, correlation, bias, alpha = options["share"], options["correlation"], options["order_bias"], decided.alpha
+    if study.others:
+        return Effect(
+            observer=preference_observer(study, share, correlation, bias, options["missed"]),
+            stated={"share": share, "correlation": correlation, "order_bias": bias},
+            icc=correlation,
+            test=f"Bradley-Terry strengths over participants and motions at {alpha:g}",
+            aim=f"find that {study.reference} is chosen over {study.comparison} in {100 * share:g}% at the level "
+            f"{alpha:g}, where all other methods are as {study.comparison}",
+            study=lambda design: strengths_study(design, alpha, share),
+            found=_no_sessions,
+            slow=True,
+        )
     return Effect(
         observer=preference_observer(study, share, correlation, bias, options["missed"]),
         stated={"share": share, "correlation": correlation, "order_bias": bias},
@@ -102,12 +115,12 @@ def preference_study(design: Design, alpha: float, share: float) -> Run:
     trials, typical = design.trials(), design.settings.preference
     signs = np.array([[1.0 if trial.a_first else -1.0 for trial in own] for own in trials])
     of_motion = motions_of(trials)
-    lean = typical.utility[design.study.reference] - typical.utility.get(design.study.comparison or "", 0.0)
+    leaning = lean(typical, design.study.reference, design.study.comparison or "")
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
 
         people = max(sizes)
-        own = lean + typical.participant_sd * rng.standard_normal((studies, people, 1))
+        own = leaning + typical.participant_sd * rng.standard_normal((studies, people, 1))
         chance = expit(own + typical.order_bias * signs[:people])
         chose_a = rng.random(chance.shape) < chance
         response_s, given = times(design, rng, np.abs(2 * chance - 1))
@@ -119,6 +132,53 @@ def preference_study(design: Design, alpha: float, share: float) -> Run:
         return np.column_stack([_found(chosen[:, :size], shown[:, :size], share, alpha) for size in sizes])
 
     return run
+
+
+def strengths_study(design: Design, alpha: float, share: float) -> Run:
+    """Whether Bradley-Terry strengths tell the reference from the comparison, in the right direction."""
+    trials, typical = design.trials(), design.settings.preference
+    a, b = (np.array([[trial.methods[k] for trial in own] for own in trials]) for k in (0, 1))
+    first = np.array([[trial.a_first for trial in own] for own in trials])
+    motions = np.array([[trial.motion for trial in own] for own in trials])
+    people = np.broadcast_to(np.array([plan.participant for plan in design.plans])[:, None], motions.shape)
+    apart = np.vectorize(lambda *pair: lean(typical, *pair))(a, b)
+    shown, other = np.where(first, a, b), np.where(first, b, a)
+    reference, comparison = design.study.reference, design.study.comparison or ""
+
+    def tells(size: int, kept: BoolArray, chose_first: BoolArray) -> bool:
+        rows = kept[:size]
+        which, against, who, where = (
+            [str(name) for name in names[:size][rows]] for names in (shown, other, people, motions)
+        )
+        found = fit_bradley_terry(
+            which,
+            against,
+            chose_first[:size][rows],
+            np.ones(int(rows.sum())),
+            reference=comparison,
+            confidence=1 - alpha,
+            participants=who,
+            motions=where,
+        )
+        if isinstance(found, str):
+            return False
+        low, high = next((row.interval.low, row.interval.high) for row in found.strengths if row.method == reference)
+        return low is not None and high is not None and (low > 0 if share > 0.5 else high < 0)
+
+    def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        count = max(sizes)
+        own = typical.participant_sd * rng.standard_normal((studies, count, 1))
+        towards_a = apart[:count] + own
+        chance = expit(np.where(first[:count], towards_a, -towards_a) + typical.order_bias)
+        chose_first = rng.random(chance.shape) < chance
+        kept = kept_of(design, rng, *times(design, rng, np.abs(2 * chance - 1)))
+        return np.array([[tells(size, kept[n], chose_first[n]) for size in sizes] for n in range(studies)])
+
+    return run
+
+
+def _no_sessions(_: Analysis) -> bool:
+    raise AnalysisError("expected no --sessions for a study of more than two methods; leave it out")
 
 
 def _found(chosen: FloatArray, shown: FloatArray, share: float, alpha: float) -> BoolArray:

@@ -25,6 +25,10 @@ ROUDER_2009 = (
     "Rouder, J. N., Speckman, P. L., Sun, D., Morey, R. D., & Iverson, G. (2009). Bayesian t tests for accepting and "
     "rejecting the null hypothesis. Psychonomic Bulletin & Review, 16, 225–237."
 )
+CAMERON_2011 = (
+    "Cameron, A. C., Gelbach, J. B., & Miller, D. L. (2011). Robust inference with multiway clustering. Journal of "
+    "Business & Economic Statistics, 29, 238–249."
+)
 CLARK_1973 = (
     "Clark, H. H. (1973). The language-as-fixed-effect fallacy: A critique of language statistics in psychological "
     "research. Journal of Verbal Learning and Verbal Behavior, 12, 335–359."

@@ -95,14 +95,14 @@ def _choices(study: StudySpec, material: Material) -> Iterator[dict[str, Any]]:
     if own.empty or needed_share(material.protocol, study) is not None:
         return
     chose_b = ~own["chose_a"].astype(bool)
-    share_b = float(chose_b.mean())
+    share_b = chose_b.groupby([own["method_a"], own["method_b"]]).transform("mean")
     audits = {one.pair: one for one in material.manifest.audits}
     for cue in CUES:
         more = own["pair"].map(lambda name, cue=cue: cue.more(audits[name]) if name in audits else 0.0)
         differs = more.abs() >= LEAST_APART
         if differs.any():
             b_has_more = more[differs] > 0
-            expected = b_has_more * share_b + ~b_has_more * (1 - share_b)
+            expected = share_b[differs].where(b_has_more, 1 - share_b[differs])
             yield {
                 "study": words.sentence(study.title or words.readable(study.name)),
                 "cue": cue.prefers,

@@ -28,12 +28,21 @@ def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Gener
 
 
 def _truth(settings: ObserverSettings, asked: Asked, _level: float) -> dict[str, Any]:
+    if asked.others:
+        utility = settings.preference.utility
+        first = utility.get(asked.reference, 0.0)
+        methods = (asked.reference, asked.comparison or asked.reference, *asked.others)
+        return {"strengths": {name: round(utility.get(name, 0.0) - first, 6) for name in methods}}
     share = preference_probability(settings.preference, asked.reference, asked.comparison or asked.reference)
     return {"favouring_a": round(share, 6)}
 
 
 def _in_words(asked: Asked, blends: Callable[[str], str]) -> str:
-    return f"chose the more natural of two transitions, {against(asked, blends)}"
+    if not asked.others:
+        return f"chose the more natural of two transitions, {against(asked, blends)}"
+    named = [blends(name) for name in (asked.reference, asked.comparison or "", *asked.others)]
+    some = f", each participant one of {asked.sets} balanced sets" if asked.sets else ""
+    return f"chose the more natural of two transitions, of all pairs of {', '.join(named[:-1])} and {named[-1]}{some}"
 
 
 PREFERENCE = Task(
@@ -45,7 +54,7 @@ PREFERENCE = Task(
     orders=((0, 1), (1, 0)),
     timed=True,
     tested=True,
-    keys=frozenset(),
+    keys=frozenset({"others", "sets"}),
     instructions="preference",
     question="question_preference",
     welcome="welcome_pairs",

@@ -42,6 +42,8 @@ class Asked(Protocol):
     show: Show | None
     reference: str
     comparison: str | None
+    others: tuple[str, ...]
+    sets: int | None
     differences_frames: tuple[int, ...]
     order: Order
     repeats: int

@@ -165,6 +165,7 @@ def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> BradleyTerry |
         with_order=bool(ordered),
         confidence=confidence,
         participants=[str(name) for name in given["participant"]],
+        motions=[str(name) for name in given["motion"]] if "motion" in given.columns else None,
     )
     return NotFitted(found) if isinstance(found, str) else found
 

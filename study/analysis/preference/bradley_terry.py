@@ -3,9 +3,11 @@
     logit P(a is favoured over b) = strength a - strength b + order effect where a comes first
 
 Answers come in, strengths with standard errors go out (Davidson & Beaver 1977; Agresti 2013, section 11.6). Where it is
-known who answered, standard errors are those of participants (the sandwich of Liang & Zeger 1986), not of answers. A
-tie counts half for each side. Estimates are those of maximum likelihood. Where a method never loses, the likelihood has
-no maximum; linear programs find which differences are finite (Konis 2007), and those are estimated.
+known who answered, standard errors are those of participants (the sandwich of Liang & Zeger 1986), not of answers. If
+the motions are known too, participants and motions both are samples (Cameron, Gelbach & Miller 2011: the sandwich of
+either, less that of their cells). A tie counts half for each side. Estimates are those of maximum likelihood. Where a
+method never loses, the likelihood has no maximum; linear programs find which differences are finite (Konis 2007), and
+those are estimated.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study.analysis.crossed import FEWEST_MOTIONS
 from study.analysis.estimates import Interval, chi_square_probability, normal_quantile, t_quantile
 from study.analysis.scoring import maximise
 from study.arrays import BoolArray, FloatArray
@@ -53,6 +56,8 @@ class BradleyTerry:
     pair and order."""
     participants: int | None = None
     """Participants behind the standard errors; None where every answer counts as independent."""
+    motions: int = 0
+    """Motions behind them, where these are taken for a sample too."""
     note: str = ""
     """What can't be estimated, and why."""
 
@@ -67,6 +72,7 @@ def fit_bradley_terry(
     reference: str | None = None,
     confidence: float = 0.95,
     participants: Sequence[str] | None = None,
+    motions: Sequence[str] | None = None,
 ) -> BradleyTerry | str:
     """Fit strengths; a sentence that says why where they can't be fitted.
 
@@ -83,6 +89,8 @@ def fit_bradley_terry(
         from.
     participants : sequence of str, shape (rows,)
         Who answered; if omitted, every answer counts as independent.
+    motions : sequence of str, shape (rows,)
+        What was shown; taken for a sample too where three or more were.
 
     Raises
     ------
@@ -110,7 +118,11 @@ def fit_bradley_terry(
         design = design if note else every
     apart = _differences_finite(design, yes, total, len(methods))
     place = int(np.argmax(apart.sum(axis=1))) if reference is None else methods.index(reference)
-    groups = None if participants is None else np.unique(np.asarray(participants), return_inverse=True)[1]
+    groups = [
+        np.unique(np.asarray(names), return_inverse=True)[1]
+        for names, fewest in ((participants, 1), (motions, FEWEST_MOTIONS))
+        if names is not None and len(set(names)) >= fewest
+    ]
     told = np.append(np.delete(apart[place], place), np.ones(design.shape[1] - len(methods), dtype=bool))
     others = [method for method in methods if method != methods[place]]
     columns = np.delete(design, place, axis=1)
@@ -166,7 +178,7 @@ def _fitted(
     total: FloatArray,
     others: Sequence[str],
     held: str,
-    groups: NDArray[np.intp] | None,
+    groups: Sequence[NDArray[np.intp]],
     confidence: float,
     told: BoolArray,
     note: str,
@@ -196,8 +208,8 @@ def _fitted(
     errors = np.full(size, np.nan)
     scored = (yes - total * share(point[None])[0])[:, None] * design
     errors[told] = _errors(information[0][np.ix_(told, told)], scored[:, told], groups)
-    people = None if groups is None else int(groups.max()) + 1
-    times = normal_quantile(confidence) if people is None else t_quantile(confidence, max(people - 1, 1))
+    sizes = [int(group.max()) + 1 for group in groups]
+    times = t_quantile(confidence, max(min(sizes) - 1, 1)) if sizes else normal_quantile(confidence)
     # By place, not by name: a method may well be called "order".
     found = [
         _strength(name, float(at) if finite else None, float(error), times, confidence)
@@ -213,7 +225,9 @@ def _fitted(
         one_way = f"the answers for or against it all go one way, so its distance from {held} has no finite estimate"
         notes.append(f"{', '.join(endless)}: {one_way}")
     if any(row.value is not None and row.standard_error is None for row in every):
-        notes.append(f"{counted(people or 0, 'participant')}: too few, or too similar, for standard errors")
+        notes.append(
+            f"{counted(sizes[0] if sizes else 0, 'participant')}: too few, or too similar, for standard errors"
+        )
     # Rows may hold single answers: the saturated model is one share for every pair and order.
     cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
     favoured, seen = np.bincount(cells, yes), np.bincount(cells, total)
@@ -229,23 +243,35 @@ def _fitted(
         deviance=deviance,
         degrees_of_freedom=max(freedom, 0),
         p_value=chi_square_probability(deviance, freedom) if freedom > 0 else None,
-        participants=people,
+        participants=sizes[0] if sizes else None,
+        motions=sizes[1] if len(sizes) > 1 else 0,
         note="; ".join(notes),
     )
 
 
-def _errors(information: FloatArray, scores: FloatArray, groups: NDArray[np.intp] | None) -> FloatArray:
-    """Standard errors: of independent answers, or of participants; NaN where these are no more than the strengths."""
+def _errors(information: FloatArray, scores: FloatArray, groups: Sequence[NDArray[np.intp]]) -> FloatArray:
+    """Standard errors: of independent answers, of participants, or of participants and motions; NaN for too few people.
+
+    Where the difference of the sandwiches is no variance, motions do not differ by more than chance: the larger of
+    both is taken.
+    """
     inverse = np.linalg.pinv(information)
-    if groups is None:
+    if not groups:
         return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)), dtype=np.float64)
-    people = int(groups.max()) + 1
-    if people <= len(inverse):
+    if int(groups[0].max()) + 1 <= len(inverse):
         return np.full(len(inverse), np.nan)
-    sums = np.zeros((people, scores.shape[1]))
-    np.add.at(sums, groups, scores)
-    spread = np.diag(inverse @ (sums.T @ sums) @ inverse) * people / (people - 1)
-    return np.asarray(np.sqrt(np.maximum(spread, 0.0)), dtype=np.float64)
+
+    def spread(group: NDArray[np.intp]) -> FloatArray:
+        count = int(group.max()) + 1
+        sums = np.zeros((count, scores.shape[1]))
+        np.add.at(sums, group, scores)
+        return np.asarray(np.diag(inverse @ (sums.T @ sums) @ inverse) * count / (count - 1), dtype=np.float64)
+
+    found = spread(groups[0])
+    if len(groups) > 1:
+        own, cells = spread(groups[1]), np.unique(np.stack(groups), axis=1, return_inverse=True)[1].ravel()
+        found = np.maximum(found + own - spread(cells), np.maximum(found, own))
+    return np.asarray(np.sqrt(np.maximum(found, 0.0)), dtype=np.float64)
 
 
 def _strength(name: str, value: float | None, error: float, times: float, confidence: float) -> Strength:

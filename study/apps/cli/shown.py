@@ -66,9 +66,9 @@ def _heading(protocol: Protocol, study: StudySpec) -> str:
     besides += [counted(study.attention_checks, "attention check")] if study.attention_checks else []
     trials = ", ".join([trials_between(protocol.fewest_trials_of(study), protocol.trials_of(study)), *besides])
     chosen = f"{words}; " if (words := study.procedure.in_words()) else ""
-    return (
-        f"{study.name}: {study.task}, {' and '.join(study.methods)}; {chosen}{trials}; frames at {protocol.fps:g} fps"
-    )
+    *others, last = study.methods
+    methods = f"{', '.join(others)} and {last}" if others else last
+    return f"{study.name}: {study.task}, {methods}; {chosen}{trials}; frames at {protocol.fps:g} fps"
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -67,9 +67,10 @@ def _check_study(protocol: Content, study: StudySpec, index: int, known: Sequenc
 def _check_methods(protocol: Content, study: StudySpec, index: int) -> None:
     """Refuse unknown methods, methods that do not suit the task, and pairs that cannot be compared."""
     where, who = ("studies", index), f"the {study.task} study {study.name!r}"
-    for key in ("reference", "comparison"):
-        if name := getattr(study, key):
-            _check_known([name], protocol.method_names, "methods", *where, key)
+    named = [*((key, name) for key in ("reference", "comparison") if (name := getattr(study, key)))]
+    named += [("others", name) for name in study.others]
+    for key, name in named:
+        _check_known([name], protocol.method_names, "methods", *where, key)
     methods = protocol.methods_of(study)
     if study.differences_frames and not methods[study.reference].make.levels:
         raise KeyMismatchError(
@@ -80,13 +81,13 @@ def _check_methods(protocol: Content, study: StudySpec, index: int) -> None:
     if len({isinstance(method.points, OwnPoints) for method in methods.values()}) > 1:
         raise KeyMismatchError(
             f"expected in {who} either cuts where a metric is least or methods at common points, found "
-            f"{study.reference!r} and {study.comparison!r}; change one",
+            f"{' and '.join(map(repr, study.methods))}; change one",
             *where,
             "comparison",
         )
     if protocol.stimuli.match != "none" and task_of(study).shortcut is not None:
-        for key, name in (("reference", study.reference), ("comparison", study.comparison)):
-            if name and not methods[name].make.moves:
+        for key, name in named:
+            if not methods[name].make.moves:
                 raise KeyMismatchError(
                     f"expected in {who} methods whose blends can be moved, as [stimuli] match = "
                     f"{protocol.stimuli.match!r} asks, found {name!r}; change it, or remove match",
@@ -132,7 +133,18 @@ def _check_analysis(protocol: Content) -> None:
 
 
 def _check_lengths(protocol: Content, study: StudySpec, index: int) -> None:
-    """Refuse more practice, or more attention checks, than a study has trials."""
+    """Refuse sets of different size, and more practice, or more attention checks, than a study has trials."""
+    if study.sets:
+        pairs, motions = len(study.methods) * (len(study.methods) - 1) // 2, len(protocol.transitions_of(study))
+        if (pairs % study.sets and motions % study.sets) or study.order == "by-group":
+            raise KeyMismatchError(
+                f"expected sets that divide the {counted(pairs, 'pair')} of methods or the "
+                f"{counted(motions, 'transition')} of {study.name!r}, in another order than by-group, found "
+                f"{study.sets}; change one",
+                "studies",
+                index,
+                "sets",
+            )
     trials = protocol.trials_of(study)
     if trials > MOST_TRIALS:
         raise KeyMismatchError(

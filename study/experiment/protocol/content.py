@@ -78,7 +78,7 @@ class Content(Part):
         if (own := study.procedure.trials(shown, study.repeats)) is not None:
             return own[1]
         orders = len(task.orders) if study.order == "both" else 1
-        return shown * len(task.conditions(study, False)) * study.repeats * orders
+        return shown * len(task.conditions(study, False)) // (study.sets or 1) * study.repeats * orders
 
     def fewest_trials_of(self, study: StudySpec) -> int:
         """How many trials of a study a participant sees at least."""

@@ -80,6 +80,17 @@ class StudySpec(Part):
     comparison: str | None = Field(
         default=None, description="Method b of a preference study; a second one to rate in a rating study."
     )
+    others: Listed[str] = Field(
+        default=(),
+        description="Preference: further methods; every pair of `reference`, `comparison` and these is compared.",
+    )
+    sets: int | None = Field(
+        default=None,
+        ge=2,
+        le=1000,
+        description="Preference: into how many balanced sets the pairs are divided, of which a participant sees one; "
+        "by default everybody sees all.",
+    )
     show: Show | None = Field(
         default=None,
         description="Rating: each transition by itself (`single`, the default), or both methods' "
@@ -167,7 +178,7 @@ class StudySpec(Part):
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods that this study shows."""
-        return (self.reference,) if self.comparison is None else (self.reference, self.comparison)
+        return (self.reference, *((self.comparison,) if self.comparison else ()), *self.others)
 
 
 def _check_task(study: StudySpec) -> None:

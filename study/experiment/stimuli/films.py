@@ -150,11 +150,9 @@ def _matched(protocol: Protocol, film: Film, reference: Film) -> Film:
 
 
 def alike(study: StudySpec, settled: Settled, ways: Ways) -> bool:
-    """Whether the two methods of a study would show one film at these points."""
-    if study.comparison is None:
-        return False
-    a, b = (_film(study, settled, method, 0, ways) for method in (study.reference, study.comparison))
-    return a == b
+    """Whether two methods of a study would show one film at these points."""
+    films = [_film(study, settled, method, 0, ways) for method in study.methods]
+    return len(set(films)) < len(films)
 
 
 def _film(study: StudySpec, settled: Settled, method: str, difference: int, ways: Ways) -> Film:

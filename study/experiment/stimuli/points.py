@@ -213,7 +213,7 @@ def _given(asked: _Asked, alike: Alike | None) -> Settled:
         raise StimulusError(f"transition {name!r}: {problem}")
     if alike is not None and alike(study, settled):
         raise StimulusError(
-            f"transition {name!r}: expected two films by the methods {study.reference!r} and {study.comparison!r} of "
+            f"transition {name!r}: expected two films by the methods {' and '.join(map(repr, study.methods))} of "
             f"the study {study.name!r}, found one at these points, where both make the same blend; give other points, "
             "or change a method or fixed_frames."
         )

@@ -132,7 +132,7 @@ def shortcut_shares(
     shortcut = task_of(study).shortcut
     known = {one.pair: one for one in audits}
     own = [pair for pair in pairs if pair.study == study.name and pair.motion in transitions and pair.name in known]
-    if shortcut is None or not own:
+    if shortcut is None or not own or study.others:  # of many methods there is no comparison that all pairs share
         return []
     found = []
     for level in sorted({pair.difference_frames for pair in own if pair.difference_frames != 0}, key=lambda n: n or 0):

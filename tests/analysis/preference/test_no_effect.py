@@ -197,3 +197,45 @@ def test_one_participant_has_strengths_without_errors() -> None:
     assert all(row.standard_error is None for row in found.strengths)
     assert found.strengths[0].value is not None
     assert "1 participant: too few" in found.note
+
+
+def test_errors_over_participants_and_motions_are_those_of_two_way_clusters() -> None:
+    """By statsmodels' sandwiches of single clusters, combined as Cameron, Gelbach and Miller 2011 do (section 2.2)."""
+    import statsmodels.api as sm
+
+    rng = np.random.default_rng(21)
+    strength = dict(zip("abcd", (0.0, 0.5, 0.8, -0.4), strict=True))
+    rows = []
+    for motion in range(6):
+        apart = {name: strength[name] + rng.normal(0, 0.8) for name in "abcd"}
+        for person in range(15):
+            for a, b in (("a", "b"), ("c", "d"), ("a", "c"), ("b", "d")):
+                first, second = (a, b) if rng.random() < 0.5 else (b, a)
+                chance = 1 / (1 + np.exp(apart[second] - apart[first] - 0.3))
+                rows.append((first, second, float(rng.random() < chance), f"p{person}", f"m{motion}"))
+    first, second, favoured, people, motions = (list(part) for part in zip(*rows, strict=True))
+    found = fit_bradley_terry(
+        first, second, favoured, np.ones(len(rows)), reference="a", participants=people, motions=motions
+    )
+    assert isinstance(found, BradleyTerry)
+    assert (found.participants, found.motions) == (15, 6)
+    design = np.array([[*((a == n) - (b == n) for n in "bcd"), 1.0] for a, b, *_ in rows], dtype=float)
+
+    def spread(labels: list[str]) -> np.ndarray:
+        groups = np.unique(labels, return_inverse=True)[1]
+        cluster = {"groups": groups, "use_correction": False}
+        model = sm.GLM(np.array(favoured), design, family=sm.families.Binomial())
+        fit = model.fit(cov_type="cluster", cov_kwds=cluster, tol=1e-12)
+        count = groups.max() + 1
+        return np.asarray(np.diag(fit.cov_params())) * count / (count - 1)
+
+    both = [f"{a} {b}" for a, b in zip(people, motions, strict=True)]
+    expected = np.maximum(spread(people) + spread(motions) - spread(both), np.maximum(spread(people), spread(motions)))
+    own = {row.method: row.standard_error for row in found.strengths}
+    assert [own[name] for name in "bcd"] == pytest.approx(np.sqrt(expected[:3]), rel=1e-5)
+    assert found.order is not None
+    assert found.order.standard_error == pytest.approx(np.sqrt(expected[3]), rel=1e-5)
+    alone = fit_bradley_terry(first, second, favoured, np.ones(len(rows)), reference="a", participants=people)
+    assert isinstance(alone, BradleyTerry)
+    widths = [row.interval.high - row.interval.low for row in alone.strengths if row.method != "a"]
+    assert max(widths) < min(row.interval.high - row.interval.low for row in found.strengths if row.method != "a")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import pandas as pd
 import pytest
 
@@ -42,3 +44,17 @@ def test_a_method_that_never_loses_has_a_note_and_no_strength() -> None:
     table = next(table for table in section.tables if table.name == "s_strengths")
     assert {row["method"]: row["value"] is None for row in table.rows if row["method"] != "order"}["a"]
     assert any("so its distance from" in note for note in section.notes)
+
+
+def test_many_methods_have_their_strengths_and_a_row_for_each_pair() -> None:
+    methods = ("geodesic", "fixed", "cut", "one-hop")
+    rows = [(f"p{n}", f"m{m}", a, b, bool((n + m) % 2), float((n * 7 + m * 3 + k) % 5 < 3))
+            for n in range(9) for m in range(4) for k, (a, b) in enumerate(combinations(methods, 2))]  # fmt: skip
+    section = section_of(rows)
+    assert [drawing.name for drawing in section.drawings] == ["s_strengths"]
+    strongest, pairs = section.tables
+    assert len(strongest.rows) == 5, "four methods and the order"
+    assert len(pairs.rows) == 6
+    assert section.headlines[0].statement.startswith("Strengths in logits beside ")
+    assert section.headlines[0].detail == "95% intervals over 9 participants and 4 motions."
+    assert not section.readings

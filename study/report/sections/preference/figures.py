@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from study.analysis.crossed import OVER_BOTH
 from study.analysis.preference.analyse import Comparison
+from study.analysis.preference.bradley_terry import BradleyTerry
 from study.report.drawing import (
     BLUE,
     INK,
@@ -57,6 +58,22 @@ def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
         known = [row for row in motions if row.percent is not None]
         spoken = "; ".join(f"{readable(row.motion)}: {row.percent:.0f}%" for row in known)
         return to_svg(figure, name, f"Percent favouring {a} over {b}", spoken, mark)
+
+
+def strengths_figure(found: BradleyTerry, name: str, mark: str) -> str:
+    """Strengths of methods with their intervals, the strongest at the top."""
+    rows = [row for row in found.strengths if row.value is not None]
+    with new_figure(7.2, 0.34 * len(rows) + 1.1) as (figure, axes):
+        axes.axvline(0, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)))
+        for place, row in enumerate(rows):
+            if row.standard_error:
+                axes.plot([row.interval.low, row.interval.high], [-place, -place], color=BLUE, linewidth=2.0)
+            axes.plot([row.value], [-place], "o", color=INK if row.method == found.reference else BLUE, markersize=5)
+            _at_the_right(axes, -place, f"{row.value:+.2f}")
+        named_rows(axes, [-place for place in range(len(rows))], [readable(row.method) for row in rows])
+        axes.set_xlabel(f"strength in logits beside {readable(found.reference)}")
+        spoken = "; ".join(f"{readable(row.method)}: {row.value:+.2f}" for row in rows)
+        return to_svg(figure, name, "Strengths of the methods", spoken, mark)
 
 
 def _at_the_right(axes: Axes, height: float, text: str, colour: str = INK) -> None:

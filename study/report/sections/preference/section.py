@@ -13,7 +13,7 @@ from study.analysis.analyse import Analysis
 from study.analysis.confirmatory import ConfirmatoryTest
 from study.analysis.crossed import OVER_BOTH
 from study.analysis.estimates import Interval
-from study.analysis.preference.analyse import Comparison, Preference
+from study.analysis.preference.analyse import Comparison, Preference, strengths_in_words
 from study.analysis.preference.bradley_terry import BradleyTerry
 from study.analysis.preference.no_effect import NoEffect
 from study.counting import counted
@@ -21,6 +21,7 @@ from study.report import tables, words
 from study.report.references import (
     AS_SAMPLES,
     BRADLEY_1952,
+    CAMERON_2011,
     CLARK_1973,
     HOLM_1979,
     ROUDER_2009,
@@ -28,9 +29,12 @@ from study.report.references import (
     SCHUIRMANN_1987,
     WILSON_1927,
 )
-from study.report.sections.preference.figures import preference_figure
+from study.report.sections.preference.figures import preference_figure, strengths_figure
 from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.tables import Table
+
+MOST_PAIRS = 3
+"""Pairs of methods that have a figure and tables of their own each: all of three methods."""
 
 
 def preference_section(result: Preference, about: About) -> Section | None:
@@ -38,6 +42,8 @@ def preference_section(result: Preference, about: About) -> Section | None:
     comparisons, name = result.comparisons, about.name
     if not comparisons:
         return None
+    if isinstance(result.strengths, BradleyTerry) and len(comparisons) > MOST_PAIRS:
+        return _section_of_many(result, result.strengths, about)
     drawings, shown, folded, notes = [], [], [], []
     for place, comparison in enumerate(comparisons):
         suffix = f"_{place + 1}" if len(comparisons) > 1 else ""
@@ -60,6 +66,34 @@ def preference_section(result: Preference, about: About) -> Section | None:
         folded=tuple(folded),
         readings=tuple(_reading(comparison) for comparison in comparisons),
     )
+
+
+def _section_of_many(result: Preference, found: BradleyTerry, about: About) -> Section:
+    """The section of many pairs of methods: strengths, with a row for each pair in place of a part of its own."""
+    caption = (
+        f"Strengths of the methods in logits beside {words.readable(found.reference)}, with 95% intervals over "
+        f"{_whose(found)}. A difference of 1 is a choice of 73 to 27%, of 2 one of 88 to 12%."
+    )
+    return Section(
+        anchor=f"study-{about.name}",
+        title=about.title,
+        headlines=(Headline(words.readable(strengths_in_words(found)), f"95% intervals over {_whose(found)}."),),
+        drawings=(
+            Drawing(f"{about.name}_strengths", strengths_figure(found, f"study-{about.name}", about.mark), caption),
+        ),
+        tables=(strengths_table(about.name, found), pairs_table(about.name, result.comparisons)),
+        notes=tuple([f"Strengths of the methods: {found.note}."] if found.note else []),
+        folded=(),
+        readings=(),
+    )
+
+
+def _whose(found: BradleyTerry) -> str:
+    """What the intervals of strengths take for samples, with how many there are."""
+    if found.participants is None:
+        return "independent answers"
+    motions = f" and {counted(found.motions, 'motion')}" if found.motions else ""
+    return f"{counted(found.participants, 'participant')}{motions}"
 
 
 def _drawing(name: str, comparison: Comparison, mark: str) -> Drawing:
@@ -286,14 +320,34 @@ def strengths_table(name: str, found: BradleyTerry) -> Table:
         vars(row) | {"low": row.interval.low, "high": row.interval.high, "method": words.readable(row.method)}
         for row in [*found.strengths, *([found.order] if found.order else [])]
     ]
-    whose = "participants" if found.participants else "answers"
     return tables.make(
         f"{name}_strengths",
         "Strengths of the methods (Bradley-Terry, logits beside the reference), and what being shown first adds; "
-        f"intervals take {whose} for independent.",
+        f"intervals are over {_whose(found)}.",
         "method value standard_error low high",
         rows,
         headings={"value": "strength"},
+    )
+
+
+def pairs_table(name: str, comparisons: Sequence[Comparison]) -> Table:
+    """Return a row for each pair of methods, by its own answers alone."""
+    rows = [
+        {
+            "comparison": " over ".join(methods_of(one)),
+            "answers": one.published.answers,
+            "percent": one.default.percent,
+            "low": one.default.low,
+            "high": one.default.high,
+            "p_value": one.default.p_value,
+        }
+        for one in comparisons
+    ]
+    return tables.make(
+        f"{name}_pairs",
+        f"Each pair of methods by its own answers, tested by {comparisons[0].default.test}.",
+        "comparison answers percent low:one high:one p_value",
+        rows,
     )
 
 
@@ -327,16 +381,24 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
         test = f"Student’s t of the percentage against 50%, {AS_SAMPLES}"
         if len(tests) > 1:
             test += "; where fewer than three motions were shown, by Student’s t over participants"
+    strengths = (
+        " Strengths of the methods are those of a Bradley-Terry model with an effect of order, by maximum likelihood; "
+        f"their intervals are over {_whose(several[0])}."
+        if (several := [result.strengths for result in found if isinstance(result.strengths, BradleyTerry)])
+        else ""
+    )
     return (
         f"Preferences were tested by {test}.{family} Chi-square and exact binomial tests of all responses are given as "
         "published, with Wilson’s intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite "
         "quadrature) accounts for the order of presentation. Evidence for no preference is an equivalence test "
-        "(Schuirmann 1987) and a Bayes factor (Rouder et al. 2009)."
+        f"(Schuirmann 1987) and a Bayes factor (Rouder et al. 2009).{strengths}"
     )
 
 
 def _references(found: Collection[Preference]) -> set[str]:
-    several = {BRADLEY_1952} if any(result.strengths for result in found) else set()
+    fitted = [result.strengths for result in found if isinstance(result.strengths, BradleyTerry)]
+    several = {BRADLEY_1952} if fitted else set()
+    several |= {CAMERON_2011} if any(one.motions for one in fitted) else set()
     several |= {CLARK_1973, SATTERTHWAITE_1946}
     return {WILSON_1927, HOLM_1979, SCHUIRMANN_1987, ROUDER_2009} | several
 
