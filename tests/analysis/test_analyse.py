@@ -119,6 +119,13 @@ def test_quality_counts_what_is_missing_and_implausible(same_different_study: Si
     assert result.shown_badly == second.shown_badly == 1
 
 
+def test_quality_counts_false_alarms_of_pairs_that_do_not_differ() -> None:
+    rows = [(0, "different"), (0, "same"), (0, "different"), (1, "different"), (1, "different"), (-5, "same")]
+    table = pd.DataFrame(rows, columns=["difference_frames", "answer"])
+    (row,) = quality(table.assign(participant="p", trial=range(1, 7), task="same-different", study="jnd")).table
+    assert (row.false_alarms, row.same_pairs) == (2, 3)
+
+
 def test_quality_without_times(same_different_study: Simulate) -> None:
     answers = same_different_study(np.random.default_rng(5), participants=2).drop(columns=["response_s", "simulated"])
     result = quality(answers)

@@ -56,6 +56,14 @@ def test_components_below_chance_join_the_rest() -> None:
     assert found.freedom == pytest.approx(63)
 
 
+def test_without_a_rest_both_components_are_kept() -> None:
+    """Participants and motions add up exactly: no rest, and the variance of the mean is that of both."""
+    shares = np.array([[0.0], [0.25], [0.5]]) + np.array([[0.0, 0.125, 0.375, 0.5]])
+    own, other, rest = mean_squares(shares)
+    assert rest == pytest.approx(0, abs=1e-15)
+    assert crossed(8 * shares, 8).error == pytest.approx(np.sqrt((own + other) / 12))
+
+
 def test_missing_answers_are_met_by_least_squares() -> None:
     rng = np.random.default_rng(8)
     shown = rng.integers(0, 4, (15, 5)).astype(float)

@@ -108,6 +108,14 @@ def test_velocity_divides_the_largest_difference_by_that_joints_mean_speed() -> 
     assert found.blend_frames == round(found.unclipped_s * 30)
 
 
+def test_the_velocity_method_says_that_it_clips_only_where_it_does() -> None:
+    for frames in (1, 30):  # at rates at which the same seconds are few frames and many
+        source, destination = make_walk(100, phase=0.2), make_walk(100, phase=2.5, swing=0.8)
+        found = velocity_length(replace(source, fps=frames * 30.0), replace(destination, fps=frames * 30.0), 30, 70)
+        low, high = 0.03 * frames * 30, 2.0 * frames * 30
+        assert ("clipped" in found.note) == (not low - 0.5 <= found.unclipped_s * frames * 30 <= high + 0.5)
+
+
 def test_joint_speed_is_half_the_angular_speed() -> None:
     walk = make_walk(301, fps=300.0, cadence=0.5, swing=0.4)
     hip = walk.skeleton.role("hip.L")

@@ -71,6 +71,14 @@ def test_frames_outside_the_blend_are_the_clips_own(specification: str) -> None:
     assert result.alignment.translation[1] == 0.0
 
 
+def test_a_destination_that_ends_with_the_blend_is_placed_by_its_last_frame() -> None:
+    source, destination = make_walk(120, speed=2.0, turn_rate=0.5), make_walk(90, phase=2.0, speed=1.0, heading=1.0)
+    result = blend(source, destination, 50, 89, 20)
+    tail = moved(destination, result.alignment.yaw, np.array(result.alignment.translation))
+    np.testing.assert_allclose(tail.root_positions[-1, [0, 2]], result.clip.root_positions[-1, [0, 2]], atol=1e-12)
+    assert facing(tail)[-1] == pytest.approx(facing(result.clip)[-1], abs=0.1)
+
+
 def test_start_and_end_frames_say_where_the_blend_starts_and_ends() -> None:
     result = blend(make_walk(100), make_walk(100, phase=2.0), 40, 60, 15)
     assert (result.blend_start, result.blend_stop) == (40, 55)

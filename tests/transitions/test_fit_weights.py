@@ -109,6 +109,13 @@ def test_leaving_one_out_moves_the_best_transition_by_less_than_a_frame(clips: l
     assert seen[-1] == (len(cuts), len(cuts))
 
 
+def test_without_motions_to_carry_over_to_nothing_is_carried_over(clips: list[Clip]) -> None:
+    cuts = cuts_from(clips, WANG2003, good=2, bad=2)
+    found = cross_validate(cuts)
+    assert len(found.deviations) == len(cuts)
+    assert (found.transfer, found.transfer_same) == ((), 0)
+
+
 def test_the_best_transition_within_a_clip_is_not_to_the_next_frame(clips: list[Clip]) -> None:
     i, j = best_transition(clips[0], clips[0], WANG2003)
     assert abs(i - j) >= 15

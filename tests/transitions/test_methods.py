@@ -81,3 +81,10 @@ def test_the_registry_waits_with_numpy_until_a_method_is_used() -> None:
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_a_warp_asks_for_the_poses_beside_its_windows() -> None:
+    shared = METHODS["geodesic"].length.room(30.0, 20)
+    warped = METHODS["timewarp"].length.room(30.0, 20)
+    assert (warped.blend, warped.search) == (shared.blend + 1, shared.search + 1)
+    assert (warped.entry, warped.after) == (1, shared.blend - 1)

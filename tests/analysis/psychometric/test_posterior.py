@@ -217,3 +217,14 @@ def test_speed_is_of_the_right_order() -> None:
     for one in yes:
         fit_psychometric(LEVELS, one, np.full(7, 40))
     assert (time.perf_counter() - start) / 10 < 0.03
+
+
+def test_a_threshold_at_another_share_of_a_sigmoid_that_is_not_symmetric() -> None:
+    """Gumbel in closed form: 1 - exp(-exp(x)), by the place of one half and the width from 5% to 95%."""
+    shown = np.full(7, 5000.0)
+    fit = fitted(
+        np.round(share("gumbel", 4, 3, 0.0, 0.0) * shown), shown, make_model("yes-no", sigmoid="gumbel", guess=0.0)
+    )
+    at = {part: np.log(-np.log(1 - part)) for part in (0.05, 0.5, 0.75, 0.95)}
+    expected = 4 + 3 * (at[0.75] - at[0.5]) / (at[0.95] - at[0.05])
+    assert threshold_at(fit, 0.75).value == pytest.approx(expected, abs=0.1)

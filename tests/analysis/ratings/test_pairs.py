@@ -12,7 +12,7 @@ from scipy import stats
 from study.analysis.analyse import analyse
 from study.analysis.ratings.analyse import PairRatings, Ratings
 from study.analysis.ratings.answers import of_pairs
-from study.analysis.ratings.pairs import AllAnswers, pair_ratings, pair_sentences
+from study.analysis.ratings.pairs import NO_RANKS, AllAnswers, pair_ratings, pair_sentences
 from study.analysis.study_result import Settings
 from study.errors import AnalysisError
 
@@ -125,6 +125,15 @@ def test_what_little_data_can_not_tell_is_said(scores: list[list[int]], why: str
     (sentence,) = pair_sentences([found], 0.05)
     assert ("at 0.05" in sentence) != bool(why)
     assert "None" not in sentence
+
+
+def test_ranks_that_can_not_be_told_are_said_and_others_are_not() -> None:
+    (told,) = pair_ratings(rows([[4, 3], [3, 3], [4, 2], [1, 2], [4, 4], [3, 2]]), 5)
+    assert told.participants.signed_rank_p_value is not None
+    assert NO_RANKS not in told.participants.note
+    (untold,) = pair_ratings(rows([[2], [2], [2]]), 5)
+    assert untold.participants.signed_rank_p_value is None
+    assert NO_RANKS in untold.participants.note
 
 
 def test_no_answers_are_no_questions_and_missed_ones_are_left_out() -> None:

@@ -271,6 +271,7 @@ def test_check_reports_the_audit_and_warns(paper: StimulusSet) -> None:
     assert outlook.audits == paper.audits
     (note,) = (one for one in outlook.notes if "threshold of 75%" in one)
     assert "size in the last frame" in note
+    assert f"(up to {100 * max(one.furthest for one in outlook.shortcuts):.0f}%, " in note
     assert 'match = "duration"' in note
     matched = look_ahead(load_protocol(find_protocol("blend_length_jnd_matched")), LIBRARY)
     assert not [one for one in matched.notes if "threshold" in one]
