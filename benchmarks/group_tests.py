@@ -1,8 +1,8 @@
 """How far tests of groups can be trusted: simulated studies, with and without an effect, through the real analysis.
 
 Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of preference, motions,
-crossed, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code that
-the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
+crossed, thresholds, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code
+that the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from study.analysis.preference.participants import participant_tests
 from study.analysis.preference.published import published_test
 from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.ratings.comparisons import rating_anova
+from study.analysis.same_different.counts import Counts
+from study.analysis.same_different.mixed import fit_mixed_thresholds
 
 CORRELATIONS = (0.0, 0.1, 0.2, 0.3)
 
@@ -110,6 +112,37 @@ def crossed_test(studies, seed):
             print(f"{count:7} {other:10} {np.mean(found):6.3f} {min(found):7.3f} {max(found):8.3f}", flush=True)
 
 
+def thresholds(studies, seed):
+    """Coverage of the median observer's threshold over participants and motions, whose log sensitivities differ."""
+    print("thresholds: coverage of 95% intervals of the median observer's, over both and for these motions alone")
+    print("people motions answers sd_people sd_motions   both  these   mean  true")
+    levels, crossing = np.array([-15.0, -10, -5, 0, 5, 10, 20]), 7.0
+    for people, count, repeats, own, other in (
+        (35, 3, 2, 0.3, 0.25), (35, 8, 1, 0.3, 0.25), (20, 8, 1, 0.3, 0.5), (12, 3, 2, 0.6, 0.5), (12, 4, 2, 0.3, 0.0),
+        (20, 5, 1, 0.3, 0.0),
+    ):  # fmt: skip
+        rng, rows, values = np.random.default_rng([seed, 7, people, count, int(100 * other)]), [], []
+        for _ in range(studies):
+            criterion = 1.9 * np.exp(own * rng.normal(size=(people, 1, 1)))
+            lean = own * rng.normal(size=(people, 1, 1)) + other * rng.normal(size=(1, count, 1))
+            delta = 2.85214 / crossing * np.exp(lean) * np.abs(levels)
+            share = ndtr((delta - criterion) / 2**0.5) + ndtr((-delta - criterion) / 2**0.5)
+            different = rng.binomial(repeats, share).reshape(people, -1).astype(float)
+            shown, names = np.full(different.shape, float(repeats)), np.repeat([f"m{n}" for n in range(count)], 7)
+            found = fit_mixed_thresholds(
+                Counts(tuple(map(str, range(people))), np.tile(levels, count), different, shown, tuple(names))
+            )
+            if isinstance(found, str):
+                continue
+            for side in ("shorter", "longer"):
+                pair = (found.typical[side].interval, found.these_motions[side].interval)
+                rows.append([(one.low or 0.0) <= crossing <= (one.high or np.inf) for one in pair])
+                values.append(found.typical[side].frames or np.nan)
+        both, these = np.mean(rows, axis=0)
+        print(f"{people:6} {count:7} {repeats:7} {own:9} {other:10} {both:6.3f} {these:6.3f} {np.nanmean(values):6.2f} "
+              f"{crossing:5.1f}", flush=True)  # fmt: skip
+
+
 def rating_answers(rng, people, better, own, place):
     """2003's study, one question of five points: two groups by order, two films each."""
     lenient = own * rng.normal(size=people)
@@ -197,6 +230,7 @@ PARTS = {
     "preference": preference,
     "motions": motions,
     "crossed": crossed_test,
+    "thresholds": thresholds,
     "ratings": ratings,
     "mixed": mixed,
     "power": power,

@@ -7,7 +7,8 @@ that between motions less what both contain of the rest, and Student's t takes t
 - A variance component that is smaller than chance gives in half of all samples (F below its median) is taken as none,
   and its sum of squares joins the rest. Otherwise the interval is far too wide where motions do not differ.
 - A variance from few groups is small by chance just where it also makes the t value large, so Satterthwaite's
-  degrees of freedom are too many; here they are counted as if that variance were `1 + 0.6 / (groups - 1)` times itself.
+  degrees of freedom are too many; here they are counted as if that variance were `1 + 0.6 / (groups - 1) / root F`
+  times itself. Where motions decide all (F is large), what is left is Student's t of their means.
 
 Both were settled by simulation (`benchmarks/group_tests.py crossed`), which gives the error rates.
 """
@@ -126,6 +127,47 @@ def crossed(sums: ArrayLike, counts: ArrayLike) -> Crossed:
     return Crossed(mean, np.where(known, error, np.nan), np.where(known, freedom, np.nan))
 
 
+def _satterthwaite(own: FloatArray, freedom: IntArray, rest: FloatArray) -> FloatArray:
+    """Squared variance over degrees of freedom of a variance between groups, with the allowance for few of them."""
+    inverse_f = np.minimum(rest / np.where(own > 0, own, 1.0), 1.0)
+    allowance = 1 + FEW_GROUPS / freedom * np.sqrt(inverse_f)
+    return np.asarray((allowance * own) ** 2 / freedom)
+
+
+@dataclass(frozen=True)
+class BetweenMotions:
+    """What motions that differ add to the variance of a mean over them, beside what is known of these motions."""
+
+    added: float
+    satterthwaite: float
+    """The part of Satterthwaite's sum, squared variance over degrees of freedom, that comes from motions."""
+    deviation: float
+    """Standard deviation across motions."""
+
+
+def between_motions(values: FloatArray, covariance: FloatArray) -> BetweenMotions:
+    """Estimate how far estimates of one thing for each motion differ beyond their own errors.
+
+    Parameters
+    ----------
+    values : ndarray, shape (motions,)
+        An estimate for each.
+    covariance : ndarray, shape (motions, motions)
+        Of their errors; what participants contribute is common to all.
+    """
+    from scipy.special import chdtrc
+
+    count, freedom = len(values), len(values) - 1
+    if count < FEWEST_MOTIONS:
+        return BetweenMotions(0.0, 0.0, 0.0)
+    own = values.var(ddof=1) / count
+    rest = np.maximum((np.trace(covariance) / count - covariance.mean()) / freedom, 1e-12)
+    if chdtrc(freedom, freedom * own / rest) >= KEPT_BELOW:
+        return BetweenMotions(0.0, 0.0, 0.0)
+    added, part = max(own - rest, 0.0), _satterthwaite(own, np.asarray(freedom), rest)
+    return BetweenMotions(float(added), float(part), float(np.sqrt(added * count)))
+
+
 def general_p_values(alone: FloatArray, sums: FloatArray, counts: FloatArray, expected: float = 0.0) -> FloatArray:
     """Return the p-values of `general_test` of many studies at once, shape (...).
 
@@ -183,7 +225,7 @@ def _combined(
     spread = (share_of_rest * pooled) ** 2 / np.maximum(count, 1)
     for own, freedom, keep in zip(sums, freedoms, kept, strict=True):
         variance = variance + np.where(keep, own, 0.0)
-        spread = spread + np.where(keep, ((1 + FEW_GROUPS / freedom) * own) ** 2 / freedom, 0.0)
+        spread = spread + np.where(keep, _satterthwaite(own, freedom, pooled), 0.0)
     variance = np.maximum(variance, pooled)
     freedom_of_all = np.where(spread > 0, variance**2 / np.where(spread > 0, spread, 1.0), 1.0)
     return np.sqrt(variance), np.maximum(freedom_of_all, 1.0)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study.analysis.crossed import FEW_GROUPS, OVER_BOTH, crossed, general_test
+from study.analysis.crossed import FEW_GROUPS, OVER_BOTH, between_motions, crossed, general_test
 from study.analysis.preference.default_test import p_values_of_studies
 from study.analysis.preference.participants import default_p_values
 
@@ -34,9 +34,10 @@ def test_a_complete_table_gives_the_quasi_f_of_clark() -> None:
     assert min(own, other) > 1.5 * rest, "both components are kept"
     found = crossed(chosen, 4)
     variance = own + other - rest
-    freedom = variance**2 / (
-        ((1 + FEW_GROUPS / 19) * own) ** 2 / 19 + ((1 + FEW_GROUPS / 5) * other) ** 2 / 5 + rest**2 / 95
-    )
+    parts = [
+        ((1 + FEW_GROUPS / one * np.sqrt(rest / square)) * square) ** 2 / one for square, one in ((own, 19), (other, 5))
+    ]
+    freedom = variance**2 / (sum(parts) + rest**2 / 95)
     assert found.mean == pytest.approx(chosen.mean() / 4)
     assert found.error == pytest.approx(np.sqrt(variance / 120))
     assert found.freedom == pytest.approx(freedom)
@@ -151,3 +152,23 @@ def test_a_table_of_ratings_has_the_test_over_both_or_over_participants() -> Non
     two = general_test(rows[rows.index.get_level_values(1) < 2])
     assert two.p_value == pytest.approx(stats.ttest_1samp(table[:, :2].mean(axis=1), 0.0).pvalue)
     assert two.generalises_to == "participants, for these motions"
+
+
+def test_where_motions_decide_all_the_test_is_students_of_their_means() -> None:
+    rng = np.random.default_rng(10)
+    lean = 30 * rng.standard_normal((1, 3)) + rng.standard_normal((14, 3))
+    found = crossed(lean, np.ones(lean.shape))
+    assert found.p_values(0.0) == pytest.approx(stats.ttest_1samp(lean.mean(axis=0), 0.0).pvalue, rel=0.05)
+    between = between_motions(lean[0], np.eye(3) * 1e-6)
+    assert between.added == pytest.approx(lean[0].var(ddof=1) / 3)
+    assert between.added**2 / between.satterthwaite == pytest.approx(2, rel=0.01)
+
+
+def test_motions_that_differ_as_chance_has_it_add_nothing() -> None:
+    """That is, where F lies below one, whatever participants add to every motion."""
+    rng = np.random.default_rng(11)
+    covariance = 0.3 * np.eye(5) + 2.0
+    drawn = rng.multivariate_normal(np.zeros(5), covariance, size=1000)
+    added = np.array([between_motions(one, covariance).added for one in drawn])
+    assert (added == 0).mean() == pytest.approx(stats.chi2.cdf(4, 4), abs=0.05)
+    assert added.mean() < 0.05

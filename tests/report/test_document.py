@@ -84,7 +84,7 @@ def test_every_study_has_a_headline_figures_and_tables(written: Path) -> None:
     page, text = Page.of(written), written.read_text(encoding="utf-8")
     for words in ("Just noticeable difference", "Geodesic against fixed", "Naturalness", "Versions and hashes"):
         assert words in page.text
-    assert "The just noticeable difference of 4 simulated observers is estimated at" in page.text
+    assert "The just noticeable difference of the median of 4 simulated observers is estimated at" in page.text
     assert "answers favoured geodesic over fixed" in page.text
     drawings = re.findall(r'<svg[^>]* role="img" aria-labelledby="([^" ]+) ([^"]+)"', text)
     assert len(drawings) >= 6

@@ -57,6 +57,8 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Foreign:
     result = pd.DataFrame({"participant": who, "level": level[given], "yes": yes, "shown": shown})
     if columns.order:
         result["order"] = column(table, columns.order, "order of a pair")[given]
+    if columns.motion:
+        result["motion"] = column(table, columns.motion, "motion")[given]
     missed = int((placed & ~given).sum())
     return Foreign(result.reset_index(drop=True), rows, len(result), int((~placed).sum()), missed)
 

@@ -80,6 +80,7 @@ class BelievedThreshold:
     low: float | None
     high: float | None
     note: str
+    generalises_to: str = ""
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,8 @@ class PsychometricStudy:
         """Return the threshold that `answer` is about: of a typical participant, the mean over them, or of one."""
         mixed, group, alone = self.mixed, self.group, self.pooled.threshold
         if mixed is not None and mixed.threshold is not None:
-            return BelievedThreshold(mixed.threshold, mixed.low, mixed.high, "of a typical participant")
+            whose = "of a typical participant"
+            return BelievedThreshold(mixed.threshold, mixed.low, mixed.high, whose, mixed.generalises_to)
         if group.participants > 1 and group.mean_threshold is not None:
             return BelievedThreshold(group.mean_threshold, group.low, group.high, "mean over participants")
         if alone is None:
@@ -126,7 +128,7 @@ class PsychometricStudy:
                 p=None,
                 p_adjusted=None,
                 test=found.note,
-                generalises_to=holds_for(len(self.participants)),
+                generalises_to=found.generalises_to or holds_for(len(self.participants)),
                 note=NO_TEST,
             )
         ]
@@ -140,7 +142,7 @@ def analyse_psychometric(
     Parameters
     ----------
     trials
-        Columns `participant`, `level`, `yes`, `shown`.
+        Columns `participant`, `level`, `yes`, `shown`, and `motion` where it is known.
     model
         From `make_model`; 2AFC unless given.
     simulations
@@ -261,7 +263,8 @@ def _in_words(
     if mixed and mixed.threshold is not None and mixed.participants is not None:
         found = _with_interval(mixed.threshold, mixed.low, mixed.high, confidence)
         people = counted(mixed.participants, "participant")
-        text = f"The threshold of a typical one of {people} is {found}, by a mixed model"
+        over = f"across {mixed.generalises_to}, by a mixed model"
+        text = f"The threshold of a typical one of {people} is {found}, {over}"
     elif group.mean_threshold is not None:
         found = _with_interval(group.mean_threshold, group.low, group.high, confidence)
         text = (

@@ -60,6 +60,30 @@ class MotionThresholds(Thresholds):
 
 
 @dataclass(frozen=True)
+class BelievedThresholds:
+    """Whose thresholds the headline gives: by their own criterion, free of it, and what the intervals hold for."""
+
+    whose: str
+    jnd: dict[Side, Threshold]
+    criterion_free: dict[Side, Threshold]
+    generalises_to: str
+
+    def in_words(self, level: float, side: Side | None = None) -> str:
+        """Return both thresholds in a sentence, and what each means in a second; of one side, or of all."""
+        own, free = (
+            {one: found for one, found in part.items() if side in (None, one)}
+            for part in (self.jnd, self.criterion_free)
+        )
+        share = f"{100 * level:.0f}%"
+        return (
+            f"Across {self.generalises_to}, the {self.whose}'s just noticeable difference is {_sides_in_words(own)}, "
+            f"and {_sides_in_words(free)} whatever the criterion. At the first, {share} of the answers are "
+            f"“different”, which moves with how readily one says so; at the second, {share} are right by the best "
+            "criterion, which sensitivity alone decides."
+        )
+
+
+@dataclass(frozen=True)
 class SameDifferent(Thresholds):
     """The result of a same-different study."""
 
@@ -89,26 +113,30 @@ class SameDifferent(Thresholds):
         del alpha
         return [self.answer]
 
+    @property
+    def believed(self) -> BelievedThresholds | None:
+        """Return the thresholds that the headline gives."""
+        return _believed(self.model, self.mixed, self.participants)
+
     def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
-        """Return the threshold of the median observer on each side; that of the group where it can't be fitted."""
+        """Return the threshold to be believed on each side, with the criterion-free one beside it."""
         del alpha, confidence
-        found, whose = (self.mixed.typical, "median observer") if self.mixed else ({}, "")
-        if not found and self.model is not None:
-            found, whose = self.model.jnd, "group" if self.participants > 1 else "participant"
+        if (found := self.believed) is None:
+            return []
         return [
             Headline(
                 study=study,
-                statement=f"The {whose}'s just noticeable difference is {_sides_in_words({side: threshold})}.",
+                statement=found.in_words(self.level, side),
                 estimate=threshold.frames,
                 unit=f"frames {side} than the reference",
                 interval=threshold.interval,
                 p=None,
                 p_adjusted=None,
                 test=threshold.method,
-                generalises_to=holds_for(self.participants),
+                generalises_to=found.generalises_to,
                 note="; ".join(filter(None, (threshold.note, NO_TEST))),
             )
-            for side, threshold in found.items()
+            for side, threshold in found.jnd.items()
         ]
 
 
@@ -134,7 +162,8 @@ def analyse_jnd(
     rng = np.random.default_rng(seed)
     counts = count_answers(answers)
     found = _thresholds(counts, level, confidence, resamples, rng)
-    mixed = fit_mixed_thresholds(counts, level=level, confidence=confidence)
+    mixed = fit_mixed_thresholds(count_answers(answers, by_motion=True), level=level, confidence=confidence)
+    among = mixed if isinstance(mixed, MixedThresholds) else None
     moved = counts.differences != 0
     given = same_different_answers(answers)
     chosen = answers[answers["task"] == "same-different"] if "task" in answers.columns else answers
@@ -143,15 +172,25 @@ def analyse_jnd(
         participants=len(counts.participants),
         missed=len(chosen) - len(given),
         level=level,
-        mixed=mixed if isinstance(mixed, MixedThresholds) else None,
+        mixed=among,
         mixed_note=mixed.note if isinstance(mixed, MixedThresholds) else mixed,
         d_prime=d_prime_table(counts, confidence),
         clustering=estimates.clustering(counts.different[:, moved].sum(axis=1), counts.shown[:, moved].sum(axis=1)),
         motions=_by_motion(given, level, confidence, resamples, rng),
         across_motions=across_motions(given),
         order_test=order_test(given),
-        answer=in_words(found, mixed, level),
+        answer=in_words(found, _believed(found.model, among, len(counts.participants)), level),
     )
+
+
+def _believed(model: ModelFit | None, mixed: MixedThresholds | None, participants: int) -> BelievedThresholds | None:
+    """The median observer's thresholds; without a mixed model the group's."""
+    if mixed is not None:
+        return BelievedThresholds("median observer", mixed.typical, mixed.criterion_free, mixed.generalises_to)
+    if model is None:
+        return None
+    whose = "group" if participants > 1 else "participant"
+    return BelievedThresholds(whose, model.jnd, model.corrected, holds_for(participants))
 
 
 def _thresholds(
@@ -182,17 +221,13 @@ def analyse_same_different(answers: pd.DataFrame, name: str, settings: Settings)
     return replace(found, staircases=own, answer=f"{own.in_words()} The following rest on all trials. {found.answer}")
 
 
-def in_words(found: Thresholds, mixed: MixedThresholds | str, level: float) -> str:
-    """Return the thresholds in sentences: as published, corrected, and those of the median observer."""
-    first = f"By linear interpolation, as published, {100 * level:.0f}% of the answers are “different” at "
-    first += _sides_in_words(found.published)
-    if found.model is None:
-        return f"{first}. No model was fitted: {found.model_note}."
-    jnd = _sides_in_words(found.model.jnd)
-    text = f"{first}. By the differencing model the just noticeable difference is {jnd}."
-    if isinstance(mixed, str):
-        return text
-    return f"{text} This is the group's; the median observer's is {_sides_in_words(mixed.typical)}."
+def in_words(found: Thresholds, believed: BelievedThresholds | None, level: float) -> str:
+    """Return the thresholds in sentences: those to be believed, and as published."""
+    share = f"{100 * level:.0f}%"
+    published = f"y linear interpolation, as published, {share} are “different” at {_sides_in_words(found.published)}."
+    if believed is None:
+        return f"B{published} No model was fitted: {found.model_note}."
+    return f"{believed.in_words(level)} B{published}"
 
 
 def _sides_in_words(thresholds: Mapping[Side, Threshold]) -> str:

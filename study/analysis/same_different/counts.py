@@ -40,6 +40,9 @@ class Counts:
     shown: FloatArray
     """`different`, `shown`: `(participants, levels)`: answers "different", and all answers given; trials without a
     response are in neither."""
+    motions: tuple[str, ...] = ()
+    """The motion of each level, where a level is a difference of one motion (and empty where that is none, since all
+    motions share these pairs); empty where levels are of all motions."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +131,8 @@ def same_different_answers(answers: pd.DataFrame) -> pd.DataFrame:
     return given
 
 
-def count_answers(answers: pd.DataFrame) -> Counts:
-    """Count answers by participant and signed difference in blend length."""
+def count_answers(answers: pd.DataFrame, *, by_motion: bool = False) -> Counts:
+    """Count answers by participant and signed difference in blend length, and by motion if asked and known."""
     import pandas as pd
 
     given = same_different_answers(answers)
@@ -140,14 +143,25 @@ def count_answers(answers: pd.DataFrame) -> Counts:
     differences = estimates.numbers(given["difference_frames"], "difference_frames")
     if not np.isfinite(differences).all():
         raise AnalysisError("expected finite numbers in difference_frames, found an infinite one; remove that row")
-    groups = yes.groupby([given["participant"].astype(str), pd.Series(differences, index=given.index)])
-    shown, different = groups.size().unstack(fill_value=0), groups.sum().unstack(fill_value=0)
+    known = by_motion and "motion" in given.columns
+    motion = [given["motion"].astype(str).where(differences != 0, "")] if known else []
+    keys = [given["participant"].astype(str), pd.Series(differences, index=given.index), *motion]
+    groups, columns = yes.groupby(keys), list(range(1, len(keys)))
+    shown, different = groups.size().unstack(columns, fill_value=0), groups.sum().unstack(columns, fill_value=0)
     return Counts(
         tuple(str(name) for name in shown.index),
-        shown.columns.to_numpy(dtype=np.float64),
+        shown.columns.get_level_values(0).to_numpy(dtype=np.float64),
         different.to_numpy(dtype=np.float64),
         shown.to_numpy(dtype=np.float64),
+        tuple(shown.columns.get_level_values(1)) if motion else (),
     )
+
+
+def all_motions(counts: Counts) -> Counts:
+    """Return counts of levels that are differences of one motion as counts of differences."""
+    levels, place = np.unique(counts.differences, return_inverse=True)
+    at = (place[:, None] == np.arange(len(levels))).astype(np.float64)
+    return Counts(counts.participants, levels, counts.different @ at, counts.shown @ at)
 
 
 def both_sides(differences: FloatArray) -> FloatArray:

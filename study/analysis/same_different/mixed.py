@@ -5,8 +5,10 @@ log-normal over people, so that "typical" is the median observer. The mean curve
 anybody's, and crosses 75% further out than the typical observer does; one curve fitted to all answers follows neither
 quite. This model says both: the typical observer's threshold, and where the mean of all people's curves crosses.
 
-The integral over people is a sum over an even grid of standard scores, which is exact to rounding as long as the grid
-is finer than what the answers of one participant tell (Trefethen & Weideman 2014).
+Where motions are known, each has its own sensitivity on each side. Thresholds are those of a motion whose logarithm is
+the mean, so that motions that differ don't flatten the curve; with three or more the interval takes them for a
+sample (`crossed.between_motions`). Log sensitivities that answers leave open (a motion that everybody tells) are kept
+in reach of the others' mean by a normal penalty with a standard deviation of 1, which hardly moves the rest.
 """
 
 from __future__ import annotations
@@ -17,20 +19,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.analysis import estimates
+from study.analysis.crossed import BOTH, FEWEST_MOTIONS, BetweenMotions, between_motions
+from study.analysis.headline import holds_for
 from study.analysis.same_different import fits
-from study.analysis.same_different.counts import SIDES, Counts, Side, Threshold, frames_by_side, log_threshold
+from study.analysis.same_different.counts import (
+    SIDES,
+    Counts,
+    Side,
+    Threshold,
+    both_sides,
+    log_threshold,
+)
 from study.analysis.same_different.model import why_no_fit
-from study.arrays import BoolArray, FloatArray
+from study.analysis.same_different.observers import (
+    ALIKE,
+    AVOIDANCE,
+    LARGEST_SPREAD,
+    REACH,
+    People,
+    covariance_of,
+    curves,
+    gradient_of,
+    maximise,
+    people_of,
+)
+from study.arrays import FloatArray, IntArray
 from study.counting import counted
-from study.models.differencing import ROOT_TWO, density, detected
+from study.models.differencing import Kind, criterion_free_delta
 
 FEWEST_PEOPLE = 3
-FARTHEST_SCORE = 4.2
-COARSEST_STEP = 0.35
-LARGEST_SPREAD = 1.5
-ALIKE = 1e-3
-AVOIDANCE = 0.5
 METHOD = "mixed differencing model; Student interval of the logarithm"
+NO_SAMPLE = BetweenMotions(0.0, 0.0, 0.0)
+"""Motions that stand for themselves alone."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +59,18 @@ class MixedThresholds:
 
     typical: dict[Side, Threshold]
     """The median observer's threshold, by side."""
+    criterion_free: dict[Side, Threshold]
+    """The difference at which the median observer's sensitivity allows that share of right answers, by side: that of an
+    observer with the best criterion."""
     population: dict[Side, Threshold]
     """Where the mean of all people's curves crosses, by side: what percentages of a large group would show."""
+    these_motions: dict[Side, Threshold]
+    """The median observer's threshold with an interval for other people and these motions."""
+    generalises_to: str
+    """What the intervals of the others hold for."""
+    motion_spread: dict[Side, float]
+    """Standard deviation across motions of the logarithm of the threshold, by side; none where motions are no sample,
+    0 where they differ no more than chance has it."""
     sensitivity_spread: float
     criterion_spread: float
     """`sensitivity_spread`, `criterion_spread`: standard deviations over people of the logarithms."""
@@ -49,7 +79,10 @@ class MixedThresholds:
     """`criterion`, `lapse`: the typical observer's criterion, and everybody's lapse rate."""
     log_likelihood: float
     alike_log_likelihood: float
-    """`log_likelihood`, `alike_log_likelihood`: of this model, and of one without individual differences."""
+    """`log_likelihood`, `alike_log_likelihood`: of this model (with its penalty), and of one without individual
+    differences."""
+    curve: tuple[tuple[float, float], ...]
+    """The median observer's: points (difference in frames, percent) for drawing."""
     alike_p_value: float
     """Likelihood-ratio test that people are alike. A spread of none is the least there can be, so the ratio is half
     of the time 0; the mixture of chi-square distributions takes that into account."""
@@ -58,24 +91,15 @@ class MixedThresholds:
 
 
 @dataclass(frozen=True, eq=False)
-class _People:
-    """Counts by participant, the regressors, and the grid of standard scores with the logarithms of its masses."""
-
-    frames: FloatArray
-    different: FloatArray
-    shown: FloatArray
-    sensitivity: FloatArray
-    criterion: FloatArray
-    log_mass: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class _Doubt:
-    """How sure the parameters are: their covariance, the point it was taken at, and how many people it rests on."""
+    """How sure the parameters of the mean motion are: their covariance, the point it was taken at, how many people it
+    rests on, and what motions add on each side.
+    """
 
     covariance: FloatArray
     point: FloatArray
     participants: int
+    motions: tuple[BetweenMotions, ...]
 
 
 def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) -> MixedThresholds | str:
@@ -106,141 +130,92 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
         reason = f"{few} too few to estimate individual differences; at least {FEWEST_PEOPLE}"
     if reason:
         return reason
-    people = _people(counts, answered)
-    start = fits.fit(people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None])
-    if start.held[0, 2:].any() or start.held[0, 0]:
+    people, sides = people_of(counts, answered)
+    together = replace(people, frames=_by_side(people, len(sides)))
+    group, alike = (_one_curve(part) for part in (together, people))
+    if group.held[0, 2:].any() or group.held[0, 0]:
         return "the group's sensitivity or criterion is at its bound: individual differences cannot be estimated"
-    slopes = np.log(start.slopes[0])
-    begin = np.concatenate([np.log(start.criterion), start.lapse, slopes, [0.2, 0.2]])
+    slopes = np.log(group.slopes[0])[people.side_of]
+    slopes = np.clip(np.log(alike.slopes[0]), slopes - 1.5 * REACH, slopes + 1.5 * REACH)
+    begin = np.concatenate([np.log(group.criterion), group.lapse, slopes, [0.2, 0.2]])
     bounds = [(math.log(1e-3), math.log(9.0)), (0.0, fits.LARGEST_LAPSE), *((slope - 3, slope + 3) for slope in slopes)]
-    point, value, settled = _maximise(people, begin, [*bounds, *[(0.0, LARGEST_SPREAD)] * 2], 0.0)
+    point, value, settled = maximise(people, begin, [*bounds, *[(0.0, LARGEST_SPREAD)] * 2], 0.0)
     near = np.concatenate([point[:-2], np.maximum(point[-2:-1], 0.1), point[-1:]])
-    wary, _, _ = _maximise(people, near, [*bounds, (2 * ALIKE, LARGEST_SPREAD), (0.0, LARGEST_SPREAD)], AVOIDANCE)
-    doubt = _Doubt(_covariance(wary, people), wary, len(people.shown))
-    sides = [SIDES[index] for index in frames_by_side(counts.differences[counts.shown.sum(axis=0) > 0])[1]]
-    nobody_else = replace(people, sensitivity=np.zeros(1), criterion=np.zeros(1), log_mass=np.zeros(1))
-    alike = float(start.log_likelihood[0])
+    wary, _, _ = maximise(people, near, [*bounds, (2 * ALIKE, LARGEST_SPREAD), (0.0, LARGEST_SPREAD)], AVOIDANCE)
+    doubt = _doubt(wary, people, len(sides))
+    mean = _of_mean_motion(people.side_of) @ point
+    median = replace(together, sensitivity=np.zeros(1), criterion=np.zeros(1), log_mass=np.zeros(1))
+    here = replace(doubt, motions=(NO_SAMPLE,) * len(sides))
+    ratio = 2 * (value - float(alike.log_likelihood[0]))
+    sampled = bool(np.bincount(people.side_of).min() >= FEWEST_MOTIONS)
     return MixedThresholds(
-        typical=_thresholds(point, doubt, nobody_else, sides, level, confidence),
-        population=_thresholds(point, doubt, people, sides, level, confidence),
+        typical=_thresholds(mean, doubt, median, sides, level, confidence),
+        criterion_free=_thresholds(mean, doubt, median, sides, level, confidence, "criterion_free"),
+        population=_thresholds(mean, doubt, together, sides, level, confidence),
+        these_motions=_thresholds(mean, here, median, sides, level, confidence),
+        generalises_to=BOTH if sampled else holds_for(len(people.shown)),
+        motion_spread={side: one.deviation for side, one in zip(sides, doubt.motions, strict=True) if sampled},
         sensitivity_spread=float(point[-2]),
         criterion_spread=float(point[-1]),
         criterion=math.exp(point[0]),
         lapse=float(point[1]),
+        curve=_curve(mean, median, counts.differences, sides),
         log_likelihood=value,
-        alike_log_likelihood=alike,
-        alike_p_value=_alike_probability(max(2 * (value - alike), 0.0)),
+        alike_log_likelihood=float(alike.log_likelihood[0]),
+        alike_p_value=_alike_probability(max(ratio, 0.0)),
         note="" if settled else "the search for the maximum did not converge",
     )
 
 
-def _people(counts: Counts, answered: BoolArray) -> _People:
-    present = counts.shown.sum(axis=0) > 0
-    shown = counts.shown[answered][:, present]
-    # One participant's answers tell the scores to about 2 / sqrt(answers); the grid has to be finer.
-    step = min(COARSEST_STEP, 2.5 / math.sqrt(float(shown.sum(axis=1).max())))
-    half = np.arange(0, FARTHEST_SCORE + step, step)
-    scores = np.concatenate([-half[:0:-1], half])
-    first, second = (part.ravel() for part in np.meshgrid(scores, scores, indexing="ij"))
-    near = first**2 + second**2 <= FARTHEST_SCORE**2
-    first, second = first[near], second[near]
-    log_mass = -(first**2 + second**2) / 2
-    return _People(
-        frames_by_side(counts.differences[present])[0],
-        counts.different[answered][:, present],
-        shown,
-        first,
-        second,
-        log_mass - np.log(np.exp(log_mass).sum()),
-    )
+def _curve(
+    point: FloatArray, median: People, differences: FloatArray, sides: list[Side]
+) -> tuple[tuple[float, float], ...]:
+    line = np.linspace(differences.min(), differences.max(), 201)
+    share = curves(point, median, both_sides(line)[:, [SIDES.index(side) for side in sides]])[0][0]
+    return tuple((float(x), 100 * float(y)) for x, y in zip(line, share, strict=True))
 
 
-def _curves(point: FloatArray, people: _People, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """P("different") of the people on the grid, shape (people, levels), and its derivatives by the parameters.
-
-    Parameters are log criterion, lapse, log slopes, and the spreads of log sensitivity and log criterion.
-    """
-    factor = np.exp(point[-2] * people.sensitivity)[:, None]
-    criterion = np.exp(point[0] + point[-1] * people.criterion)[:, None]
-    slopes, lapse = np.exp(point[2:-2]), point[1]
-    delta = factor * (frames @ slopes)
-    above, below = (delta - criterion) / ROOT_TWO, (delta + criterion) / ROOT_TWO
-    dense_above, dense_below = density(above), density(below)
-    share = detected(delta, criterion)
-    by_criterion = -(1 - lapse) * (dense_above + dense_below) / ROOT_TWO * criterion
-    by_delta = (1 - lapse) * (dense_above - dense_below) / ROOT_TWO
-    by_slopes = [by_delta * factor * (frames[:, place] * slope) for place, slope in enumerate(slopes)]
-    by_spreads = [by_delta * delta * people.sensitivity[:, None], by_criterion * people.criterion[:, None]]
-    by = np.stack([by_criterion, 0.5 - share, *by_slopes, *by_spreads])
-    return lapse / 2 + (1 - lapse) * share, by
+def _one_curve(people: People) -> fits.Fits:
+    """The differencing model of all answers as one person's."""
+    return fits.fit(people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None])
 
 
-def _log_likelihood(point: FloatArray, people: _People) -> tuple[float, FloatArray]:
-    """Marginal log likelihood and its gradient."""
-    share, by = _curves(point, people, people.frames)
-    share = np.clip(share, fits.SMALLEST_PROBABILITY, 1 - fits.SMALLEST_PROBABILITY)
-    value = people.different @ np.log(share).T + (people.shown - people.different) @ np.log1p(-share).T
-    value += people.log_mass
-    highest = value.max(axis=1, keepdims=True)
-    weights = np.exp(value - highest)
-    total = weights.sum(axis=1, keepdims=True)
-    weights /= total
-    # Each grid point answers for the participants by their posterior masses there.
-    yes, asked = weights.T @ people.different, weights.T @ people.shown
-    gradient = np.einsum("kl,pkl->p", (yes - asked * share) / (share * (1 - share)), by)
-    return float((highest + np.log(total)).sum()), gradient
+def _by_side(people: People, sides: int) -> FloatArray:
+    """Sizes of the differences with one column a side, shape (levels, sides)."""
+    return np.asarray(people.frames @ (people.side_of[:, None] == np.arange(sides)))
 
 
-def _maximise(
-    people: _People, begin: FloatArray, bounds: list[tuple[float, float]], avoidance: float
-) -> tuple[FloatArray, float, bool]:
-    """The highest point of the likelihood times the spread of sensitivity to the power `avoidance`."""
-    from scipy.optimize import minimize
-
-    def loss(point: FloatArray) -> tuple[float, FloatArray]:
-        value, gradient = _log_likelihood(point, people)
-        if avoidance:
-            value += avoidance * math.log(point[-2])
-            gradient[-2] += avoidance / point[-2]
-        return -value, -gradient
-
-    found = minimize(loss, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 200, "ftol": 1e-10})
-    return np.asarray(found.x, dtype=np.float64), -float(found.fun), bool(found.success)
+def _of_mean_motion(side_of: IntArray) -> FloatArray:
+    """What turns parameters with a log slope for each motion of a side into those with the mean of these."""
+    sides = int(side_of.max()) + 1
+    turned = np.zeros((sides + 4, len(side_of) + 4))
+    turned[:2, :2] = turned[-2:, -2:] = np.eye(2)
+    turned[2:-2, 2:-2] = (np.arange(sides)[:, None] == side_of) / np.bincount(side_of)[:, None]
+    return turned
 
 
-def _covariance(point: FloatArray, people: _People) -> FloatArray:
-    """Inverse of the curvature, avoidance included; parameters at a bound are held there."""
-    step, size = 1e-4, len(point)
-    curvature = np.empty((size, size))
-    for place in range(size):
-        moved = np.zeros(size)
-        moved[place] = step
-        ahead, behind = _log_likelihood(point + moved, people)[1], _log_likelihood(point - moved, people)[1]
-        curvature[place] = -(ahead - behind) / (2 * step)
-    curvature = (curvature + curvature.T) / 2
-    curvature[-2, -2] += AVOIDANCE / point[-2] ** 2
-    held = np.zeros(size, dtype=bool)
-    held[1] = point[1] <= 2 * step or point[1] >= fits.LARGEST_LAPSE - 1e-9
-    held[-2:] = (point[-2:] <= ALIKE) | (point[-2:] >= LARGEST_SPREAD - 1e-9)
-    free = np.flatnonzero(~held)
-    result = np.zeros((size, size))
-    result[np.ix_(free, free)] = np.linalg.pinv(curvature[np.ix_(free, free)], hermitian=True)
-    return result
+def _doubt(point: FloatArray, people: People, sides: int) -> _Doubt:
+    covariance, turned = covariance_of(point, people), _of_mean_motion(people.side_of)
+    places = [2 + np.flatnonzero(people.side_of == side) for side in range(sides)]
+    between = tuple(between_motions(point[own], covariance[np.ix_(own, own)]) for own in places)
+    return _Doubt(turned @ covariance @ turned.T, turned @ point, len(people.shown), between)
 
 
-def _log_threshold(point: FloatArray, people: _People, place: int, level: float) -> tuple[float, FloatArray]:
+def _log_threshold(point: FloatArray, people: People, place: int, level: float, kind: Kind) -> tuple[float, FloatArray]:
     """Log threshold (frames) of the people on the grid, and its derivatives; infinite where there is none.
 
     Where the mean curve m crosses at x, d log x / d parameter = -(d m / d parameter) / (d m / d log x), and a change of
     the logarithm of x does what one of the logarithm of the slope does.
     """
-    mass = np.exp(people.log_mass)
+    if kind == "criterion_free":  # sensitivity alone decides it
+        return math.log(criterion_free_delta(level)) - float(point[2 + place]), -np.eye(len(point))[2 + place]
+    mass = np.exp(people.log_mass)[:, None]
     alone = np.zeros((1, people.frames.shape[1]))
 
     def mean_at(log_frames: float) -> tuple[float, FloatArray]:
         alone[0, place] = math.exp(log_frames)
-        share, by = _curves(point, people, alone)
-        return float(mass @ share[:, 0]), np.asarray(by[:, :, 0] @ mass, dtype=np.float64)
+        share, *by = curves(point, people, alone)
+        return float((mass * share).sum()), gradient_of(mass, tuple(by), point, people, alone)
 
     low, high = -float(point[2 + place]) - 5.0, -float(point[2 + place]) + 4.0
     if mean_at(low)[0] >= level or mean_at(high)[0] < level:
@@ -255,41 +230,43 @@ def _log_threshold(point: FloatArray, people: _People, place: int, level: float)
 def _thresholds(
     point: FloatArray,
     doubt: _Doubt,
-    people: _People,
+    people: People,
     sides: list[Side],
     level: float,
     confidence: float,
+    kind: Kind = "different",
 ) -> dict[Side, Threshold]:
     """Thresholds of the people on the grid; one person there is the median observer."""
     result: dict[Side, Threshold] = {}
     for place, side in enumerate(sides):
         largest, nothing = float(people.frames[:, place].max()), estimates.Interval(None, None, confidence)
-        log_found, gradient = _log_threshold(point, people, place, level)
+        log_found, gradient = _log_threshold(point, people, place, level, kind)
         if not math.isfinite(log_found):
             note = f"{100 * level:g}% is not crossed: false alarms lie above it, or lapses keep the curve below it"
             result[side] = Threshold(side, None, None, nothing, "not estimable", METHOD, note)
             continue
-        variance, freedom = _variance(doubt, gradient)
+        variance, freedom = _variance(doubt, gradient, doubt.motions[place])
         error = math.sqrt(variance) if variance > 0 else None
         times = estimates.t_quantile(confidence, freedom)
         result[side] = log_threshold(side, math.exp(log_found), error, times, largest, METHOD, confidence)
     return result
 
 
-def _variance(doubt: _Doubt, gradient: FloatArray) -> tuple[float, float]:
+def _variance(doubt: _Doubt, gradient: FloatArray, motions: BetweenMotions) -> tuple[float, float]:
     """Variance of the log threshold, and its degrees of freedom.
 
-    The part that comes from people's differing rests on as many of them as there are, less one; the part that comes
-    from single answers rests on many (Satterthwaite 1946). Maximum likelihood takes the first part too small by one
-    participant, as it does every variance.
+    The part that comes from people's differing rests on as many of them as there are, less one, that from motions'
+    on as many motions; the part that comes from single answers rests on many (Satterthwaite 1946). Maximum likelihood
+    takes the first part too small by one participant, as it does every variance.
     """
     variance, others = float(gradient @ doubt.covariance @ gradient), doubt.participants - 1
     between = float(doubt.point[-2] ** 2 + (gradient[0] * doubt.point[-1]) ** 2) / others
     variance += between / doubt.participants
     if not variance > 0:
         return 0.0, math.inf
-    part = min(between / variance, 1.0)
-    return variance, others / max(part, 1e-3) ** 2
+    spread = min(between, variance) ** 2 / others + motions.satterthwaite
+    variance += motions.added
+    return variance, variance**2 / max(spread, 1e-6 * variance**2)
 
 
 def _alike_probability(ratio: float) -> float:

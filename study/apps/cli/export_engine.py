@@ -17,7 +17,7 @@ from study.counting import counted
 @click.argument("found", type=READABLE, metavar="ADVICE|TABLE")
 @click.argument("clips", metavar="[CLIP...]", nargs=-1)
 @clips_options
-@click.option("--out", type=FOLDER, required=True, help="Folder to write; one that is there is replaced.")
+@click.option("--out", type=FOLDER, required=True, help="Folder to write to; other files in it stay.")
 @click.option("--native", is_flag=True, help="Write each animation at its clip's own frame rate.")
 @json_option
 def export_engine(found: Path, clips: tuple[str, ...], library: str | None, out: Path, native: bool) -> None:
@@ -34,7 +34,7 @@ def export_engine(found: Path, clips: tuple[str, ...], library: str | None, out:
     from study.transitions.one_hop.table import FORMAT, read_table
 
     said: Any = {"format": FORMAT}
-    if found.suffix == ".json":
+    if found.suffix not in (".npz", ".bin"):
         try:
             said = json.loads(read_text(found, "advice or a one-hop table"))
         except (ValueError, RecursionError) as error:

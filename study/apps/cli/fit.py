@@ -24,9 +24,9 @@ Read = tuple["Foreign", Callable[[], dict[str, Any]]]
 
 # The options of each task, in addition to the common ones; others are refused.
 OWN = {
-    "2afc": ("level", "shown", "yes", "sigmoid", "choices", "lapse"),
-    "yes-no": ("level", "shown", "yes", "sigmoid", "guess", "lapse"),
-    "same-different": ("level", "shown", "yes", "order", "reference_first", "threshold"),
+    "2afc": ("level", "motion", "shown", "yes", "sigmoid", "choices", "lapse"),
+    "yes-no": ("level", "motion", "shown", "yes", "sigmoid", "guess", "lapse"),
+    "same-different": ("level", "motion", "shown", "yes", "order", "reference_first", "threshold"),
     "preference": ("first", "second", "motion", "yes", "tie", "alpha"),
     "rating": ("method", "motion", "item", "scale", "ends", "alpha"),
 }
@@ -187,7 +187,7 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 @click.option("--first", help="Preference: column of the method shown first.")
 @click.option("--second", help="Preference: column of the method shown second.")
 @click.option("--method", help="Rating: column of the method.")
-@click.option("--motion", help="Preference, rating: column of the motion.")
+@click.option("--motion", help="Column of the motion (or other item) that was shown.")
 @click.option("--item", help="Rating: column of the question.")
 @click.option("--scale", multiple=True, help="Rating: WORD=POINT, if the scale has words; once for each word.")
 @click.option("--ends", type=(float, float), help="Rating: lowest and highest point of the scale.")

@@ -20,7 +20,7 @@ from study.motion.clip import Clip, refuse_large
 from study.motion.readers.bvh_hierarchy import Hierarchy, Joint, read_hierarchy
 from study.motion.readers.frame_times import frame_rate, read_motion_header, stated_rate
 from study.motion.readers.numbers import parse_table
-from study.motion.readers.rigid import Measured, rigid_clip
+from study.motion.readers.rigid import Measured, rigid_clip, unique
 from study.motion.readers.source import Source, read_source
 
 # The number of joints with a repeated name that are named one by one.
@@ -50,9 +50,11 @@ def read_bvh(
     """
     source = read_source(path, "a BVH file")
     hierarchy, offset = read_hierarchy(source)
-    for name, unique in hierarchy.renamed[:_NAMED]:
-        source.warn(f"two joints are called {name!r}; the second is read as {unique!r}")
-    if more := len(hierarchy.renamed[_NAMED:]):
+    names = unique([joint.name for joint in hierarchy.joints])
+    renamed = [(joint.name, name) for joint, name in zip(hierarchy.joints, names, strict=True) if joint.name != name]
+    for name, other in renamed[:_NAMED]:
+        source.warn(f"two joints are called {name!r}; the second is read as {other!r}")
+    if more := len(renamed[_NAMED:]):
         source.warn(f"{more} more joints have the name of another, and are numbered likewise")
     frame_time, stated, offset = read_motion_header(source, offset)
     values = parse_table(source, offset, hierarchy.columns)
@@ -63,13 +65,12 @@ def read_bvh(
         fps = stated_rate(source, frame_time)
     elif fps != (stated_fps := frame_rate(frame_time.text)):
         notes.append(f"taken at {fps:g} fps, as told, and not at the file's {stated_fps:g}")
-    measured = _measured(source, hierarchy, values)
+    measured = _measured(source, hierarchy, names, values)
     return rigid_clip(source, source.path.stem, measured, fps, metres_per_unit, mapping, notes)
 
 
-def _measured(source: Source, hierarchy: Hierarchy, values: FloatArray) -> Measured:
+def _measured(source: Source, hierarchy: Hierarchy, names: tuple[str, ...], values: FloatArray) -> Measured:
     """The body and its motion by a hierarchy and the values of its channels, shape (frames, channels)."""
-    names = tuple(joint.name for joint in hierarchy.joints)
     refuse_large(len(values), len(names), str(source.path), values.size)
     paths = {j: _path(joint, values) for j, joint in enumerate(hierarchy.joints) if joint.columns("position") or j == 0}
     return Measured(

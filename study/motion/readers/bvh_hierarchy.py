@@ -43,20 +43,6 @@ class Hierarchy:
     joints: list[Joint] = field(default_factory=list)
     ends: list[tuple[int, FloatArray]] = field(default_factory=list)
     columns: int = 0
-    # Each name that is taken, with the number that the last joint of that name was given.
-    names: dict[str, int] = field(default_factory=dict)
-    renamed: list[tuple[str, str]] = field(default_factory=list)
-
-    def unique(self, name: str) -> str:
-        """A name that no joint has yet: the name itself, or with `_2`, `_3` ... behind it."""
-        unique, number = name, self.names.get(name, 1)
-        while unique in self.names:
-            number += 1
-            unique = f"{name}_{number}"
-        self.names |= {name: number, unique: 1} if unique != name else {name: 1}
-        if unique != name:
-            self.renamed.append((name, unique))
-        return unique
 
 
 class _Tokens:
@@ -140,8 +126,7 @@ def _open_joint(tokens: _Tokens, hierarchy: Hierarchy, start: int, open_joints: 
             start, f"Expected at most {MOST_JOINTS} joints, found more. Leave out what is no part of the body."
         )
     tokens.word("{")
-    unique = hierarchy.unique(name)
-    hierarchy.joints.append(Joint(unique, open_joints[-1] if open_joints else -1, start))
+    hierarchy.joints.append(Joint(name, open_joints[-1] if open_joints else -1, start))
     return len(hierarchy.joints) - 1
 
 

@@ -6,7 +6,7 @@ carries the body is folded into it, and what a clip can't hold causes a warning.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,18 @@ class Measured:
     paths: Mapping[int, FloatArray]
     """Places of joints in their parents `(frames, 3)`: of the root, and of those that have them in each frame."""
     rotations: FloatArray
+
+
+def unique(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, with `_2`, `_3` ... behind those that stand before."""
+    found: dict[str, int] = {}
+    for name in names:
+        one = name
+        while one in found:
+            found[name] += 1
+            one = f"{name}_{found[name]}"
+        found[one] = 1
+    return tuple(found)
 
 
 def rigid_clip(
@@ -100,7 +112,8 @@ def _unit(source: Source, skeleton: Skeleton, stated: float | None, history: lis
         return stated
     history.append(scale.note)
     if scale.by_legs and not (scale.plausible and stated in (None, scale.metres_per_unit)):
-        source.warn(f"{scale.note}; a person or the format has another size: say `unit` in library.toml")
+        why = "the format has another" if scale.plausible else "a person has another size"
+        source.warn(f"{scale.note}; {why}: say `unit` in library.toml")
     return scale.metres_per_unit
 
 

@@ -13,19 +13,18 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from study.errors import TransitionError
-from study.files import whole_folder
+from study.files import write_whole
 from study.motion.clip import Clip
-from study.motion.readers.gltf_file import unique
 from study.motion.readers.gltf_writing import write_glb
+from study.motion.readers.rigid import unique
 from study.transitions.blending import blend
 from study.transitions.one_hop.table import OneHopTable, write_table
 
@@ -47,45 +46,31 @@ class Advised:
     blend_frames: int
 
 
-def read_advice(path: Path, said: Mapping[str, Any]) -> tuple[float, list[Advised]]:
-    """The frame rate and the transitions of an `advice.json`.
-
-    Raises
-    ------
-    TransitionError
-        For what `segue advise` did not write.
-    """
-    kinds = {
-        name: int if name.endswith("_frames") or name.endswith("_frame") else str for name in Advised.__match_args__
-    }
+def read_advice(path: Path, said: Any) -> tuple[float, list[Advised]]:
+    """The frame rate and the transitions of an `advice.json`; `TransitionError` for what is none."""
+    names = [field.name for field in fields(Advised)]
     try:
-        rows = [Advised(**{name: _of(kind, row[name]) for name, kind in kinds.items()}) for row in said["advice"]]
-        fps = float(said["fps"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise TransitionError(
-            f"{path}: expected the advice.json of `segue advise --out` or a one-hop table, found something else "
-            f"({type(error).__name__}: {error})."
-        ) from error
-    if not rows or not fps > 0.0:
-        raise TransitionError(f"{path}: expected advice on transitions, found none. Run `segue advise` again.")
-    return fps, rows
-
-
-def _of(kind: type, value: object) -> Any:
-    if type(value) is not kind:
-        raise TypeError(f"{value!r} is no {kind.__name__}")
-    return value
+        rows = [Advised(**{name: row[name] for name in names}) for row in said["advice"]]
+        words = [word for row in rows for word in astuple(row)[:4]]
+        frames = [frame for row in rows for frame in astuple(row)[4:]]
+        if rows and {*map(type, words)} == {str} and {*map(type, frames)} == {int} and said["fps"] > 0.0:
+            return float(said["fps"]), rows
+    except (KeyError, TypeError):
+        pass  # refused with what has other values
+    raise TransitionError(
+        f"{path}: expected the advice.json of `segue advise --out`, or a one-hop table, found neither."
+    )
 
 
 def export(
     folder: Path, clips: Mapping[str, Clip], shown: Sequence[Clip], advice: Sequence[Advised], table: OneHopTable | None
 ) -> dict[str, Any]:
-    """Write the folder, whole or not at all, and give the state machine.
+    """Write the files, each whole or not at all, and give the state machine.
 
     Parameters
     ----------
     folder
-        It takes the place of one that is there.
+        Other files in it stay, since it may be a game's.
     clips
         The states by name, on one skeleton, at the frame rate of the advice or the table.
     shown
@@ -93,70 +78,40 @@ def export(
     advice, table
         The transitions; none, or None, where there are none of that kind.
     """
-    names = unique([re.sub(r"[^\w .-]", "_", name) for name in clips])
+    animations = dict(zip(unique([re.sub(r"[^\w .-]", "_", name) for name in clips]), shown, strict=True))
     states = [
-        {
-            "name": name,
-            "animation": animation,
-            "frames": clip.frames,
-            "fps": clip.fps,
-            "length_s": (clip.frames - 1) / clip.fps,
-        }
-        for name, animation, clip in zip(clips, names, shown, strict=True)
+        {"name": name, "animation": animation, "frames": c.frames, "fps": c.fps, "length_s": (c.frames - 1) / c.fps}
+        for name, (animation, c) in zip(clips, animations.items(), strict=True)
     ]
     machine = {
         "format": FORMAT,
         "version": VERSION,
         "file": "clips.glb",
-        "up": "Y",
-        "unit": "metre",
         "states": states,
         "transitions": [_transition(row, clips[row.source], clips[row.destination]) for row in advice],
         "one_hop": None if table is None else {"table": "one_hop.bin", "header": "one_hop.json"},
     }
-    with whole_folder(folder) as unfinished:
-        write_glb(dict(zip(names, shown, strict=True)), unfinished / "clips.glb")
-        (unfinished / "state_machine.json").write_text(_text(machine), encoding="utf-8")
-        if table is not None:
-            write_table(table, unfinished / "one_hop.bin")
-        for file in sorted((Path(__file__).parent / "importers").iterdir()):
-            shutil.copyfile(file, unfinished / file.name)
+    # A line for each key, and for each list of numbers.
+    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda m: f"[{' '.join(m[1].split())}]", json.dumps(machine, indent=1))
+    write_glb(animations, folder / "clips.glb")
+    write_whole(folder / "state_machine.json", f"{text}\n")
+    if table is not None:
+        write_table(table, folder / "one_hop.bin")
+    for file in filter(Path.is_file, (Path(__file__).parent / "importers").iterdir()):
+        write_whole(folder / file.name, file.read_bytes())
     return machine
-
-
-def _text(machine: Mapping[str, Any]) -> str:
-    """JSON with a line for each key, and for each list of numbers."""
-    return (
-        re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda m: f"[{' '.join(m[1].split())}]", json.dumps(machine, indent=1)) + "\n"
-    )
 
 
 def _transition(row: Advised, source: Clip, destination: Clip) -> dict[str, Any]:
     """A transition in seconds, as parts of the clips' lengths, and with the root's path through it."""
     made = blend(source, destination, row.start_frame, row.end_frame, row.blend_frames, specification=SPECIFICATION)
     lead = 1 if made.source_frames[0] > 0 and made.destination_frames[0] > 0 else 0
-    start, offset, duration = (
-        frames / source.fps
-        for frames in (made.source_frames[0] - lead, made.destination_frames[0] - lead, row.blend_frames + lead)
-    )
+    times = made.source_frames[0] - lead, made.destination_frames[0] - lead, row.blend_frames + lead
     through = slice(made.blend_start - lead, made.blend_stop + 1)
-    root = np.concatenate([made.clip.root_positions[through], made.clip.rotations[through, 0][:, [1, 2, 3, 0]]], axis=1)
-    lengths = [(clip.frames - 1) / clip.fps for clip in (source, destination)]
-    return {
-        "source": row.source,
-        "destination": row.destination,
-        "method": row.method,
-        "make": row.make,
-        "specification": SPECIFICATION,
-        "fps": source.fps,
-        "blend_frames": row.blend_frames,
-        "start_s": start,
-        "start_normalised": start / lengths[0],
-        "offset_s": offset,
-        "offset_normalised": offset / lengths[1],
-        "duration_s": duration,
-        "duration_normalised": duration / lengths[0],
-        "turn_radians": made.alignment.yaw,
-        "shift_m": list(made.alignment.translation),
-        "root": np.round(root, _DECIMALS).tolist(),
-    }
+    root = [made.clip.root_positions[through], made.clip.rotations[through, 0][:, [1, 2, 3, 0]]]
+    said: dict[str, Any] = {name: getattr(row, name) for name in ("source", "destination", "method", "make")}
+    said |= {"specification": SPECIFICATION, "fps": source.fps, "blend_frames": row.blend_frames}
+    for name, frames, whole in zip(("start", "offset", "duration"), times, (source, destination, source), strict=True):
+        said |= {f"{name}_s": frames / source.fps, f"{name}_normalised": frames / (whole.frames - 1)}
+    said |= {"turn_radians": made.alignment.yaw, "shift_m": list(made.alignment.translation)}
+    return said | {"root": np.round(np.concatenate(root, axis=1), _DECIMALS).tolist()}

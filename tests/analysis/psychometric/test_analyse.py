@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 from study.analysis.psychometric.analyse import analyse_psychometric
+from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.psychometric.model import make_model
 
 LEVELS = np.arange(1.0, 8.0)
@@ -63,3 +64,25 @@ def test_a_group_without_a_threshold_gets_none(thresholds: list[float], says: st
     assert result.mixed is None or result.mixed.threshold is None
     assert result.answer.startswith("No threshold")
     assert says in str(result.participants)
+
+
+def test_motions_that_differ_have_a_mean_threshold_that_holds_for_others() -> None:
+    """Thresholds 3, 4 and 5: the mean, with Student's interval of three where answers and people are many."""
+    rng = np.random.default_rng(21)
+    rows = [
+        (f"p{person}", f"m{motion}", level, rng.binomial(20, norm.cdf(level - 3 - motion - lean)), 20)
+        for person, lean in enumerate(0.3 * rng.standard_normal(40))
+        for motion in range(3)
+        for level in range(1, 8)
+    ]
+    table = pd.DataFrame(rows, columns=["participant", "motion", "level", "yes", "shown"])
+    found = psychometric_mixed(table)
+    assert found.threshold == pytest.approx(4, abs=0.15)
+    assert found.motion_spread == pytest.approx(1, abs=0.1)
+    assert found.standard_error == pytest.approx(1 / 3**0.5, rel=0.1)
+    assert found.high - found.threshold == pytest.approx(found.standard_error * t.ppf(0.975, 2), rel=0.4)
+    assert found.generalises_to == "participants and motions"
+    alone = psychometric_mixed(table.drop(columns="motion"))
+    assert alone.generalises_to == "participants, for these motions"
+    assert alone.standard_error < found.standard_error / 3
+    assert alone.slope < 0.9 * found.slope

@@ -11,9 +11,10 @@ import pytest
 from scipy.stats import norm
 
 from study.analysis.same_different.analyse import analyse_jnd
-from study.analysis.same_different.counts import Counts, count_answers
+from study.analysis.same_different.counts import Counts, all_motions, count_answers
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
+from study.models.differencing import criterion_free_delta
 
 LEVELS = np.array([-15.0, -10, -5, 0, 5, 10, 20])
 
@@ -153,9 +154,91 @@ def test_what_cannot_be_estimated_is_said(counts: Counts, says: str) -> None:
 def test_a_study_reports_the_median_observer(same_different_study: Callable[..., pd.DataFrame]) -> None:
     answers = same_different_study(np.random.default_rng(8), participants=10, spread=0.3)
     result = analyse_jnd(answers, resamples=50)
-    expected = fitted(count_answers(answers))
+    expected = fitted(count_answers(answers, by_motion=True))
     assert result.mixed.typical["longer"].frames == pytest.approx(expected.typical["longer"].frames)
-    assert "the median observer's is k +" in result.answer
+    assert "the median observer's just noticeable difference is k +" in result.answer
     alone = analyse_jnd(answers[answers["participant"] == "p00"], resamples=50)
     assert alone.mixed is None
     assert "too few to estimate individual differences" in alone.mixed_note
+
+
+def several_motions(rng: np.random.Generator, scales: list[float], count: int, answers: int) -> Counts:
+    """Counts by motion, each with its own sensitivity, of people who differ by 0.3."""
+    own = np.exp(0.3 * rng.normal(size=count))
+    shares = np.array([[share_of(one * scale, 2.0) for scale in scales] for one in own]).reshape(count, -1)
+    different = rng.binomial(answers, shares).astype(float)
+    names = tuple(np.repeat([f"m{place}" for place in range(len(scales))], len(LEVELS)))
+    shown = np.full(different.shape, float(answers))
+    return Counts(tuple(map(str, range(count))), np.tile(LEVELS, len(scales)), different, shown, names)
+
+
+def test_motions_that_differ_do_not_flatten_the_curve() -> None:
+    """The median observer's threshold is the geometric mean over motions; one curve for all lies further out."""
+    counts = several_motions(np.random.default_rng(8), [0.5, 1.0, 2.0], 150, 12)
+    found, together = fitted(counts), fitted(all_motions(counts))
+    for side, slope in (("shorter", 0.4), ("longer", 0.45)):
+        assert found.these_motions[side].frames == pytest.approx(crossing(slope), rel=0.05)
+        assert found.typical[side].frames == found.these_motions[side].frames
+        assert (together.typical[side].frames or 0) > 1.1 * crossing(slope)
+    assert found.sensitivity_spread == pytest.approx(0.3, abs=0.05)
+    assert found.motion_spread["longer"] == pytest.approx(np.std(np.log([0.5, 1, 2]), ddof=1), rel=0.1)
+    assert found.generalises_to == "participants and motions"
+
+
+def test_the_interval_over_motions_is_students_where_people_and_answers_are_many() -> None:
+    """Nearly all doubt comes from the motions: their log thresholds are then a plain sample of three."""
+    counts = several_motions(np.random.default_rng(9), [0.6, 1.0, 1.7], 150, 20)
+    found = fitted(counts)
+    logs = [np.log(fitted(of_one(counts, motion)).typical["longer"].frames or np.nan) for motion in ("m0", "m1", "m2")]
+    error = np.std(logs, ddof=1) / np.sqrt(3)
+    here, general = found.these_motions["longer"], found.typical["longer"]
+    assert (general.standard_error or 0) / (general.frames or 1) == pytest.approx(error, rel=0.1)
+    assert (here.standard_error or 1) < (general.standard_error or 0) / 3
+
+
+def of_one(counts: Counts, motion: str) -> Counts:
+    kept = np.array([name == motion for name in counts.motions])
+    return Counts(counts.participants, counts.differences[kept], counts.different[:, kept], counts.shown[:, kept])
+
+
+def test_two_motions_hold_for_these_alone() -> None:
+    two = fitted(several_motions(np.random.default_rng(10), [0.8, 1.2], 20, 6))
+    assert (two.generalises_to, two.motion_spread) == ("participants, for these motions", {})
+    assert two.typical == two.these_motions
+
+
+def test_a_motion_that_everybody_tells_stays_in_reach_of_the_others() -> None:
+    counts = several_motions(np.random.default_rng(11), [1.0, 1.0, 1.0], 20, 2)
+    longer_of_last = np.array(
+        [name == "m2" and level > 0 for name, level in zip(counts.motions, [*LEVELS] * 3, strict=False)]
+    )
+    found = fitted(replace(counts, different=np.where(longer_of_last, counts.shown, counts.different)))
+    frames = found.typical["longer"].frames
+    assert frames is not None
+    assert crossing(0.45) / 3 < frames < crossing(0.45)
+    assert found.generalises_to == "participants and motions"
+    assert 0.3 < found.motion_spread["longer"] < 1.5
+
+
+def test_motions_that_are_shown_on_one_side_only_count_there() -> None:
+    counts = several_motions(np.random.default_rng(12), [1.0] * 6, 20, 4)
+    place = np.array([int(name[1]) for name in counts.motions])
+    shown = np.where((np.tile(LEVELS, 6) < 0) == (place < 3), counts.shown, 0.0)
+    found = fitted(replace(counts, shown=shown, different=np.minimum(counts.different, shown)))
+    for side, slope in (("shorter", 0.4), ("longer", 0.45)):
+        assert found.typical[side].frames == pytest.approx(crossing(slope), rel=0.15)
+    assert found.generalises_to == "participants and motions"
+
+
+def test_the_criterion_free_threshold_rests_on_sensitivity_alone() -> None:
+    """One sensitivity and three criteria: 75% "different" moves, the best criterion's threshold does not."""
+    free, own = [], []
+    for place, criterion in enumerate((1.2, 1.9, 2.6)):
+        rng = np.random.default_rng([12, place])
+        different = rng.binomial(40, [share_of(np.exp(0.1 * rng.normal()), criterion) for _ in range(40)])
+        counts = Counts(tuple(map(str, range(40))), LEVELS, different.astype(float), np.full(different.shape, 40.0))
+        found = fitted(counts)
+        free.append(found.criterion_free["longer"].frames)
+        own.append(found.typical["longer"].frames)
+    assert free == pytest.approx([criterion_free_delta(0.75) / 0.45] * 3, rel=0.06)
+    assert own == pytest.approx([crossing(0.45, criterion) for criterion in (1.2, 1.9, 2.6)], rel=0.06)

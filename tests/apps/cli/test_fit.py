@@ -145,3 +145,23 @@ def test_degenerate_data_give_a_statement(
     path.write_text("\n".join(["level,answer", *rows]))
     found = fitted(capsys, str(path), "--task", task, "--level", "level", "--answer", "answer")
     assert found["answer"]
+
+
+@pytest.mark.parametrize(("task", "level"), [("same-different", "diff"), ("2afc", "size")])
+def test_motions_make_a_threshold_that_holds_for_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], task: str, level: str
+) -> None:
+    rng = np.random.default_rng(6)
+    rows = ["who,clip,diff,size,answer"]
+    for person, motion, difference in ((p, m, d) for p in range(8) for m in range(3) for d in (-12, -6, 0, 6, 9, 12)):
+        for _ in range(4):
+            delta = (0.25 + 0.1 * motion) * abs(difference)
+            chance = norm.sf((2 - delta) / 2**0.5) if task == "same-different" else 0.5 + 0.5 * norm.cdf(delta - 2)
+            rows.append(f"p{person},m{motion},{difference},{abs(difference)},{int(rng.random() < chance)}")
+    (tmp_path / "data.csv").write_text("\n".join(rows), encoding="utf-8")
+    columns = ["--task", task, "--level", level, "--answer", "answer", "--participant", "who"]
+    found = fitted(capsys, str(tmp_path / "data.csv"), *columns, "--motion", "clip")
+    assert {one["generalises_to"] for one in found["headline"]} == {"participants and motions"}
+    assert "participants and motions" in found["headline"][0]["statement"]
+    found = fitted(capsys, str(tmp_path / "data.csv"), *columns)
+    assert {one["generalises_to"] for one in found["headline"]} == {"participants, for these motions"}

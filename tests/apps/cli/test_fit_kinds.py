@@ -313,8 +313,8 @@ def test_qualtrics_has_three_headings(fitted: Fitted) -> None:
 def test_a_difference_alike_for_all_is_stated_without_a_ratio(fitted: Fitted) -> None:
     found = fitted(ratings(np.tile([5, 1], (12, 1))), *RATED)
     assert (
-        "rating: b minus a over participants -4.00, the same for all 12, exact sign test p = 0.000488"
-        in found["answer"]
+        "rating: b minus a over participants, for these motions -4.00, the same for all 12, exact sign test "
+        "p = 0.000488" in found["answer"]
     )
     effect = found["rating_anova"]["rating"][0]["ordinal"]["effects"][0]
     assert effect["odds_ratio"] is effect["value"] is None

@@ -99,7 +99,7 @@ def test_what_the_system_refuses_is_no_fault_of_ours(
         ("a.fbx", b"Kaydara FBX Binary  \0", "found an FBX file. Make a BVH file of it in Blender: File > Import"),
         ("a.bvh", b"Kaydara FBX Binary  \0", "found an FBX file"),
         ("a.bvh", b"; FBX 7.4.0 project file", "found an FBX file"),
-        ("a.glb", b"glTF", "found 4 bytes"),
+        ("a.glb", b"glTF", "a damaged one"),
         ("a.bvh", b"glTF\2\0\0\0", "found a glTF file. Let its name end in .glb"),
         ("a.C3D", b"\2\x50", "found a C3D file. It holds markers and no skeleton"),
         ("a.bvh", b"\2\x50\1\0", "found a C3D file"),

@@ -67,31 +67,31 @@ def _model_threshold(axes: Axes, threshold: Threshold, level: float, label: bool
 
 def same_different_figure(result: SameDifferent, name: str, mark: str) -> str:
     """Percent "different" by difference in blend length, with both readings of the threshold (2004 Figure 6)."""
-    rows, model = result.percent_different, result.model
+    rows, found, fitted = result.percent_different, result.believed, result.mixed or result.model
     with new_figure(7.2, 3.9) as (figure, axes):
         _level_axis(axes, result.level)
         _points(axes, rows)
         _level_ticks(axes, [row.difference_frames for row in rows])
-        if model:
-            across, up = zip(*model.curve, strict=True)
+        if found and fitted:
+            across, up = zip(*fitted.curve, strict=True)
             axes.plot(across, up, color=BLUE, linewidth=1.8, zorder=3)
-            for threshold in model.jnd.values():
+            for threshold in found.jnd.values():
                 _model_threshold(axes, threshold, result.level, label=True)
         axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
         axes.set_ylabel("answers “different”")
-        _key(axes, bool(model))
+        _key(axes, found.whose if found else "")
         return to_svg(figure, name, "Percent “different” by difference in blend length", _spoken_levels(rows), mark)
 
 
-def _key(axes: Axes, with_model: bool) -> None:
+def _key(axes: Axes, whose: str) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
         Line2D([], [], color=FAINT, linestyle=(0, (4, 2)), marker="o", markerfacecolor=INK, markeredgecolor=INK,
                markersize=4.5, label="mean ± standard error over participants"),
     ]  # fmt: skip
-    if with_model:
-        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label="differencing model, thresholds with interval"))
+    if whose:
+        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label=f"{whose}, thresholds with interval"))
     axes.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8.5, labelcolor=SOFT)
 
 
@@ -132,8 +132,8 @@ def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mappin
         for row, (_, entry) in enumerate(entries):
             for side in SIDES:
                 _bar(axes, entry.published[side], -row + 0.14, INK, "o")
-                if entry.model and side in entry.model.jnd:
-                    _bar(axes, entry.model.jnd[side], -row - 0.14, BLUE, "s")
+                if side in (own := _own(entry)):
+                    _bar(axes, own[side], -row - 0.14, BLUE, "s")
         for side, place in known.items():
             axes.axvline(SIGNS[side] * place, color=ORANGE, linewidth=1.0, linestyle=(0, (2, 2)), zorder=0)
         named_rows(axes, [-row for row in range(len(entries))], [label for label, _ in entries])
@@ -145,6 +145,13 @@ def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mappin
         axes.set_xlabel(f"{100 * result.level:.0f}% “different”, frames from k")
         _threshold_key(axes, bool(known))
         return to_svg(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries), mark)
+
+
+def _own(entry: SameDifferent | MotionThresholds) -> Mapping[Side, Threshold]:
+    """The thresholds to be believed: the headline's, and those of one motion by itself."""
+    if isinstance(entry, SameDifferent):
+        return entry.believed.jnd if entry.believed else {}
+    return entry.model.jnd if entry.model else {}
 
 
 def _bar(axes: Axes, threshold: Threshold, height: float, colour: str, marker: str) -> None:

@@ -18,7 +18,14 @@ from study.analysis.same_different.motions import AcrossMotions
 from study.analysis.same_different.staircases import Staircases
 from study.counting import counted
 from study.report import words
-from study.report.references import FIELLER_1954, MACMILLAN_2005, WILSON_1927
+from study.report.references import (
+    AS_SAMPLES,
+    CLARK_1973,
+    FIELLER_1954,
+    MACMILLAN_2005,
+    SATTERTHWAITE_1946,
+    WILSON_1927,
+)
 from study.report.sections.same_different import figures
 from study.report.sections.same_different.tables import (
     d_prime_table,
@@ -75,15 +82,16 @@ def _drawings(result: SameDifferent, about: About) -> Iterator[Drawing]:
         f"{name}_curve",
         figures.same_different_figure(result, f"study-{name}-curve", mark),
         "Answers “different” by the difference in blend length from k, the length that the reference method gives. "
-        "Points: means over participants ± one standard error, interpolated linearly as in 2004. Curve: the "
-        "differencing model; its drop lines are the just noticeable differences, the bars at their feet 95% intervals "
-        "(jackknife over participants).",
+        "Points: means over participants ± one standard error, interpolated linearly as in 2004. Blue "
+        "curve: the median observer by the mixed model (without one, the differencing model of all answers); its drop "
+        "lines are the just noticeable differences, the bars at their feet 95% intervals.",
     )
     yield Drawing(
         f"{name}_thresholds",
         figures.thresholds_figure(result, f"study-{name}-thresholds", mark, truth),
-        "The just noticeable difference with 95% intervals over participants: Fieller’s for linear interpolation, the "
-        "jackknife’s for the model. Without a bar, the interval reaches beyond the levels shown.",
+        "The just noticeable difference with 95% intervals. All motions: of the median observer, as in the headline, "
+        "and by linear interpolation (Fieller’s, over participants); each motion: one model of all answers (jackknife "
+        "over participants). Without a bar, the interval reaches beyond the levels shown.",
     )
     if len(result.motions) > 1:
         svg = figures.motions_figure(result, f"study-{name}-motions", mark)
@@ -104,25 +112,34 @@ def headline(result: SameDifferent, fps: float, data: str) -> Headline:
         why = f"all {counted(missed, 'question')} had no response" if missed else "there are no answers"
         return Headline(f"No just noticeable difference can be given: {why}.", "")
     who = SUBJECTS[data](result.participants)
-    percent = f"{100 * result.level:.0f}% “different”"
-    chosen = thresholds_of(result)
-    places = [place for side in PRINTED if (place := _place(result, chosen, side, fps))]
+    found = result.believed
+    places = _places(result, found.jnd if found else result.published, fps)
     if not places:
-        return Headline(
-            f"No just noticeable difference can be given from the answers of {who}.", _detail(result, chosen)
-        )
-    statement = f"The just noticeable difference of {who} is estimated at {' and '.join(places)} ({percent})."
-    return Headline(statement, _detail(result, chosen))
+        return Headline(f"No just noticeable difference can be given from the answers of {who}.", _detail(result))
+    of = f"the median of {who}" if result.mixed else who
+    statement = f"The just noticeable difference of {of} is estimated at {places} ({_percent(result)} “different”)"
+    if found and (free := _places(result, found.criterion_free, fps, told_beyond=False)):
+        statement += f"; whatever the criterion, at {free}"
+    return Headline(f"{statement}.", _detail(result))
 
 
-def _place(result: SameDifferent, chosen: Mapping[Side, Threshold], side: Side, fps: float) -> str:
+def _percent(result: SameDifferent) -> str:
+    return f"{100 * result.level:.0f}%"
+
+
+def _places(result: SameDifferent, chosen: Mapping[Side, Threshold], fps: float, *, told_beyond: bool = True) -> str:
+    """Where the thresholds are; those beyond the levels shown only if asked."""
+    places = [_place(result, chosen.get(side), side, fps, told_beyond) for side in PRINTED]
+    return words.joined([place for place in places if place])
+
+
+def _place(result: SameDifferent, found: Threshold | None, side: Side, fps: float, told_beyond: bool) -> str:
     """Where the threshold is, or beyond which level it lies; empty where neither can be told."""
-    found = chosen.get(side)
     if found is not None and found.frames is not None:
         return f"{found.frames:.1f} frames ({found.frames / fps:.2f} s) {side}"
     sign = 1 if side == "longer" else -1
     levels = sorted(
-        (row for row in result.percent_different if sign * row.difference_frames > 0),
+        (row for row in result.percent_different if told_beyond and sign * row.difference_frames > 0),
         key=lambda row: abs(row.difference_frames),
     )
     # Wilson's interval has to agree: a single answer is no evidence.
@@ -133,20 +150,24 @@ def _place(result: SameDifferent, chosen: Mapping[Side, Threshold], side: Side, 
     return ""
 
 
-def _detail(result: SameDifferent, chosen: Mapping[Side, Threshold]) -> str:
+def _detail(result: SameDifferent) -> str:
     size = f"{counted(result.answers, 'answer')} of {counted(result.participants, 'participant')}"
-    parts = []
-    if result.model:
-        ends = [f"{_ends(found)} {side}" for side in PRINTED if (found := chosen.get(side)) and _closed(found)]
-        over = "over participants" if result.participants > 1 else "of one participant, answers treated as independent"
+    found, parts = result.believed, []
+    if found:
+        model = "Mixed differencing model" if result.mixed else "Differencing model"
+        ends = [f"{_ends(one)} {side}" for side in PRINTED if (one := found.jnd.get(side)) and _closed(one)]
+        over = f"; 95% intervals across {found.generalises_to}: {words.joined(ends)}" if ends else ""
         parts.append(
-            f"Differencing model, {size}" + (f"; 95% intervals {over}: {words.joined(ends)}." if ends else ".")
+            f"{model}, {size}{over}. {_percent(result)} “different” moves with how readily participants say so; the "
+            f"second threshold is where {_percent(result)} would be right by the best criterion, and rests on "
+            "sensitivity alone."
         )
     else:
         parts.append(f"Linear interpolation, {size}. No model was fitted: {result.model_note}.")
+    chosen = found.jnd if found else result.published
     absent = [side for side in PRINTED if side in chosen and chosen[side].frames is None]
     parts += [f"Where the blend was {side}: {chosen[side].note}." for side in absent]
-    if result.model:
+    if found:
         published = result.published
         places = [f"k {sign} {_frames(published[side])}" for side, sign in PRINTED.items() if side in published]
         parts.append(f"Linear interpolation, as published in 2004: {words.joined(places)} frames.")
@@ -166,13 +187,13 @@ def _frames(threshold: Threshold) -> str:
 
 
 def _readings(result: SameDifferent) -> Iterator[Reading]:
-    model = result.model.jnd if result.model else {}
+    found = result.believed
     for side, sign in PRINTED.items():
-        published = result.published.get(side)
+        published, own = result.published.get(side), found.jnd.get(side) if found else None
         yield Reading(
             f"just noticeable difference, {side}",
             f"{_with_interval(published, sign)}; linear interpolation" if published else "–",
-            f"{_with_interval(model[side], sign)}; differencing model" if side in model else "no model was fitted",
+            f"{_with_interval(own, sign)}; {found.whose}" if found and own else "no model was fitted",
         )
 
 
@@ -239,6 +260,9 @@ def _mixed_note(mixed: MixedThresholds) -> str:
         f"{mixed.sensitivity_spread:.2f} and {mixed.criterion_spread:.2f}; the test that they are equal gives "
         f"{words.p(mixed.alike_p_value)} (likelihood ratio)."
     )
+    if mixed.motion_spread:
+        spreads = [f"{spread:.2f} {side}" for side, spread in mixed.motion_spread.items()]
+        text += f" Thresholds’ logarithms differ across motions by a standard deviation of {words.joined(spreads)}."
     return f"{text} Caution: {mixed.note}." if mixed.note else text
 
 
@@ -259,22 +283,20 @@ def _across_motions(test: AcrossMotions) -> list[str]:
 # Beside the section
 
 
-def thresholds_of(result: SameDifferent) -> Mapping[Side, Threshold]:
-    """Return the thresholds to be believed: the model's where there is one."""
-    return result.model.jnd if result.model else result.published
-
-
 def _methods(found: Collection[SameDifferent], analysis: Analysis) -> str:
     del analysis
-    percent = f"{100 * next(iter(found)).level:.0f}%"
+    first = next(iter(found))
+    sampled = any(one.mixed and one.mixed.motion_spread for one in found)
+    motions = f" (one for each motion), {AS_SAMPLES}" if sampled else ""
     return (
-        f"Percentages of “different” are means over participants ± standard errors. Just noticeable differences "
-        f"are where these reach {percent}: found by linear interpolation as in 2004, with Fieller’s intervals over "
-        "participants, and on a differencing model of the same-different task (Macmillan & Creelman 2005: one "
-        "criterion, a slope each for shorter and longer blends, a lapse rate of at most 10%), fitted by maximum "
-        "likelihood to all answers, with intervals by Student’s t of the logarithm from a jackknife over "
-        "participants. The median observer’s thresholds are those of a mixed model in which participants have "
-        "log-normal sensitivities and criteria."
+        "Just noticeable differences are those of the median observer, at which "
+        f"{_percent(first)} of the answers are “different”, by a mixed differencing model of the same-different task "
+        "(Macmillan & Creelman 2005): sensitivities and criteria are log-normal across participants, with a slope each "
+        f"for shorter and longer blends{motions}, and a lapse rate of at most 10%; maximum likelihood, intervals by "
+        "Student’s t of the logarithm. Beside them are the differences at which the best criterion would be right in "
+        f"{_percent(first)} of pairs, half of them same, which no participant’s own criterion moves. One differencing "
+        "model of all answers (jackknife over participants) and linear interpolation between the percentages as in "
+        "2004 (means over participants ± standard errors; Fieller’s intervals) are given alongside."
     )
 
 
@@ -285,6 +307,6 @@ def _right(given: pd.DataFrame) -> pd.Series[bool]:
 KIND = SectionKind(
     same_different_section,
     _methods,
-    lambda _: {WANG_2004, FIELLER_1954, MACMILLAN_2005, WILSON_1927},
+    lambda _: {WANG_2004, FIELLER_1954, MACMILLAN_2005, WILSON_1927, CLARK_1973, SATTERTHWAITE_1946},
     ("right answers", _right),
 )

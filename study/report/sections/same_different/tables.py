@@ -15,9 +15,11 @@ def _threshold_rows(entry: SameDifferent | MotionThresholds, fps: float) -> list
     """One row an estimate of the thresholds, of all motions together or of one: both sides beside each other."""
     kinds: list[tuple[str, Mapping[Side, Threshold]]] = []
     if isinstance(entry, SameDifferent) and (mixed := entry.mixed):
-        kinds += [("median observer", mixed.typical), ("all observers’ mean", mixed.population)]
+        kinds += [("median observer", mixed.typical), ("median observer, best criterion", mixed.criterion_free)]
+        kinds += [("median observer, for these motions", mixed.these_motions)] if mixed.motion_spread else []
+        kinds += [("all observers’ mean", mixed.population)]
     if model := entry.model:
-        kinds += [("group’s curve", model.jnd), ("best criterion", model.corrected)]
+        kinds += [("group’s curve", model.jnd), ("group’s curve, best criterion", model.corrected)]
     kinds.append(("linear interpolation (as published)", entry.published))
     if isinstance(entry, SameDifferent) and (staircases := entry.staircases):
         share = f"{100 * staircases.target:.1f}%"

@@ -11,19 +11,14 @@ using UnityEngine;
 
 public static class SegueImporter {
     // Fields are called as the keys of the JSON are.
-    [Serializable]
-    public class State {
-        public string name, animation;
-    }
+    [Serializable] public class State { public string name, animation; }
 
-    [Serializable]
-    public class Transition {
+    [Serializable] public class Transition {
         public string source, destination;
         public float start_normalised, offset_normalised, duration_s;
     }
 
-    [Serializable]
-    public class Machine {
+    [Serializable] public class Machine {
         public string file;
         public State[] states;
         public Transition[] transitions;

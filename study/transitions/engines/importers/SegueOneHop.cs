@@ -5,13 +5,11 @@ using System;
 
 public sealed class SegueOneHop {
     // Fields are called as the keys of the JSON are.
-    [Serializable]
-    public class Row {
+    [Serializable] public class Row {
         public int source, destination, first_trigger, triggers, first_entry;
     }
 
-    [Serializable]
-    public class Header {
+    [Serializable] public class Header {
         public float fps;
         public int blend_frames, entries;
         public string[] columns;

@@ -7,18 +7,18 @@
 #     character.travel("run")  # fades at the point that Segue chose; false where the clip is past it
 extends Node
 
-var machine = {}
+const CLOSE = 1e-5  # seconds, to which times are the same
+
 var state = ""
 var time = 0.0
+var machine = {}
+var states = {}
+var coming = null  # the transition that is waited for or under way
 
 var _model
 var _skeleton
 var _tree
-var _graph
 var _four
-var _lengths = {}
-var _animations = {}
-var _next = null
 var _none  # the identity, whose class has another name in each version
 var _start  # where the model stands
 var _placed  # where the clip that plays has been moved to
@@ -28,93 +28,104 @@ func setup(model, path, first):
 	_four = Engine.get_version_info()["major"] >= 4
 	machine = _read(path)
 	for one in machine["states"]:
-		_animations[one["name"]] = one["animation"]
-		_lengths[one["name"]] = one["length_s"]
+		states[one["name"]] = one
 	_model = model
 	_start = model.transform
 	_none = _start.affine_inverse() * _start
 	_placed = _none
 	_skeleton = _find(model, ["Skeleton", "Skeleton3D"])
-	_graph = AnimationNodeBlendTree.new()
-	for slot in ["source", "destination"]:
-		_graph.add_node(slot, AnimationNodeAnimation.new())
-		_graph.add_node(slot + "_at", AnimationNodeTimeSeek.new())
-		_graph.connect_node(slot + "_at", 0, slot)
-	_graph.add_node("fade", AnimationNodeBlend2.new())
-	_graph.connect_node("fade", 0, "source_at")
-	_graph.connect_node("fade", 1, "destination_at")
-	_graph.connect_node("output", 0, "fade")
 	_tree = AnimationTree.new()
-	_tree.tree_root = _graph
+	_tree.tree_root = AnimationNodeBlendTree.new()
+	_tree.tree_root.add_node("fade", AnimationNodeBlend2.new())
+	_tree.tree_root.connect_node("output", 0, "fade")
+	for slot in ["source", "destination"]:
+		_tree.tree_root.add_node(slot, AnimationNodeAnimation.new())
+		_tree.tree_root.add_node(slot + "_at", AnimationNodeTimeSeek.new())
+		_tree.tree_root.connect_node(slot + "_at", 0, slot)
+		_tree.tree_root.connect_node("fade", int(slot == "destination"), slot + "_at")
+		_play(slot, first)
 	model.add_child(_tree)
 	_tree.anim_player = _tree.get_path_to(_find(model, ["AnimationPlayer"]))
-	_tree.set("callback_mode_process" if _four else "process_mode", 2)  # by hand, in `advance`
+	_tree.set("callback_mode_process" if _four else "process_mode", 2)  # by hand, in `_pose`
 	_tree.active = true
 	state = first
-	_graph.get_node("destination").animation = _animations[first]
-	_show(0.0)
+	advance(0.0)
+
+
+func travel(to):
+	for one in machine["transitions"]:
+		if one["source"] == state and one["destination"] == to and time < one["start_s"] + CLOSE:
+			coming = one
+			_play("destination", to)
+			return true
+	return false
 
 
 func _process(delta):
 	advance(delta)
 
 
-func travel(to):
-	for one in machine["transitions"]:
-		if one["source"] == state and one["destination"] == to and time <= one["start_s"]:
-			_next = one
-			_graph.get_node("destination").animation = _animations[to]
-			return true
-	return false
-
-
 func advance(delta):
 	time += delta
-	if _next != null and time >= _next["start_s"] + _next["duration_s"]:
-		time += _next["offset_s"] - _next["start_s"]
-		_placed = _placed * _moved(_next["turn_radians"], _next["shift_m"])
-		state = _next["destination"]
-		_next = null
-	var share = 0.0
-	if _next != null:
-		share = max(0.0, (time - _next["start_s"]) / _next["duration_s"])
-	_show(share)
-
-
-func _show(share):
-	_graph.get_node("source").animation = _animations[state]
-	_seek("source_at", min(time, _lengths[state]))
-	_seek("destination_at", 0.0 if _next == null else max(0.0, time - _next["start_s"] + _next["offset_s"]))
-	_tree.set("parameters/fade/blend_amount", share)
-	_tree.advance(0.0)
+	if coming != null and time > coming["start_s"] + coming["duration_s"] - CLOSE:
+		time += coming["offset_s"] - coming["start_s"]
+		var shift = coming["shift_m"]
+		_placed = _placed * _at(Vector3(0, 1, 0), coming["turn_radians"], shift)
+		state = coming["destination"]
+		coming = null
+		_play("source", state)
+	var since = -1.0 if coming == null else time - coming["start_s"]
+	var share = 0.0 if coming == null else max(0.0, since / coming["duration_s"])
+	_pose(share)
 	_model.transform = _start * _placed
 	if share > 0.0:
+		if _four:
+			# Trees of Godot 4 blend rotations about the rest pose, off by centimetres; this is the shortest way.
+			var from = _rotations(0.0)
+			var to = _rotations(1.0)
+			for bone in range(_skeleton.get_bone_count()):
+				_skeleton.set_bone_pose_rotation(bone, from[bone].slerp(to[bone], share))
 		# Engines blend places; Segue blends steps, whose path is in the file. The root is put on it.
-		var at = (time - _next["start_s"]) * _next["fps"]
-		var before = int(min(floor(at), len(_next["root"]) - 2))
-		var root = _pose(_next["root"][before]).interpolate_with(_pose(_next["root"][before + 1]), at - before)
+		var frame = since * coming["fps"]
+		var before = int(min(floor(frame), len(coming["root"]) - 2))
+		var root = _root(before).interpolate_with(_root(before + 1), frame - before)
 		_model.transform = _start * _placed * root * _skeleton.get_bone_global_pose(0).affine_inverse()
 
 
-func _seek(node, seconds):
-	_tree.set("parameters/" + node + ("/seek_request" if _four else "/seek_position"), seconds)
+func _play(slot, name):
+	_tree.tree_root.get_node(slot).animation = states[name]["animation"]
 
 
-func _moved(turn, shift):
-	var place = _none
-	place.basis = place.basis.rotated(Vector3(0, 1, 0), turn)
-	place.origin = Vector3(shift[0], shift[1], shift[2])
-	return place
+func _pose(share):
+	var seek = "seek_request" if _four else "seek_position"
+	var entered = 0.0 if coming == null else max(0.0, time - coming["start_s"] + coming["offset_s"])
+	_tree.set("parameters/source_at/" + seek, min(time, states[state]["length_s"]))
+	_tree.set("parameters/destination_at/" + seek, entered)
+	_tree.set("parameters/fade/blend_amount", share)
+	_tree.advance(0.0)
 
 
-func _pose(numbers):
+func _rotations(share):
+	_pose(share)
+	var found = []
+	for bone in range(_skeleton.get_bone_count()):
+		found.append(_skeleton.get_bone_pose_rotation(bone))
+	return found
+
+
+func _root(frame):
 	# Position, then a quaternion with its real part last.
+	var numbers = coming["root"][frame]
 	var axis = Vector3(numbers[3], numbers[4], numbers[5])
-	var place = _none
+	return _at(axis, 2.0 * atan2(axis.length(), numbers[6]), numbers)
+
+
+func _at(axis, angle, place):
+	var found = _none
 	if axis.length() > 1e-9:
-		place.basis = place.basis.rotated(axis.normalized(), 2.0 * atan2(axis.length(), numbers[6]))
-	place.origin = Vector3(numbers[0], numbers[1], numbers[2])
-	return place
+		found.basis = found.basis.rotated(axis.normalized(), angle)
+	found.origin = Vector3(place[0], place[1], place[2])
+	return found
 
 
 func _find(node, classes):
