@@ -239,6 +239,19 @@ def test_an_armature_that_moves_is_folded_into_the_body(tmp_path: Path) -> None:
     assert np.abs(positions(clip) - by_matrices(made, np.arange(31) / 30.0)).max() < 1e-6
 
 
+def test_bones_beside_the_body_are_left_out(tmp_path: Path) -> None:
+    """As Unreal has them on the root of its figures: for hands and feet to hold to, and for marks."""
+    made = figure(4, {"translation": [0.0, 0, 0]})
+    animate(made)
+    count = len(made.json["nodes"])
+    made.json["nodes"] += [{"name": "ik_foot_root", "children": [count + 1]}, {"name": "ik_foot_l"}, {"name": "mark"}]
+    made.json["nodes"][count - 1]["children"] += [count, count + 2]
+    made.json["skins"][0]["joints"] += range(count - 1, count + 3)
+    clip = read_clip(made.written(tmp_path / "walk.gltf"))
+    assert sorted(clip.skeleton.names) == sorted(name for name, _, _ in BODY)
+    assert np.abs(positions(clip) - by_matrices(made, np.arange(31) / 30.0)).max() < 1e-6
+
+
 def test_nodes_without_a_skin_are_joints_where_they_move(tmp_path: Path) -> None:
     made = figure(5)
     del made.json["skins"]

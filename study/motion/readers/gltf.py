@@ -35,8 +35,6 @@ _USUAL_RATES = (30.0, 24.0, 25.0, 60.0, 50.0, 120.0, 100.0, 240.0)
 _ON_FRAME = 0.02
 # Poses that few keys may be sampled to, and poses for each key beyond that.
 _FEW_POSES, _POSES_A_KEY = 1_000_000, 100
-# Bones that Unreal adds beside the body, to hold hands and feet to.
-_HELPER = "ik_"
 END = "_end"
 """How the name of a bone's tip ends, which `gltf_writing` writes as a node of its own."""
 
@@ -249,12 +247,16 @@ def _joints(document: Document, nodes: Nodes, tracks: Tracks) -> tuple[list[int]
     while not {root} & (moving | wanted) and (further := [n for n in below[root] if counts[n] == total > 0]):
         above.append(root)
         root = further[0]
+    # Unreal has marks beside the body on a root that carries it, and bones `ik_` for hands and feet to hold to.
+    body = [n for n in below[root] if below[n] and not document.name("nodes", n).startswith("ik_")]
+    if len(body) == 1 and (body[0], "translation") in tracks:
+        below[root] = body
     ordered, waiting = [], [root]
     while waiting:
         ordered.append(waiting.pop())
         for number in below[ordered[-1]]:
             name = document.name("nodes", number).lower()
-            if (counts[number] or name.endswith(END)) and not name.startswith(_HELPER):
+            if counts[number] or name.endswith(END):
                 waiting.append(number)
     if not moving.intersection(ordered) or len(ordered) > MOST_JOINTS:
         found = f"{len(ordered)} joints" if moving.intersection(ordered) else "none that moves"

@@ -1,7 +1,7 @@
 """Clips to a binary glTF 2.0 file: one skeleton, one animation a clip, and a body of thin bones that carries them.
 
-Metres, Y up, seconds; a key in each frame, linear between. Engines (Unreal, Unity) import a skeleton and its animations
-with a skinned mesh alone, so each bone has one: eight triangles, which also show the motion at once. The rest pose is
+Metres, Y up, seconds; a key in each frame, linear between. Importers (Godot 3 and others) make a skeleton of a
+skinned mesh alone, so each bone has one: eight triangles, which also show the motion at once. The rest pose is
 the clips', standing on the floor; the tips of bones are joints whose names end in `_end`.
 """
 
