@@ -22,6 +22,7 @@ from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.joint_distance import JointDistance
 from study.transitions.one_hop.play import Played, Segment
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
+from study.transitions.one_hop.robustness import Costs, costs_of, draw_costs, robustness_set
 from study.transitions.point_cloud import point_cloud, window_distances
 
 
@@ -43,9 +44,9 @@ def dances() -> tuple[Clip, ...]:
     return tuple(synthesize(name, seconds=6.0 + k, fps=30.0, seed=k) for k, name in enumerate(names))
 
 
-def test_the_robustness_set_follows_its_rule(dances: tuple[Clip, ...], robustness: ModuleType) -> None:
+def test_the_robustness_set_follows_its_rule(dances: tuple[Clip, ...]) -> None:
     settings = Settings.at(30.0)
-    switches = robustness.robustness_set(dances, settings)
+    switches = robustness_set(dances, settings)
     assert len(switches) == 15
     usable = [clip.frames - 90 + 1 for clip in dances]
     starts = np.concatenate([[0], np.cumsum(usable)])
@@ -54,35 +55,29 @@ def test_the_robustness_set_follows_its_rule(dances: tuple[Clip, ...], robustnes
     for switch in switches:
         assert switch.destination == (switch.source + 1) % 3
         assert 0 <= (switch.alignment.destination_frame or 0) < usable[switch.destination]
-    assert robustness.robustness_set(dances, settings) == switches
+    assert robustness_set(dances, settings) == switches
     with pytest.raises(TransitionError, match="at least two clips of 90 frames or more"):
-        robustness.robustness_set((dances[0], trim(dances[1], 0, 80)), settings)
+        robustness_set((dances[0], trim(dances[1], 0, 80)), settings)
 
 
-def test_the_parts_of_a_cost_add_up_to_the_table(
-    dances: tuple[Clip, ...], tmp_path: Path, robustness: ModuleType
-) -> None:
+def test_the_parts_of_a_cost_add_up_to_the_table(dances: tuple[Clip, ...], tmp_path: Path) -> None:
     distance = PointCloudDistance()
-    switches = robustness.robustness_set(dances, Settings.at(30.0), 6)
+    switches = robustness_set(dances, Settings.at(30.0), 6)
     problem = Problem(dances, switches, Settings.at(30.0), weight_in_counts(3e-4, distance), distance)
     table = build_table(problem)
-    costs = [
-        robustness.costs_of(problem, table, number, switch.first_trigger) for number, switch in enumerate(switches)
-    ]
+    costs = [costs_of(problem, table, number, switch.first_trigger) for number, switch in enumerate(switches)]
     for number, parts in enumerate(costs):
         assert parts.total == pytest.approx(table.costs[number], abs=3 * distance.unit)
         assert parts.direct == pytest.approx(table.direct_costs[number], abs=2 * distance.unit)
         assert parts.total <= parts.direct + 3 * distance.unit
-    robustness.draw_costs(costs, tmp_path / "costs.png")
+    draw_costs(costs, tmp_path / "costs.png")
     picture = imread(tmp_path / "costs.png")
     blue = np.all(np.abs(picture[..., :3] - np.array([0.0, 0x62 / 255, 0xA8 / 255])) < 0.01, axis=-1)
     assert blue.sum() > 100
 
 
-def test_bars_are_as_high_as_their_costs(tmp_path: Path, robustness: ModuleType) -> None:
-    robustness.draw_costs(
-        [robustness.Costs(0.0, 0.0, 0.0, 0.4), robustness.Costs(0.0, 0.0, 0.0, 0.2)], tmp_path / "costs.png"
-    )
+def test_bars_are_as_high_as_their_costs(tmp_path: Path) -> None:
+    draw_costs([Costs(0.0, 0.0, 0.0, 0.4), Costs(0.0, 0.0, 0.0, 0.2)], tmp_path / "costs.png")
     dark = np.all(np.abs(imread(tmp_path / "costs.png")[..., :3] - 0x44 / 255) < 0.01, axis=-1)
     heights = dark[80:].sum(axis=0)  # below the legend
     bars = np.flatnonzero(heights > 40)
@@ -142,7 +137,7 @@ def test_blends_of_their_own_length_cost_no_more_and_are_no_cuts(
     dances: tuple[Clip, ...], robustness: ModuleType
 ) -> None:
     settings = Settings.at(30.0)
-    switches = robustness.robustness_set(dances, settings, 6)
+    switches = robustness_set(dances, settings, 6)
     weight = weight_in_counts(robustness.WEIGHT, PointCloudDistance())
     problem = Problem(dances, switches, settings, weight)
     own = adaptive(replace(problem, settings=replace(settings, lengths=lengths_at(30.0, 15)), weight=weight // 2))

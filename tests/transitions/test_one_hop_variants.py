@@ -125,31 +125,42 @@ def test_a_genre_is_preferred_by_its_cost() -> None:
 # No overlap (section 5, Connection of nonoverlapping motions)
 
 
-def test_a_connection_is_the_best_of_all_hops_frames_and_stays() -> None:
-    clips, settings = one_rig(40, 50, 45), Settings(6, 12, 9)
-    problem = Problem(clips, (), settings, 50, DISTANCE)
-    found = connect(problem, 0, 1)
-    prepared = [DISTANCE.prepare(clip, 6) for clip in clips]
-    whole = [range(clip.frames - 5) for clip in clips]
+@pytest.mark.parametrize("seed", range(50))
+def test_a_connection_is_the_best_of_all_hops_frames_and_stays(seed: int) -> None:
+    """Every hop, frame and stay is tried, with costs of hops, allowed offsets and a bound on stays now and then."""
+    rng = np.random.default_rng([seed, 4])
+    blend, weight = int(rng.integers(2, 7)), int(rng.choice([0, 50, 20_000]))
+    frames = [int(n) for n in rng.integers(blend, 30, 2)] + [int(n) for n in rng.integers(2 * blend, 40, 2)]
+    clips, stay = one_rig(*frames), int(rng.integers(0, 10))
+    both = int(rng.integers(0, 6)) if rng.random() < 0.4 else None
+    extra = {int(rng.integers(4)): int(rng.integers(0, 500_000))} if rng.random() < 0.5 else {}
+    allowed = {(0, 2): np.unique(rng.integers(-20, 30, 12))} if rng.random() < 0.5 else {}
+    settings = Settings(blend, 12, stay, both)
+    problem = Problem(clips, (), settings, weight, DISTANCE, hop_costs=extra, offsets=allowed)
+    found, last = connect(problem, 0, 1), frames[0] - blend
+    prepared = [DISTANCE.prepare(clip, blend) for clip in clips]
     costs = []
-    for hop in range(3):
-        first = DISTANCE.counts(prepared[0], prepared[hop], 6, whole[0], whole[hop])[-1]
-        second = DISTANCE.counts(prepared[1], prepared[hop], 6, whole[1], whole[hop])[0]
-        costs += [
-            (int(first[frame]) + int(second[frame + 6 + stay]) + 50 * stay, hop, frame, stay)
-            for frame, stay in product(range(len(first)), range(10))
-            if frame + 6 + stay < len(second)
-        ]
-    cost, hop, frame, stay = min(costs)
+    for hop in range(4):
+        whole = range(frames[hop] - blend + 1)
+        first = DISTANCE.counts(prepared[0], prepared[hop], blend, range(last, last + 1), whole)[0]
+        second = DISTANCE.counts(prepared[1], prepared[hop], blend, range(1), whole)[0]
+        for frame, waited in product(whole, range(min(stay, settings.stay_both) + 1)):
+            if frame + blend + waited < len(whole) and ((0, hop) not in allowed or last - frame in allowed[0, hop]):
+                cost = int(first[frame]) + int(second[frame + blend + waited]) + weight * waited + extra.get(hop, 0)
+                costs.append((cost, hop, frame, waited))
+    cost, hop, frame, waited = min(costs)
     entry = found.entry
-    assert (entry.hop, 34 - entry.offset, entry.stay_hop) == (hop, frame, stay)
+    assert (entry.hop, last - entry.offset, entry.stay_hop) == (hop, frame, waited)
     assert found.cost == pytest.approx(cost * DISTANCE.unit, abs=3 * DISTANCE.unit)
-    steps = [Step(0, entry.hop, entry.offset, 6), Step(entry.stay_hop, 1, found.alignment.offset or 0, 6)]
-    played = play_steps(clips, 0, 0, 34, steps)
-    assert played.segments[-1].clip_start == 6
-    assert played.clip.frames == 34 + 6 + stay + 50
+    steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.alignment.offset or 0, blend)]
+    played = play_steps(clips, 0, 0, last, steps)
+    assert played.clip.frames == last + blend + waited + frames[1]
+
+
+def test_clips_shorter_than_the_blend_cannot_be_connected() -> None:
+    clips = one_rig(40, 50, 45)
     with pytest.raises(TransitionError, match="at least 6 frames, the blend"):
-        connect(Problem((clips[0], trim(clips[1], 0, 4)), (), settings), 0, 1)
+        connect(Problem((clips[0], trim(clips[1], 0, 4)), (), Settings(6, 12, 9)), 0, 1)
 
 
 # Upper and lower body apart (section 5, Separate handling of body parts)
@@ -363,6 +374,26 @@ def cheapest_chain(
         return best
 
     return {trigger: cheapest(0, trigger, trigger - to, 2, False) for trigger in range(clips[0].frames)}
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_chains_of_two_hops_equal_exhaustive_search(seed: int) -> None:
+    rng = np.random.default_rng([seed, 6])
+    blend, stay = int(rng.integers(2, 4)), int(rng.integers(0, 3))
+    clips, to = one_rig(*(int(n) for n in rng.integers(5, 10, 3))), int(rng.integers(-4, 5))
+    settings, weight = Settings(blend, stay, stay), int(rng.choice([0, 300, 30_000]))
+    prepared = [DISTANCE.prepare(clip, blend) for clip in clips]
+    windows = [range(max(clip.frames - blend + 1, 0)) for clip in clips]
+    costs = {
+        (a, b): DISTANCE.counts(prepared[a], prepared[b], blend, windows[a], windows[b])
+        for a in range(3)
+        for b in range(3)
+    }
+    expected = cheapest_chain(costs, clips, settings, weight, to)
+    found = find_chains(Problem(clips, (), settings, weight, DISTANCE), Switch(0, 1, Alignment(offset=to)), 2)
+    for trigger, chain in enumerate(found):
+        cost = np.inf if chain is None else chain.cost
+        assert cost == pytest.approx(expected[trigger] * DISTANCE.unit, abs=4 * DISTANCE.unit)
 
 
 def test_two_hops_equal_exhaustive_search_and_never_cost_more_than_one() -> None:

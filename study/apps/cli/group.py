@@ -34,7 +34,7 @@ VERBS = {
     "cost-matrix": "cost_matrix:cost_matrix",
     "label": "weights:label",
     "fit-weights": "weights:fit_weights",
-    "one-hop": "one_hop:one_hop",
+    "one-hop": "one_hop_variants:one_hop",
     "advise": "advise:advise",
     "check": "study:check",
     "render": "study:render",

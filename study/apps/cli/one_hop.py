@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from study.apps.cli.clips import clips_options, find_entry, load_clip
-from study.apps.cli.console import FILE, READABLE, emit, json_option, progress, say
+from study.apps.cli.console import FILE, READABLE, emit, json_option, progress, say, together
 from study.counting import counted
 
 if TYPE_CHECKING:
     from study.arrays import IntArray
     from study.motion.clip import Clip
-    from study.transitions.one_hop.problem import Settings, Switch
+    from study.transitions.one_hop.play import Played
+    from study.transitions.one_hop.problem import Problem, Settings, Switch
     from study.transitions.one_hop.table import OneHopTable
 
 
@@ -48,11 +50,25 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
     return [(a, b) for a in range(len(clips)) for b in range(len(clips)) if a != b]
 
 
+search_options = together(
+    clips_options,
+    click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frame rate to work at."),
+    click.option("--blend", type=click.IntRange(min=1), help="Frames of each blend (default: 0.5 s)."),
+    click.option("--stay", type=click.IntRange(min=0), help="Longest stay in source and hop, frames (default: 1 s)."),
+    click.option("--weight", type=click.FloatRange(min=0), help="Cost of a frame of stay (default: Eq. 5)."),
+    click.option("--times", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Multiply that weight."),
+    click.option("--seed", type=int, default=0, show_default=True, help="For the weight of Eq. 5."),
+    click.option("--distance", type=click.Choice(["pointcloud", "joint"]), default="pointcloud", show_default=True),
+    click.option("--part", type=click.Choice(["lower", "upper"]), help="The distance of one part of the body alone."),
+    click.option("--memory-gb", type=click.FloatRange(min=0.05), default=2.0, show_default=True, help="Memory limit."),
+)
+"""Clips, frame rate and what all searches share."""
+
+
 @one_hop.command()
 @click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
-@clips_options
+@search_options
 @click.option("--out", type=FILE, required=True, help="X.npz, or X.bin and X.json.")
-@click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frame rate to work at.")
 @click.option(
     "--pair", "pairs", type=(str, str), multiple=True, metavar="SRC DST", help="A transition to build (default: all)."
 )
@@ -66,13 +82,13 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
     type=click.IntRange(min=0),
     help="Instead: the frame at which DST enters whenever triggered, as in a jump.",
 )
-@click.option("--blend", type=click.IntRange(min=1), help="Frames of each blend (default: 0.5 s).")
-@click.option("--stay", type=click.IntRange(min=0), help="Longest stay in source and hop, frames (default: 1 s).")
 @click.option("--longest", type=click.IntRange(min=1), help="Longest transition, frames, both blends included.")
-@click.option("--weight", type=click.FloatRange(min=0), help="Cost of a frame of stay (default: Eq. 5).")
-@click.option("--times", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Multiply that weight.")
-@click.option("--seed", type=int, default=0, show_default=True, help="For the weight of Eq. 5.")
-@click.option("--distance", type=click.Choice(["pointcloud", "joint"]), default="pointcloud", show_default=True)
+@click.option(
+    "--genre",
+    type=(str, click.FloatRange(min=0)),
+    metavar="GENRE COST",
+    help="Prefer hops of a genre, a category of the library: any other costs so much more (Eq. 6).",
+)
 @click.option("--adaptive", is_flag=True, help="Each blend has a length of its own, up to 1 s.")
 @click.option("--on-beat", is_flag=True, help="Align beats with beats, estimated from the motions or given by --beats.")
 @click.option(
@@ -82,7 +98,6 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
     "--near-direct", type=click.IntRange(min=0), help="The hop is DST itself, shifted by at most this many frames."
 )
 @click.option("--workers", type=click.IntRange(min=1), help="Threads (default: one a core).")
-@click.option("--memory-gb", type=click.FloatRange(min=0.05), default=2.0, show_default=True, help="Memory limit.")
 @json_option
 def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **options: Any) -> None:
     """Find the best transition between CLIPs for every triggered frame, and write a table of them.
@@ -100,6 +115,7 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **
     loaded = load_clips(clips, library, fps)
     check_place(out)
     options["known_beats"] = known_beats(clips, library, loaded)
+    options["genres"] = [find_entry(spec, library)[1].kind for spec in clips]
     table = built(loaded, out, options)
     files = write_table(table, out)
     both = np.isfinite(table.costs) & np.isfinite(table.direct_costs)
@@ -142,50 +158,72 @@ def settings_of(fps: float, options: dict[str, Any]) -> Settings:
     usual = Settings.at(fps)
     blend = options["blend"] or usual.blend_frames
     stay = usual.longest_stay_source if options["stay"] is None else options["stay"]
-    longest = options["longest"]
+    longest = options.get("longest")
     if longest is not None and longest < 2 * blend:
         raise click.UsageError(f"expected --longest of at least two blends, {2 * blend} frames, found {longest}.")
-    lengths = lengths_at(fps, blend) if options["adaptive"] else ()
+    lengths = lengths_at(fps, blend) if options.get("adaptive") else ()
     return Settings(blend, stay, stay, None if longest is None else longest - 2 * blend, lengths)
 
 
 def built(clips: tuple[Clip, ...], out: Path, options: dict[str, Any]) -> OneHopTable:
     """The search of the paper, with the variants that leave its structure as it is."""
-    from numpy.random import default_rng
+    from dataclasses import replace
 
     from study.transitions.one_hop.adaptive import adaptive
+    from study.transitions.one_hop.beats import genre_costs
     from study.transitions.one_hop.build import build_table
-    from study.transitions.one_hop.default_weight import default_weight
-    from study.transitions.one_hop.joint_distance import JointDistance
-    from study.transitions.one_hop.problem import Distance, PointCloudDistance, Problem, weight_in_counts
 
     if options["adaptive"] and options["longest"]:
         raise click.UsageError("expected no --longest with --adaptive; it bounds both stays, whatever the blends take.")
-    settings, memory = settings_of(clips[0].fps, options), int(options["memory_gb"] * 2**30)
-    distance: Distance = JointDistance() if options["distance"] == "joint" else PointCloudDistance()
     switches = switches_of(clips, options)
     offsets = beat_offsets(clips, switches, options)
-    weight = options["weight"]
-    if weight is None:
-        rng = default_rng(options["seed"])
-        found = default_weight(
-            clips, rng, settings=settings, distance=distance, workers=options["workers"], memory_bytes=memory
-        )
-        weight = found.weight
-        means = f"{found.without_stays:.4g} without stays, {found.with_stays:.4g} with"
-        say(f"weight of Eq. 5: {weight:.4g} a frame ({means})")
-    counts = weight_in_counts(weight * options["times"], distance)
-    problem = Problem(
-        clips, switches, settings, counts, distance, offsets=offsets, nearest_to_direct=options["near_direct"]
-    )
+    problem = problem_of(clips, switches, options)
+    genre = options["genre"]
+    costs = {} if genre is None else genre_costs(options["genres"], genre[0], genre[1], problem.distance)
+    problem = replace(problem, offsets=offsets, hop_costs=costs, nearest_to_direct=options["near_direct"])
     with progress("hops") as report:
         return build_table(
             adaptive(problem) if options["adaptive"] else problem,
             workers=options["workers"],
-            memory_bytes=memory,
+            memory_bytes=memory_of(options),
             checkpoint=out.with_name(f"{out.stem}.unfinished.npz"),
             progress=lambda done, total: report(done / total, f"{done} of {total}"),
         )
+
+
+def memory_of(options: dict[str, Any]) -> int:
+    """The memory limit in bytes."""
+    return int(options["memory_gb"] * 2**30)
+
+
+def problem_of(clips: tuple[Clip, ...], switches: tuple[Switch, ...], options: dict[str, Any]) -> Problem:
+    """What is searched for, with the weight that is given or that of Eq. 5."""
+    from numpy.random import default_rng
+
+    from study.transitions.one_hop.default_weight import default_weight
+    from study.transitions.one_hop.joint_distance import JointDistance
+    from study.transitions.one_hop.parts import part_weights
+    from study.transitions.one_hop.problem import Distance, PointCloudDistance, Problem, weight_in_counts
+
+    settings, part = settings_of(clips[0].fps, options), options["part"]
+    if part and options["distance"] == "joint":
+        raise click.UsageError("expected --distance pointcloud with --part; the joint distance is of the whole body.")
+    weights = part_weights(clips[0].skeleton, part) if part else None
+    distance: Distance = JointDistance() if options["distance"] == "joint" else PointCloudDistance(weights)
+    weight = options["weight"]
+    if weight is None:
+        found = default_weight(
+            clips,
+            default_rng(options["seed"]),
+            settings=settings,
+            distance=distance,
+            workers=options.get("workers"),
+            memory_bytes=memory_of(options),
+        )
+        weight = found.weight
+        means = f"{found.without_stays:.4g} without stays, {found.with_stays:.4g} with"
+        say(f"weight of Eq. 5: {weight:.4g} a frame ({means})")
+    return Problem(clips, switches, settings, weight_in_counts(weight * options["times"], distance), distance)
 
 
 def known_beats(specs: tuple[str, ...], library: str | None, clips: tuple[Clip, ...]) -> list[IntArray]:
@@ -266,6 +304,7 @@ def show(table: Path, places: tuple[tuple[str, str, int], ...]) -> None:
     "--trigger", "triggers", type=(int, str), multiple=True, metavar="FRAME DST", help="At this frame, change to DST."
 )
 @click.option("--method", type=click.Choice(["one-hop", "direct"]), default="one-hop", show_default=True)
+@click.option("--upper", type=READABLE, metavar="TABLE", help="A table of the same clips for trunk, arms and head.")
 @click.option("--out", type=FILE, required=True, help="X.bvh, X.mp4 or X.png.")
 @json_option
 def play(
@@ -275,19 +314,18 @@ def play(
     first: str | None,
     triggers: tuple[tuple[int, str], ...],
     method: str,
+    upper: Path | None,
     out: Path,
 ) -> None:
     """Play clips as the states of a state machine, with transitions from a table, and write the motion.
 
     CLIPs are those of the table, in its order (default: the motions of --library with the table's names).
     """
-    from dataclasses import asdict
+    from dataclasses import replace
 
-    from study.motion.drawing import draw_clip
-    from study.motion.readers.bvh_writing import write_bvh
+    from study.transitions.one_hop.parts import put_together
     from study.transitions.one_hop.play import Trigger
     from study.transitions.one_hop.play import play as play_machine
-    from study.transitions.one_hop.strip import draw_played
     from study.transitions.one_hop.table import read_table
 
     held = read_table(table)
@@ -295,15 +333,46 @@ def play(
     wishes = [Trigger(frame, held.number(name)) for frame, name in triggers]
     start = 0 if first is None else held.number(first)
     played = play_machine(loaded, held, wishes, first=start, method=method)
-    if out.suffix.lower() == ".bvh":
+    result: dict[str, Any] = {"method": method}
+    if upper is not None:
+        other = read_table(upper)
+        if (other.clips, other.fps) != (held.clips, held.fps):
+            raise click.UsageError(f"expected --upper with the clips of {table} at its rate, found others in {upper}.")
+        above = play_machine(loaded, other, wishes, first=start, method=method)
+        played = replace(played, clip=put_together(played.clip, above.clip))
+        result["upper_segments"] = segments_of(above, held.clips)
+    show_played(played, held.clips, out, result)
+
+
+def segments_of(played: Played, names: Sequence[str]) -> list[dict[str, Any]]:
+    """What plays when, with the names of the clips."""
+    from dataclasses import asdict
+
+    return [{**asdict(part), "clip": names[part.clip]} for part in played.segments]
+
+
+def show_played(
+    played: Played, names: Sequence[str], out: Path | None, result: dict[str, Any], lines: Sequence[str] = ()
+) -> None:
+    """Write what was played where that is asked for, and print its segments after other lines."""
+    from study.motion.drawing import draw_clip
+    from study.motion.readers.bvh_writing import write_bvh
+    from study.transitions.one_hop.strip import draw_played
+
+    if out is None:
+        pass
+    elif out.suffix.lower() == ".bvh":
         write_bvh(played.clip, out)
     elif out.suffix.lower() == ".png":
         draw_played(played, out)
     else:
         draw_clip(played.clip, out)
-    segments = [{**asdict(part), "clip": held.clips[part.clip]} for part in played.segments]
-    lines = [
+    segments = segments_of(played, names)
+    said = [
         f"{part['start']:6} {part['kind']:6} {part['clip']} from its frame {part['clip_start']}" for part in segments
     ]
-    result = {"file": str(out), "frames": played.clip.frames, "method": method, "segments": segments}
-    emit(result, "\n".join([f"{out}: {counted(played.clip.frames, 'frame')}", *lines]))
+    head = [] if out is None else [f"{out}: {counted(played.clip.frames, 'frame')}"]
+    file = None if out is None else str(out)
+    emit(
+        {"file": file, "frames": played.clip.frames, **result, "segments": segments}, "\n".join([*lines, *head, *said])
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from study.apps.cli import run
@@ -101,3 +102,87 @@ def test_refusals(
     monkeypatch.chdir(tmp_path)
     assert words in refusal(capsys, "one-hop", *arguments)
     assert not list(tmp_path.iterdir())
+
+
+def test_hops_of_a_genre_are_preferred(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The library's categories are the genres: at a high cost every hop is a dance, at none some are not."""
+    hops = []
+    for cost in (0, 3):
+        out = tmp_path / f"{cost}.bin"
+        build = ("one-hop", "build", "box", "walk", "dance", "--pair", "box", "dance", "--fps", 10, "--weight", 0.0005)
+        assert answer(capsys, *build, "--genre", "dancing", cost, "--out", out)["transitions"] == 1
+        entries = np.frombuffer(out.read_bytes(), "<i4").reshape(-1, 4)
+        hops.append(np.mean(entries[entries[:, 0] >= 0, 0] == 2))
+    assert hops[0] < hops[1] == 1.0
+    waltz = refusal(capsys, *build, "--genre", "waltz", 1, "--out", tmp_path / "x.bin")
+    assert "one of the clips' genres (boxing, dancing, walking), got 'waltz'" in waltz
+
+
+SEARCH = ("--fps", 10, "--weight", 0.0005, "--stay", 4)
+
+
+def test_more_hops_never_cost_more(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "chain.bvh"
+    clips = ("one-hop", "chain", "dance", "box", "walk", "--pair", "dance", "box", *SEARCH)
+    found = answer(capsys, *clips, "--at", 40, "--hops", 3, "--out", out)
+    costs = found["costs"]
+    assert isinstance(costs, list)
+    assert costs == sorted(costs, reverse=True)
+    table = tmp_path / "t.npz"
+    assert run(["one-hop", "build", "dance", "box", "walk", "--pair", "dance", "box", *map(str, SEARCH),
+                "--out", str(table)]) == 0  # fmt: skip
+    capsys.readouterr()
+    shown = answer(capsys, "one-hop", "show", table, "--at", "dance", "box", 40)["shown"]
+    assert isinstance(shown, list)
+    assert costs[0] == pytest.approx(shown[0]["cost"], abs=1e-6)
+    steps = found["steps"]
+    assert isinstance(steps, list)
+    assert steps[-1]["clip"] == "box"
+    assert read_bvh(out).frames == found["frames"]
+    assert "choose an earlier one" in refusal(capsys, *clips, "--at", 239)
+
+
+def test_clips_that_do_not_overlap_are_connected(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "joined.bvh"
+    found = answer(capsys, "one-hop", "connect", "walk", "tai_chi", "stand", *SEARCH, "--out", out)
+    segments = found["segments"]
+    assert isinstance(segments, list)
+    assert [segments[0]["clip"], segments[-1]["clip"]] == ["walk", "tai_chi"]
+    assert (segments[0]["start"], segments[0]["clip_start"]) == (0, 0)
+    assert read_bvh(out).frames == found["frames"]
+    assert found["hop"] in ("walk", "tai_chi", "stand")
+
+
+@pytest.mark.gl
+def test_transitions_by_rule_and_their_costs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "costs.png"
+    found = answer(capsys, "one-hop", "robustness", "dance", "box", *SEARCH, "--count", 5, "--out", out)
+    rows = found["transitions"]
+    assert isinstance(rows, list)
+    assert len(rows) == 5
+    assert all(row["cost"] <= row["direct"] + 1e-6 for row in rows)
+    assert found["lower"] == sum(row["cost"] < row["direct"] for row in rows)
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_body_is_played_in_two_parts(capsys: pytest.CaptureFixture[str], tmp_path: Path, table: Path) -> None:
+    clips = ("dance", "box", "walk", "--pair", "dance", "box", *SEARCH)
+    parts = {}
+    for part in ("lower", "upper"):
+        parts[part] = tmp_path / f"{part}.npz"
+        answer(capsys, "one-hop", "build", *clips, "--part", part, "--out", parts[part])
+    trigger = ("--first", "dance", "--trigger", 40, "box")
+    alone, both = (tmp_path / f"{name}.bvh" for name in ("alone", "both"))
+    answer(capsys, "one-hop", "play", parts["lower"], *trigger, "--out", alone)
+    played = answer(capsys, "one-hop", "play", parts["lower"], "--upper", parts["upper"], *trigger, "--out", both)
+    assert played["upper_segments"]
+    legs, whole = read_bvh(alone), read_bvh(both)
+    np.testing.assert_allclose(legs.root_positions, whole.root_positions, atol=1e-6)
+    differ = np.abs(legs.rotations - whole.rotations).max(axis=(0, 2)) > 1e-4
+    names = {legs.skeleton.names[joint] for joint in np.flatnonzero(differ)}
+    assert names
+    assert not names & {legs.skeleton.names[legs.skeleton.role(role)] for role in ("pelvis", "hip.L", "knee.R")}
+    refused = refusal(capsys, "one-hop", "play", parts["lower"], "--upper", table, *trigger, "--out", both)
+    assert "found others in" in refused
+    joint = refusal(capsys, "one-hop", "build", *clips, "--part", "upper", "--distance", "joint", "--out", "x.npz")
+    assert "expected --distance pointcloud with --part" in joint

@@ -1,0 +1,149 @@
+"""`segue one-hop` (chain, connect, robustness): variants of section 5 of Koyama & Goto 2019 that need no table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from study.apps.cli.console import FILE, emit, json_option
+from study.apps.cli.one_hop import (
+    load_clips,
+    memory_of,
+    one_hop,
+    pairs_of,
+    problem_of,
+    search_options,
+    show_played,
+)
+from study.counting import counted
+
+__all__ = ["one_hop"]
+
+out_option = click.option("--out", type=FILE, help="X.bvh, X.mp4 or X.png.")
+
+
+@one_hop.command()
+@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
+@search_options
+@click.option("--pair", type=(str, str), metavar="SRC DST", required=True, help="The transition.")
+@click.option("--at", "trigger", type=click.IntRange(min=0), required=True, help="Triggered frame of SRC.")
+@click.option("--hops", type=click.IntRange(1, 8), default=2, show_default=True, help="The most hops.")
+@click.option("--offset", type=int, default=0, show_default=True, help="Frame of SRC at which DST has its frame 0.")
+@out_option
+@json_option
+def chain(
+    clips: tuple[str, ...],
+    library: str | None,
+    fps: float,
+    pair: tuple[str, str],
+    trigger: int,
+    hops: int,
+    offset: int,
+    out: Path | None,
+    **options: Any,
+) -> None:
+    """The best transition through several hops, for one triggered frame.
+
+    Exact, by dynamic programming; each further hop takes as long as the first. All CLIPs may be hops.
+    """
+    from study.transitions.one_hop.chains import find_chains
+    from study.transitions.one_hop.play import play_steps
+    from study.transitions.one_hop.problem import Alignment, Switch
+
+    loaded = load_clips(clips, library, fps)
+    ((source, destination),) = pairs_of((pair,), loaded)
+    switch = Switch(source, destination, Alignment(offset=offset), trigger, trigger)
+    problem = problem_of(loaded, (switch,), options)
+    found = [find_chains(problem, switch, most, memory_bytes=memory_of(options))[0] for most in range(1, hops + 1)]
+    best = found[-1]
+    if best is None:
+        raise click.UsageError(
+            f"expected a triggered frame from which a transition fits in the clips, found {trigger}; choose an earlier "
+            "one, or lower --blend."
+        )
+    names = [clip.name for clip in loaded]
+    steps = [
+        {"stay": step.stay, "clip": names[step.clip], "offset": step.offset, "blend_frames": step.blend_frames}
+        for step in best.steps
+    ]
+    costs = [None if one is None else one.cost for one in found]
+    said = ", ".join(f"{counted(most, 'hop')} {one.cost:.4g}" for most, one in enumerate(found, start=1) if one)
+    result = {"costs": costs, "weight": problem.weight * problem.distance.unit, "steps": steps}
+    played = play_steps(loaded, source, 0, trigger, best.steps)
+    show_played(played, names, out, result, [f"cost by at most {said}"])
+
+
+@one_hop.command()
+@click.argument("source", metavar="SRC")
+@click.argument("destination", metavar="DST")
+@click.argument("hops", metavar="HOP...", nargs=-1, required=True)
+@search_options
+@out_option
+@json_option
+def connect(
+    source: str,
+    destination: str,
+    hops: tuple[str, ...],
+    library: str | None,
+    fps: float,
+    out: Path | None,
+    **options: Any,
+) -> None:
+    """Join the last frames of SRC to the first frames of DST by a hop, where the two do not overlap in time."""
+    from study.transitions.one_hop.connect import connect as connected
+    from study.transitions.one_hop.play import Step, play_steps
+
+    loaded = load_clips((source, destination, *hops), library, fps)
+    problem = problem_of(loaded, (), options)
+    found, names = connected(problem, 0, 1), [clip.name for clip in loaded]
+    entry, blend = found.entry, problem.settings.blend_frames
+    last = loaded[0].frames - blend
+    result = {"hop": names[entry.hop], "frame": last - entry.offset, "stay_hop": entry.stay_hop, "cost": found.cost}
+    assert found.alignment.offset is not None, "a connection stands at an offset"
+    steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.alignment.offset, blend)]
+    words = f"hop {result['hop']} from its frame {result['frame']}, stay {entry.stay_hop}; cost {found.cost:.4g}"
+    show_played(play_steps(loaded, 0, 0, last, steps), names, out, result, [words])
+
+
+@one_hop.command()
+@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
+@search_options
+@click.option("--count", type=click.IntRange(1, 200), default=15, show_default=True, help="How many transitions.")
+@click.option("--out", type=FILE, help="X.png: what each costs (Figure 10).")
+@json_option
+def robustness(
+    clips: tuple[str, ...], library: str | None, fps: float, count: int, out: Path | None, **options: Any
+) -> None:
+    """Transitions chosen by rule, direct and by the best hop, and what each part of them costs (section 4.2).
+
+    Triggers lie at equal distances over the usable frames of all CLIPs, each to the next clip.
+    """
+    from dataclasses import asdict, replace
+
+    from study.apps.cli.one_hop import settings_of
+    from study.transitions.one_hop.build import build_table
+    from study.transitions.one_hop.robustness import costs_of, draw_costs, robustness_set
+
+    loaded = load_clips(clips, library, fps)
+    switches = robustness_set(loaded, settings_of(loaded[0].fps, options), count)
+    problem = problem_of(loaded, switches, options)
+    table = build_table(replace(problem, switches=switches), memory_bytes=memory_of(options))
+    costs = [costs_of(problem, table, number, one.first_trigger) for number, one in enumerate(switches)]
+    rows = [
+        {"source": loaded[one.source].name, "destination": loaded[one.destination].name, "frame": one.first_trigger}
+        | {"destination_frame": one.alignment.destination_frame, **asdict(cost), "cost": cost.total}
+        for one, cost in zip(switches, costs, strict=True)
+    ]
+    if out is not None:
+        draw_costs(costs, out)
+    lower = sum(cost.total < cost.direct for cost in costs)
+    lines = [
+        f"{row['source']} {row['frame']} to {row['destination']} {row['destination_frame']}: {row['cost']:.4g}, "
+        f"direct {row['direct']:.4g}"
+        for row in rows
+    ]
+    lines.append(f"one-hop costs less in {lower} of {counted(len(rows), 'transition')}" + (f"; {out}" if out else ""))
+    result = {"transitions": rows, "weight": problem.weight * problem.distance.unit, "lower": lower}
+    emit({**result, "file": None if out is None else str(out)}, "\n".join(lines))
