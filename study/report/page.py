@@ -120,6 +120,11 @@ def _sections(material: Material, analysis: Analysis, mark: str) -> Iterator[Sec
             points=study.scale_points,
             ends={item.name: (item.low, item.high) for item in study.items},
             transitions=tuple(transition.name for transition in protocol.transitions_of(study)),
+            lengths={
+                pair.motion: material.manifest.record(pair.stimuli[0]).blend_frames
+                for pair in material.manifest.pairs
+                if pair.study == study.name
+            },
             known=known.get(study.name, {}),
         )
         result = analysis.studies.get(study.name)

@@ -15,7 +15,6 @@ import numpy as np
 from study.analysis import estimates
 from study.analysis.headline import NO_TEST, Headline, holds_for
 from study.analysis.same_different.counts import (
-    PRINTED,
     Counts,
     PercentDifferent,
     Side,
@@ -23,6 +22,7 @@ from study.analysis.same_different.counts import (
     count_answers,
     percent_different,
     same_different_answers,
+    sides_in_words,
 )
 from study.analysis.same_different.d_prime import LevelDPrime, d_prime_table
 from study.analysis.same_different.interpolation import crossings
@@ -76,8 +76,8 @@ class BelievedThresholds:
         )
         share = f"{100 * level:.0f}%"
         return (
-            f"Across {self.generalises_to}, the {self.whose}'s just noticeable difference is {_sides_in_words(own)}, "
-            f"and {_sides_in_words(free)} whatever the criterion. At the first, {share} of the answers are "
+            f"Across {self.generalises_to}, the {self.whose}'s just noticeable difference is {sides_in_words(own)}, "
+            f"and {sides_in_words(free)} whatever the criterion. At the first, {share} of the answers are "
             f"“different”, which moves with how readily one says so; at the second, {share} are right by the best "
             "criterion, which sensitivity alone decides."
         )
@@ -134,7 +134,7 @@ class SameDifferent(Thresholds):
                 p_adjusted=None,
                 test=threshold.method,
                 generalises_to=found.generalises_to,
-                note="; ".join(filter(None, (threshold.note, NO_TEST))),
+                note="; ".join(filter(None, (threshold.note, self.mixed.note if self.mixed else "", NO_TEST))),
             )
             for side, threshold in found.jnd.items()
         ]
@@ -224,24 +224,10 @@ def analyse_same_different(answers: pd.DataFrame, name: str, settings: Settings)
 def in_words(found: Thresholds, believed: BelievedThresholds | None, level: float) -> str:
     """Return the thresholds in sentences: those to be believed, and as published."""
     share = f"{100 * level:.0f}%"
-    published = f"y linear interpolation, as published, {share} are “different” at {_sides_in_words(found.published)}."
+    published = f"y linear interpolation, as published, {share} are “different” at {sides_in_words(found.published)}."
     if believed is None:
         return f"B{published} No model was fitted: {found.model_note}."
     return f"{believed.in_words(level)} B{published}"
-
-
-def _sides_in_words(thresholds: Mapping[Side, Threshold]) -> str:
-    parts = []
-    for side, sign in PRINTED.items():
-        found = thresholds.get(side)
-        if found is None:
-            continue
-        if found.frames is None:
-            parts.append(f"nothing where the blend is {side} ({found.note})")
-            continue
-        error = f" ± {found.standard_error:.1f}" if found.standard_error is not None else ""
-        parts.append(f"k {sign} {found.frames:.1f}{error} frames")
-    return " and ".join(parts)
 
 
 def _by_motion(

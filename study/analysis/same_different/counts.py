@@ -94,6 +94,21 @@ def log_threshold(
     return Threshold(side, found, found * error, interval, "reached", method, note)
 
 
+def sides_in_words(thresholds: Mapping[Side, Threshold]) -> str:
+    """Return thresholds of both sides in words: k + 7.1 ± 0.8 frames and k − 8.0 ± 0.7 frames."""
+    parts = []
+    for side, sign in PRINTED.items():
+        found = thresholds.get(side)
+        if found is None:
+            continue
+        if found.frames is None:
+            parts.append(f"nothing where the blend is {side} ({found.note})")
+            continue
+        error = f" ± {found.standard_error:.1f}" if found.standard_error is not None else ""
+        parts.append(f"k {sign} {found.frames:.1f}{error} frames")
+    return " and ".join(parts)
+
+
 @dataclass(frozen=True)
 class PercentDifferent:
     """How often a difference was seen (a point of 2004 Figure 6).

@@ -14,7 +14,8 @@ in reach of the others' mean by a normal penalty with a standard deviation of 1,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from study.analysis.same_different.counts import (
     Threshold,
     both_sides,
     log_threshold,
+    sides_in_words,
 )
 from study.analysis.same_different.model import why_no_fit
 from study.analysis.same_different.observers import (
@@ -37,6 +39,7 @@ from study.analysis.same_different.observers import (
     LARGEST_SPREAD,
     REACH,
     People,
+    cannot_tell,
     covariance_of,
     curves,
     gradient_of,
@@ -51,6 +54,8 @@ FEWEST_PEOPLE = 3
 METHOD = "mixed differencing model; Student interval of the logarithm"
 NO_SAMPLE = BetweenMotions(0.0, 0.0, 0.0)
 """Motions that stand for themselves alone."""
+MANY_UNABLE = 0.1
+"""The share of participants without sensitivity from which on the result is cautioned."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,10 @@ class MixedThresholds:
     alike_p_value: float
     """Likelihood-ratio test that people are alike. A spread of none is the least there can be, so the ratio is half
     of the time 0; the mixture of chi-square distributions takes that into account."""
+    unable: tuple[str, ...] = ()
+    """Participants whose answers come rather from an observer who can't tell at all than from this distribution."""
+    able: dict[Side, Threshold] = field(default_factory=dict)
+    """The median observer's threshold without them; empty where there are none, or too few others."""
     note: str = ""
     """What to be careful about."""
 
@@ -148,6 +157,18 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
     here = replace(doubt, motions=(NO_SAMPLE,) * len(sides))
     ratio = 2 * (value - float(alike.log_likelihood[0]))
     sampled = bool(np.bincount(people.side_of).min() >= FEWEST_MOTIONS)
+    unable = cannot_tell(point, people)
+    answering = np.array(counts.participants)[answered]
+    names = tuple(str(name) for name in answering[unable])
+    able: dict[Side, Threshold] = {}
+    if names:
+        others = fit_mixed_thresholds(_without(counts, names), level=level, confidence=confidence)
+        if isinstance(others, MixedThresholds):
+            names, able = (*names, *others.unable), others.able or others.typical
+    notes = [
+        "" if settled else "the search for the maximum did not converge",
+        _in_words(names, len(people.shown), able),
+    ]
     return MixedThresholds(
         typical=_thresholds(mean, doubt, median, sides, level, confidence),
         criterion_free=_thresholds(mean, doubt, median, sides, level, confidence, "criterion_free"),
@@ -163,7 +184,26 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
         log_likelihood=value,
         alike_log_likelihood=float(alike.log_likelihood[0]),
         alike_p_value=_alike_probability(max(ratio, 0.0)),
-        note="" if settled else "the search for the maximum did not converge",
+        unable=names,
+        able=able,
+        note="; ".join(filter(None, notes)),
+    )
+
+
+def _without(counts: Counts, names: Collection[str]) -> Counts:
+    kept = np.array([name not in names for name in counts.participants])
+    who = tuple(name for name in counts.participants if name not in names)
+    return replace(counts, participants=who, different=counts.different[kept], shown=counts.shown[kept])
+
+
+def _in_words(unable: Sequence[str], people: int, able: dict[Side, Threshold]) -> str:
+    """What to be careful about where more than the odd one can't tell."""
+    if len(unable) < max(2, MANY_UNABLE * people):
+        return ""
+    return (
+        f"{len(unable)} of {people} participants answer as if they could not tell any difference, which people who "
+        "differ log-normally seldom do: the intervals are not to be trusted; without these participants the threshold "
+        f"is {sides_in_words(able) or 'not to be had'}"
     )
 
 

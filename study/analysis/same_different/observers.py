@@ -7,7 +7,7 @@ is finer than what the answers of one participant tell (Trefethen & Weideman 201
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ LARGEST_SPREAD = 1.5
 ALIKE = 1e-3
 AVOIDANCE = 0.5
 REACH = 1.0
+UNABLE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +103,21 @@ def gradient_of(
     return np.concatenate([[own.sum(), by_lapse.sum()], by_delta.sum(axis=0) @ parts, tail])
 
 
-def log_likelihood(point: FloatArray, people: People) -> tuple[float, FloatArray]:
-    """Marginal log likelihood, the penalty included, and its gradient."""
-    share, *by = curves(point, people, people.frames)
-    share = np.clip(share, fits.SMALLEST_PROBABILITY, 1 - fits.SMALLEST_PROBABILITY)
+def _weighed(share: FloatArray, people: People) -> FloatArray:
+    """Logarithms of each participant's likelihood at each point of the grid times its mass, shape (points, people)."""
     value = np.log(share) @ people.different.T + np.log1p(-share) @ (people.shown - people.different).T
-    value += people.log_mass[:, None]
+    return np.asarray(value + people.log_mass[:, None])
+
+
+def _share(point: FloatArray, people: People) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    share, *by = curves(point, people, people.frames)
+    return np.clip(share, fits.SMALLEST_PROBABILITY, 1 - fits.SMALLEST_PROBABILITY), tuple(by)
+
+
+def log_likelihood(point: FloatArray, people: People) -> tuple[float, FloatArray]:
+    """Return the marginal log likelihood, the penalty included, and its gradient."""
+    share, by = _share(point, people)
+    value = _weighed(share, people)
     highest = value.max(axis=0)
     mass = np.exp(value - highest)
     total = mass.sum(axis=0)
@@ -115,10 +125,20 @@ def log_likelihood(point: FloatArray, people: People) -> tuple[float, FloatArray
     # Each grid point answers for the participants by their posterior masses there.
     yes, asked = mass @ people.different, mass @ people.shown
     weights = (yes - asked * share) / (share * (1 - share))
-    gradient = gradient_of(weights, tuple(by), point, people, people.frames)
+    gradient = gradient_of(weights, by, point, people, people.frames)
     pull = people.penalty @ point[2:-2]
     gradient[2:-2] -= pull
     return float((highest + np.log(total)).sum() - point[2:-2] @ pull / 2), gradient
+
+
+def cannot_tell(point: FloatArray, people: People) -> BoolArray:
+    """Return who answers rather like an observer without any sensitivity than like one of the distribution.
+
+    That is, whose answers are `UNABLE` times as likely from such observers, with criteria as they are distributed.
+    """
+    blind = replace(people, frames=np.zeros_like(people.frames))
+    told, blindly = (np.logaddexp.reduce(_weighed(_share(point, one)[0], one), axis=0) for one in (people, blind))
+    return np.asarray(blindly - told > math.log(UNABLE))
 
 
 def maximise(

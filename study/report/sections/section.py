@@ -79,6 +79,8 @@ class About:
     question."""
     transitions: tuple[str, ...] = ()
     """Names of the transitions in the protocol's order."""
+    lengths: Mapping[str, int] = field(default_factory=dict)
+    """Blend length in frames of the first stimulus of each transition's pairs: k in a same-different study."""
     known: Mapping[str, Any] = field(default_factory=dict)
     """What is known of simulated observers; empty where people took part."""
 

@@ -242,3 +242,21 @@ def test_the_criterion_free_threshold_rests_on_sensitivity_alone() -> None:
         own.append(found.typical["longer"].frames)
     assert free == pytest.approx([criterion_free_delta(0.75) / 0.45] * 3, rel=0.06)
     assert own == pytest.approx([crossing(0.45, criterion) for criterion in (1.2, 1.9, 2.6)], rel=0.06)
+
+
+def test_a_minority_that_can_not_tell_is_seen_named_and_left_out() -> None:
+    """Seven of 35 without sensitivity: their names, and the threshold of the others beside."""
+    rng = np.random.default_rng(13)
+    counts = people(rng, 28, 0.3, 8)
+    blind = rng.binomial(8, np.tile(share_of(0.02, 2.0), (7, 1))).astype(float)
+    names = (*counts.participants, *(f"blind {place}" for place in range(7)))
+    different = np.vstack([counts.different, blind])
+    found = fitted(Counts(names, LEVELS, different, np.full(different.shape, 8.0)))
+    assert set(found.unable) >= set(names[28:])
+    assert len(found.unable) <= 8
+    assert "participants answer as if they could not tell any difference" in found.note
+    alone = fitted(counts)
+    for side in ("shorter", "longer"):
+        assert found.able[side].frames == pytest.approx(alone.typical[side].frames, rel=0.05)
+        assert (found.typical[side].frames or 0) > 1.1 * (found.able[side].frames or 99)
+    assert not alone.note

@@ -64,10 +64,10 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
             threshold_table(name, result, about.fps),
             *([recovery_table(name, result, about.known)] if about.known else []),
         ),
-        notes=tuple(_notes(result)),
+        notes=(*_notes(result), *_weber(result, about.lengths)),
         folded=(
             percent_table(name, result),
-            *([motion_table(name, result, about.fps)] if several else []),
+            *([motion_table(name, result, about)] if several else []),
             d_prime_table(name, result),
             *([staircase_table(name, result.staircases)] if result.staircases else []),
         ),
@@ -240,6 +240,25 @@ def _notes(result: SameDifferent) -> list[str]:
             f"{effect:.2f})."
         )
     return notes
+
+
+def _weber(result: SameDifferent, lengths: Mapping[str, int]) -> Iterator[str]:
+    """Thresholds as shares of the length that they are differences from, over all transitions."""
+    known = [length for length in lengths.values() if length]
+    found = result.believed
+    if not known or found is None:
+        return
+    mean = sum(known) / len(known)
+    shares = [
+        f"{100 * threshold.frames / mean:.0f}% of it {side}"
+        for side in PRINTED
+        if (threshold := found.jnd.get(side)) and threshold.frames is not None
+    ]
+    if shares:
+        several = (
+            f"{min(known)} to {max(known)} frames, {mean:.1f} on average" if len(known) > 1 else f"{mean:g} frames"
+        )
+        yield f"k was {several}; the thresholds are {words.joined(shares)} of it (Weber fractions)."
 
 
 def _model_notes(model: ModelFit) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 from study.analysis.same_different.analyse import MotionThresholds, SameDifferent
 from study.analysis.same_different.counts import PRINTED, Side, Threshold
 from study.report import words
+from study.report.sections.section import About
 from study.report.tables import Table, make
 
 
@@ -64,17 +65,20 @@ def threshold_table(name: str, result: SameDifferent, fps: float) -> Table:
     )
 
 
-def motion_table(name: str, result: SameDifferent, fps: float) -> Table:
-    """Return the thresholds for every motion."""
-    rows = [
-        {"motion": words.readable(motion.motion), "answers": motion.answers, **row}
-        for motion in result.motions
-        for row in _threshold_rows(motion, fps)
-    ]
+def motion_table(name: str, result: SameDifferent, about: About) -> Table:
+    """Return the thresholds for every motion, as shares of its k too."""
+    rows = []
+    for motion in result.motions:
+        k = about.lengths.get(motion.motion)
+        for row in _threshold_rows(motion, about.fps):
+            shares = {f"{side}_share": 100 * row[side] / k for side in PRINTED if k and row.get(side) is not None}
+            found = {"motion": words.readable(motion.motion), "answers": motion.answers, "reference_frames": k}
+            rows.append(found | row | shares)
     return make(
         f"{name}_thresholds_by_motion",
-        "Thresholds for every motion by itself, in frames.",
-        f"motion answers {_THRESHOLDS}",
+        "Thresholds for every motion by itself, in frames, and in percent of k, its reference’s blend length (Weber "
+        "fraction).",
+        f"motion answers reference_frames {_THRESHOLDS.replace(' longer ', ' shorter_share longer ', 1)} longer_share",
         rows,
         files_only=f"answers {_FILES_ONLY} remark",
     )
