@@ -1,4 +1,4 @@
-"""Staircases in window, browser and simulation: the same responses lead to the same trials, however often it stops.
+"""Staircases and QUEST+ in window, browser and simulation: the same responses lead to the same trials, stopped or not.
 
 The window is scripted and the browser is a client without a screen. Each is stopped after some responses (an error in
 the window's store, a server that is started again, a walk that is left) and taken up from its database.
@@ -39,7 +39,8 @@ NAME = "p01"
 STOPS = (3, 12)
 """After so many responses, in all, a session is stopped."""
 
-STAIRCASE = """
+PROCEDURES = {
+    "staircase": """
 [studies.procedure]
 name = "staircase"
 start_frames = 3
@@ -50,19 +51,31 @@ reversals = 4
 averaged = 2
 most_trials = 20
 catch_every = 4
-"""
+""",
+    "quest-plus": """
+[studies.procedure]
+name = "quest-plus"
+most_frames = 5
+threshold_frames = 3.0
+side = "longer"
+narrow = 2.5
+least_trials = 12
+most_trials = 20
+catch_every = 4
+""",
+}
 
 
-def text_with_staircases() -> str:
-    """The served protocol without consent and form: its same-different study with staircases, and one study more."""
+def text_with(procedure: str) -> str:
+    """The served protocol without consent and form: its same-different study with a procedure, and one study more."""
     head, jnd, liking, *_ = PROTOCOL.split("\n[[studies]]\n")
     head = head.replace('text = "Do you take part?"', 'text = ""')
     head = head[: head.index("[[form]]")] + head[head.index("[stimuli]") :]
-    jnd = jnd.replace('differences_frames = [-2, 0]\norder = "both"\n', "").replace("attention_checks = 1\n", STAIRCASE)
+    jnd = jnd.replace('differences_frames = [-2, 0]\norder = "both"\n', "").replace("attention_checks = 1\n", procedure)
     return "\n[[studies]]\n".join([head, jnd, liking])
 
 
-TEXT = text_with_staircases()
+TEXTS = {name: text_with(procedure) for name, procedure in PROCEDURES.items()}
 
 
 def chosen(trial: int, legal: Sequence[str]) -> str:
@@ -115,10 +128,10 @@ def in_the_window(protocol: Protocol, responses: Responses) -> None:
         assert outcome.end == "finished"
 
 
-def in_the_browser(manifest: Manifest, responses: Responses) -> None:
+def in_the_browser(manifest: Manifest, responses: Responses, text: str) -> None:
     cookies = None
     for stop in (*STOPS, float("inf")):
-        with TestClient(make_app(make_host(manifest, responses, TEXT, parameters=("participant",)))) as client:
+        with TestClient(make_app(make_host(manifest, responses, text, parameters=("participant",)))) as client:
             client.cookies = cookies or client.cookies
             person = Person(client, f"page-until-{stop}")
             view = person.begin(parameters={"participant": NAME}, force=True)
@@ -161,34 +174,36 @@ def table(responses: Responses) -> pd.DataFrame:
     return whole.drop(columns=["answered_at", "response_s"])
 
 
-def test_the_same_responses_lead_to_the_same_trials_in_window_browser_and_simulation(tmp_path: Path) -> None:
-    protocol = protocol_of(TEXT)
-    manifest = unfilmed(tmp_path / "served", TEXT)
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_the_same_responses_lead_to_the_same_trials_in_window_browser_and_simulation(tmp_path: Path, text: str) -> None:
+    protocol = protocol_of(text)
+    manifest = unfilmed(tmp_path / "served", text)
     with (
         open_responses(tmp_path / "window.sqlite") as window,
         open_responses(tmp_path / "browser.sqlite") as browser,
         open_responses(tmp_path / "simulated.sqlite") as simulated,
     ):
         in_the_window(protocol, window)
-        in_the_browser(manifest, browser)
+        in_the_browser(manifest, browser, text)
         in_a_simulation(protocol, manifest, simulated)
         tables = {"window": table(window), "browser": table(browser), "simulation": table(simulated)}
     pd.testing.assert_frame_equal(tables["window"], tables["simulation"])
     pd.testing.assert_frame_equal(tables["browser"], tables["simulation"])
     own = tables["simulation"]
-    staircase = own[(own["study"] == "jnd") & (own["role"] == "trial")]
-    assert list(staircase["trial"]) == list(range(2, 2 + len(staircase)))
-    assert len(set(staircase["difference_frames"])) > 3
-    assert len(staircase) > max(STOPS)
+    tracked = own[(own["study"] == "jnd") & (own["role"] == "trial")]
+    assert list(tracked["trial"]) == list(range(2, 2 + len(tracked)))
+    assert len(set(tracked["difference_frames"])) > 3
+    assert len(tracked) > max(STOPS)
     # The study after it has the numbers that were kept for it.
     course = draw_plan(protocol, manifest.pairs, NAME).courses[0]
     assert list(own[own["study"] == "liking"]["trial"]) == [course.first + course.most]
 
 
-def test_other_responses_lead_to_other_trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_other_responses_lead_to_other_trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     """So that the test above could fail."""
-    protocol = protocol_of(TEXT)
-    manifest = unfilmed(tmp_path / "served", TEXT)
+    protocol = protocol_of(text)
+    manifest = unfilmed(tmp_path / "served", text)
     found = []
     for right in (1, 0):
         monkeypatch.setattr(f"{__name__}.chosen", lambda _, legal, right=right: legal[right])
