@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from study.arrays import FloatArray
 from study.errors import MotionError, MotionFileError, MotionWarning, SegueError
 from study.motion.clip import Clip, joint_positions, resample, retarget
 from study.motion.library import open_library
+from study.motion.readers.bvh_writing import write_bvh
 from study.motion.readers.gltf_writing import write_glb
 from study.motion.readers.registry import read_clip
 from tests.walks import make_walk
@@ -373,6 +375,7 @@ REFUSALS = [
     (wrong("accessors.1.componentType", 5125), 'found ."VEC4", 5125'),
     (wrong("bufferViews.0.extensions", {"EXT_meshopt_compression": {}}), "Export it without compression"),
     (wrong("bufferViews.0.byteOffset", -1), "byteOffset: Expected a whole number from 0"),
+    (wrong("animations.0.channels.0.target.node", [1]), r"target.node: Expected a number of nodes .*found \[1\]"),
     (wrong("animations", []), "found none in it. Export it with its animation"),
     (wrong("animations.0.channels", []), "Expected one that moves joints"),
 ]  # fmt: skip
@@ -447,6 +450,16 @@ def test_damaged_binary_files_are_refused(tmp_path: Path) -> None:
 
 
 # -- Writing, and both ways -------------------------------------------------------------------------------------------
+
+
+def test_names_that_bvh_files_cannot_hold_are_written_in_others(tmp_path: Path) -> None:
+    """Found by the fuzzer: glTF gives any name."""
+    clip = open_library("synthetic").clip("stand")
+    names = ("{root}", " Spine ", "_root_", *clip.skeleton.names[3:])
+    write_bvh(replace(clip, skeleton=replace(clip.skeleton, names=names, known=None)), tmp_path / "walk.bvh")
+    again = read_clip(tmp_path / "walk.bvh")
+    assert again.skeleton.names[:3] == ("_root_", "Spine", "_root__2")
+    assert np.abs(joint_positions(again)[:, 0] - clip.root_positions).max() < 1e-6
 
 
 def test_only_clips_of_one_skeleton_are_written(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from study.errors import MotionFileError
 from study.files import write_whole
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
+from study.motion.readers.rigid import unique
 from study.motion.readers.source import LARGEST
 from study.motion.skeleton import Skeleton
 
@@ -57,6 +59,8 @@ def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:
     ends: dict[int, list[FloatArray]] = {}
     for joint, offset in zip(skeleton.end_parents.tolist(), skeleton.end_offsets, strict=True):
         ends.setdefault(joint, []).append(offset)
+    # Braces end a name in BVH files, and blanks around it are not read.
+    names = unique([re.sub(r"[{}\r\n]", "_", name).strip() or "_" for name in skeleton.names])
     lines: list[str] = []
     open_joints: list[int] = []
 
@@ -69,7 +73,7 @@ def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:
         close_to(parent)
         tab = "\t" * len(open_joints)
         position = "6 Xposition Yposition Zposition" if joint == 0 else "3"
-        lines += [f"{tab}{'ROOT' if joint == 0 else 'JOINT'} {skeleton.names[joint]}", f"{tab}{{"]
+        lines += [f"{tab}{'ROOT' if joint == 0 else 'JOINT'} {names[joint]}", f"{tab}{{"]
         lines += [f"{tab}\t{place(skeleton.offsets[joint])}"]
         lines += [f"{tab}\tCHANNELS {position} Zrotation Yrotation Xrotation"]
         for end in ends.get(joint, []):

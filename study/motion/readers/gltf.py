@@ -196,7 +196,7 @@ def _tracks(document: Document, number: int) -> Tracks:
         if not isinstance(target, dict):
             document.refuse(here, "an object with a target", channel)
         node, kind = target.get("node"), target.get("path")
-        if kind in _REST and node is not None and (node, kind) not in found:
+        if kind in [*_REST] and node is not None:
             document.item("nodes", node, f"{here}.target.node")
             sampler = document.whole(channel.get("sampler"), f"{here}.sampler", len(samplers), "a number of samplers")
             found[node, kind] = _track(document, samplers[sampler], kind, f"{place}.samplers[{sampler}]")

@@ -97,9 +97,9 @@ class Document:
 
     def whole(self, value: object, place: str, limit: float = LARGEST, what: str = "a whole number") -> int:
         """A whole number from 0 and below a limit."""
-        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < limit:
-            self.refuse(place, f"{what} from 0 and below {limit:.10g}", value)
-        return value
+        if type(value) is int and 0 <= value < limit:
+            return value
+        return self.refuse(place, f"{what} from 0 and below {limit:.10g}", value)
 
     def item(self, kind: str, number: object, place: str) -> dict[str, Any]:
         """One of the items by its number, which the file names at `place`."""
@@ -109,7 +109,8 @@ class Document:
 
     def numbers(self, value: object, count: int, place: str) -> FloatArray:
         """A list of `count` numbers in the JSON, up to `LARGEST`."""
-        if len(found := self.listed(value, place)) != count or not all(map(_is_number, found)):
+        found = self.listed(value, place)
+        if len(found) != count or not all(type(one) in (int, float) and abs(one) <= LARGEST for one in found):
             self.refuse(place, f"{count} numbers up to {LARGEST:.0e}", value)
         return np.array(found, dtype=np.float64)
 
@@ -175,7 +176,7 @@ def read_document(path: Path) -> Document:
         if at != len(raw) or raw[4 : _HEADER.size] != struct.pack("<II", 2, len(raw)) or _JSON not in chunks:
             raise MotionFileError(f"Expected {KIND}, found one of another version, or a damaged one.", path)
     try:
-        root = json.loads(chunks.get(_JSON, raw).decode("utf-8-sig"), parse_constant=_no_number)
+        root = json.loads(chunks.get(_JSON, raw).decode("utf-8-sig"), parse_constant=str)  # NaN is no number
     except (ValueError, RecursionError) as problem:
         where = (problem.lineno, problem.colno) if isinstance(problem, json.JSONDecodeError) and not chunks else (0, 0)
         raise MotionFileError(f"Expected {KIND}, found no JSON in it ({str(problem)[:80]}).", path, *where) from problem
@@ -191,14 +192,6 @@ def pack(text: bytes, binary: bytes) -> bytes:
     parts = ((text + b" " * (-len(text) % 4), _JSON), (binary + bytes(-len(binary) % 4), _BINARY))
     chunks = b"".join(_CHUNK.pack(len(part), kind) + part for part, kind in parts)
     return _HEADER.pack(_MAGIC, 2, _HEADER.size + len(chunks)) + chunks
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
-
-
-def _no_number(text: str) -> float:
-    raise ValueError(f"{text} is no number")
 
 
 def _shown(value: object) -> str:
