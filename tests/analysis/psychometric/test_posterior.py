@@ -228,3 +228,12 @@ def test_a_threshold_at_another_share_of_a_sigmoid_that_is_not_symmetric() -> No
     at = {part: np.log(-np.log(1 - part)) for part in (0.05, 0.5, 0.75, 0.95)}
     expected = 4 + 3 * (at[0.75] - at[0.5]) / (at[0.95] - at[0.05])
     assert threshold_at(fit, 0.75).value == pytest.approx(expected, abs=0.1)
+
+
+@pytest.mark.parametrize(("task", "bound"), [("yes-no", ("guess",)), ("2afc", ())])
+def test_a_rate_that_is_held_is_not_told_to_lie_at_its_bound(task: str, bound: tuple[str, ...]) -> None:
+    shown = np.full(7, 400.0)
+    yes = np.round(share("normal", 4, 3, 0.0 if task == "yes-no" else 0.5, 0.04) * shown)
+    best = fit_likelihood(LEVELS, yes, shown, make_model(task))
+    assert isinstance(best, LikelihoodFit)
+    assert best.at_bound == bound

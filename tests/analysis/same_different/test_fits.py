@@ -232,3 +232,17 @@ def test_one_participant_gets_an_interval_that_says_what_it_rests_on() -> None:
 def test_the_same_answers_give_the_same_numbers() -> None:
     counts = draw(np.random.default_rng(5), shares_of_group(8, 7), 10)
     assert fit_model(counts) == fit_model(counts)
+
+
+def test_the_error_of_d_prime_is_that_of_both_rates() -> None:
+    """Delta method by hand: derivatives of the two rates by d' and by the criterion."""
+    hits, alarms, pairs = 70, 20, 100
+    found = d_prime(hits, pairs, alarms, pairs)
+    assert found.d_prime is not None
+    assert found.criterion is not None
+    rates = np.array([hits + 0.5, alarms + 0.5]) / (pairs + 1)
+    above, below = (norm.pdf((found.d_prime + sign * found.criterion) / 2**0.5) / 2**0.5 for sign in (-1, 1))
+    by_d_prime, by_criterion = above - below, -(above + below)
+    criterion_by_alarm = -1 / (2**0.5 * norm.pdf(found.criterion / 2**0.5))
+    slopes = np.array([1 / by_d_prime, -by_criterion / by_d_prime * criterion_by_alarm])
+    assert found.standard_error == pytest.approx(np.sqrt((slopes**2 * rates * (1 - rates) / pairs).sum()), rel=1e-3)

@@ -18,7 +18,9 @@ def protocol() -> Protocol:
     return parse_protocol(TOY_PROTOCOL.replace("differences_frames = [-3, 0, 5]", practice))
 
 
-def test_the_rows_are_what_is_prepared(protocol: Protocol, toy_library: ToyLibrary) -> None:
+@pytest.mark.parametrize("entry_s", [0.3, 2.5], ids=["within the clips", "beyond their beginning"])
+def test_the_rows_are_what_is_prepared(protocol: Protocol, toy_library: ToyLibrary, entry_s: float) -> None:
+    protocol = parse_protocol(protocol.text.replace("entry_s = 0.3", f"entry_s = {entry_s}"))
     ahead, made = look_ahead(protocol, toy_library), prepare(protocol, toy_library)
     assert ahead.problems == ()
     assert ahead.films == len(made.records)
