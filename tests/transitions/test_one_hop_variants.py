@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from walks import make_walk
 
 from study.errors import TransitionError
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, trim
+from study.motion.clip import Clip, joint_positions, moved, trim
 from study.motion.skeleton import Skeleton
 from study.motion.synthetic import synthesize
+from study.transitions.blending import facing
 from study.transitions.one_hop import beats as on_beat
 from study.transitions.one_hop.adaptive import StrainDistance, adaptive
 from study.transitions.one_hop.build import build_table
@@ -22,6 +24,8 @@ from study.transitions.one_hop.connect import connect
 from study.transitions.one_hop.parts import part_joints, part_weights, put_together
 from study.transitions.one_hop.play import Step, Trigger, play, play_steps
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch
+from study.transitions.one_hop.reach import Wanted, reach
+from study.transitions.point_cloud import alignment as align
 
 DISTANCE = PointCloudDistance()
 
@@ -347,6 +351,149 @@ def test_a_blend_costs_what_it_bends_and_what_it_adds_to_the_velocities(blend: i
     assert (found[:, 101 - window :] == 2**29).all()
     with pytest.raises(TransitionError, match=r"ascending, got \(6, 3\)"):
         Settings(6, lengths=(6, 3))
+
+
+# Places to reach
+
+
+class Drawn:
+    """A distance that is drawn: small whole numbers, exact, so that ties abound. Clips go by their number."""
+
+    unit, words = 1.0, "drawn costs"
+
+    def __init__(self, rng: np.random.Generator, clips: tuple[Clip, ...], blend: int) -> None:
+        windows = [clip.frames - blend + 1 for clip in clips]
+        self.costs: dict[tuple[int, int], np.ndarray] = {}
+        for a, b in product(range(len(clips)), repeat=2):
+            drawn = rng.integers(0, 6, (windows[a], windows[b])).astype(np.int32)
+            if a == b:
+                drawn = np.minimum(drawn, drawn.T)
+                np.fill_diagonal(drawn, 0)
+            self.costs[a, b] = self.costs[b, a].T.copy() if a > b else drawn
+
+    def prepare(self, clip: Clip, blend_frames: int) -> int:
+        del blend_frames
+        return int(clip.name)
+
+    def counts(self, a: int, b: int, blend_frames: int, rows: range, columns: range) -> np.ndarray:
+        del blend_frames
+        return self.costs[a, b][rows.start : rows.stop, columns.start : columns.stop].copy()
+
+
+def placed_on(a: Clip, at: int, b: Clip, there: int, blend: int) -> tuple[float, np.ndarray]:
+    yaw, shift, _ = align(*(joint_positions(trim(c, f, f + blend)) for c, f in ((a, at), (b, there))))
+    return yaw, shift
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_a_place_is_reached_by_the_best_of_all_transitions_that_end_there(seed: int) -> None:
+    """Every hop, frame and stay is tried, each end found by aligning and moving clips; with nothing wanted it is the
+    table's entry."""
+    rng = np.random.default_rng([seed, 9])
+    blend, clips = int(rng.integers(2, 5)), wandering(*(int(n) for n in rng.integers(8, 15, 3)))
+    stay, weight = int(rng.integers(0, 3)), int(rng.integers(0, 3))
+    both = int(rng.integers(0, 4)) if rng.random() < 0.4 else None
+    extra, distance = {int(rng.integers(3)): int(rng.integers(0, 4))}, Drawn(rng, clips, blend)
+    allowed = {(0, 2): np.unique(rng.integers(-8, 12, 9))} if rng.random() < 0.4 else {}
+    settings, to = Settings(blend, stay, stay, both), int(rng.integers(-3, 4))
+    switch = Switch(0, 1, Alignment(offset=to))
+    problem = Problem(clips, (switch,), settings, weight, distance, hop_costs=extra, offsets=allowed)
+    trigger = int(rng.integers(0, 5))
+    every = []
+    source, destination = clips[:2]
+    counts, windows = distance.costs, [clip.frames - blend + 1 for clip in clips]
+    for s, hop in product(range(min(stay, settings.stay_both) + 1), range(3)):
+        for u in range(windows[hop]) if trigger + s < windows[0] else ():
+            if (0, hop) in allowed and trigger + s - u not in allowed[0, hop]:
+                continue
+            yaw, shift = placed_on(source, trigger + s, clips[hop], u, blend)
+            first = int(counts[0, hop][trigger + s, u]) + weight * s + extra.get(hop, 0)
+            e = trigger + s + blend - to
+            if hop == 1 and e == u + blend:
+                every.append(((first, s, hop, u, 0), moved(destination, yaw, shift), e - 1))
+            for h in range(min(stay, settings.stay_both - s) + 1):
+                if 0 <= e + h < windows[1] and u + blend + h < windows[hop]:
+                    then = placed_on(moved(clips[hop], yaw, shift), u + blend + h, destination, e + h, blend)
+                    cost = first + int(counts[1, hop][e + h, u + blend + h]) + weight * h
+                    every.append(((cost, s, hop, u, h), moved(destination, *then), e + h + blend - 1))
+    ends = []
+    for _, there, frame in every:
+        turned = facing(there)[frame] - facing(source)[trigger]
+        way = there.root_positions[frame] - source.root_positions[trigger]
+        way = quat.rotate(quat.yaw(-facing(source)[trigger]), way)
+        ends.append((way[2], way[0], (turned + np.pi) % (2 * np.pi) - np.pi))
+    table = build_table(problem)
+    free = reach(problem, switch, trigger, Wanted())
+    known = table.look_up(0, 1, trigger)
+    assert (free and free.entry) == known
+    if not every:
+        assert free is None
+        return
+    aim = ends[int(rng.integers(len(ends)))]
+    for wanted in (
+        Wanted(aim[0], aim[1], 0.05),
+        Wanted(turn_rad=aim[2], within_rad=0.1),
+        Wanted(aim[0], aim[1], 0.1, aim[2], 0.3),
+        Wanted(left_m=aim[1], within_m=0.02),
+    ):
+        fits = [
+            k
+            for k, (ahead, left, turn) in enumerate(ends)
+            if sum((value - want) ** 2 for value, want in ((ahead, wanted.forward_m), (left, wanted.left_m))
+                   if want is not None) <= wanted.within_m**2
+            and (wanted.turn_rad is None
+                 or abs((turn - wanted.turn_rad + np.pi) % (2 * np.pi) - np.pi) <= wanted.within_rad)
+        ]  # fmt: skip
+        best = min(fits, key=lambda k: every[k][0])
+        found = reach(problem, switch, trigger, wanted)
+        assert found is not None
+        cost, s, hop, u, h = every[best][0]
+        assert (found.entry.hop, found.entry.stay_source, found.entry.stay_hop) == (hop, s, h)
+        assert trigger + s - found.entry.offset == u
+        assert found.cost == cost
+        assert (found.forward_m, found.left_m) == pytest.approx(ends[best][:2], abs=1e-9)
+        assert np.angle(np.exp(1j * (found.turn_rad - ends[best][2]))) == pytest.approx(0.0, abs=1e-9)
+    assert reach(problem, switch, trigger, Wanted(forward_m=50.0)) is None
+
+
+def wandering(*lengths: int) -> tuple[Clip, ...]:
+    """Clips with hips and shoulders to face by, that go and turn."""
+    clips = []
+    for number, frames in enumerate(lengths):
+        walk = make_walk(frames, speed=1.0 + number, phase=1.0 * number, turn_rate=0.5 * number - 0.4, heading=number)
+        clips.append(replace(walk, name=str(number)))
+    return tuple(clips)
+
+
+def test_what_is_reached_is_where_the_destination_plays() -> None:
+    clips = wandering(60, 70, 65)
+    switch = Switch(0, 1, Alignment(offset=2))
+    problem = Problem(clips, (switch,), Settings(6, 8, 8), 200, DISTANCE)
+    free = reach(problem, switch, 20, Wanted())
+    assert free is not None
+    found = reach(problem, switch, 20, Wanted(free.forward_m + 0.15, free.left_m, 0.1))
+    assert found is not None
+    assert found.entry != free.entry
+    assert found.cost >= free.cost
+    steps = [Step(found.entry.stay_source, found.entry.hop, found.entry.offset, 6), Step(found.entry.stay_hop, 1, 2, 6)]
+    played = play_steps(clips, 0, 0, 20, steps)
+    state = played.segments[-1]
+    yaw, shift, rest = align(
+        joint_positions(trim(played.clip, state.start, state.stop)),
+        joint_positions(trim(clips[1], state.clip_start, state.clip_start + state.stop - state.start)),
+    )
+    assert rest == pytest.approx(0.0, abs=1e-12)
+    there = moved(clips[1], yaw, shift)
+    way = there.root_positions[state.clip_start - 1] - clips[0].root_positions[20]
+    way = quat.rotate(quat.yaw(-facing(clips[0])[20]), way)
+    assert (found.forward_m, found.left_m) == pytest.approx((way[2], way[0]), abs=1e-9)
+
+
+def test_rules_that_a_search_for_a_place_does_not_know_are_refused() -> None:
+    clips = one_rig(20, 20)
+    problem = Problem(clips, (Switch(0, 1),), Settings(3, 2, 2), 0, DISTANCE, nearest_to_direct=2)
+    with pytest.raises(TransitionError, match="blends of one length and any hop"):
+        reach(problem, problem.switches[0], 0, Wanted())
 
 
 # More than one hop (section 5, Multiple hops)

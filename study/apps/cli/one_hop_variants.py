@@ -1,4 +1,4 @@
-"""`segue one-hop` (chain, connect, robustness): variants of section 5 of Koyama & Goto 2019 that need no table."""
+"""`segue one-hop` (chain, reach, connect, robustness): variants of Koyama & Goto 2019, section 5, without a table."""
 
 from __future__ import annotations
 
@@ -73,6 +73,85 @@ def chain(
     result = {"costs": costs, "weight": problem.weight * problem.distance.unit, "steps": steps}
     played = play_steps(loaded, source, 0, trigger, best.steps)
     show_played(played, names, out, result, [f"cost by at most {said}"])
+
+
+@one_hop.command()
+@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
+@search_options
+@click.option("--pair", type=(str, str), metavar="SRC DST", required=True, help="The transition.")
+@click.option("--at", "trigger", type=click.IntRange(min=0), required=True, help="Triggered frame of SRC.")
+@click.option("--offset", type=int, default=0, show_default=True, help="Frame of SRC at which DST has its frame 0.")
+@click.option("--forward", type=float, help="Metres ahead of the figure at the triggered frame.")
+@click.option("--left", type=float, help="Metres to its left; below 0 to its right.")
+@click.option("--within", type=click.FloatRange(min=0), default=0.1, show_default=True, help="Tolerance, metres.")
+@click.option("--turn", type=click.FloatRange(-180, 180), help="Degrees that it is to face further to the left.")
+@click.option("--within-turn", type=click.FloatRange(0, 180), default=10.0, show_default=True,
+              help="Tolerance, degrees.")  # fmt: skip
+@out_option
+@json_option
+def reach(
+    clips: tuple[str, ...],
+    library: str | None,
+    fps: float,
+    pair: tuple[str, str],
+    trigger: int,
+    offset: int,
+    forward: float | None,
+    left: float | None,
+    within: float,
+    turn: float | None,
+    within_turn: float,
+    out: Path | None,
+    **options: Any,
+) -> None:
+    """The best transition that ends at a wanted place and heading, for one triggered frame.
+
+    Exact: every hop, frame and stay is looked at. The end is the last blended frame. All CLIPs may be hops.
+    """
+    from math import degrees, radians
+
+    from study.transitions.one_hop.play import Step, play_steps
+    from study.transitions.one_hop.problem import Alignment, Switch
+    from study.transitions.one_hop.reach import Wanted
+    from study.transitions.one_hop.reach import reach as find
+
+    if forward is None and left is None and turn is None:
+        raise click.UsageError("expected a place or a heading to reach; give --forward, --left or --turn.")
+    loaded = load_clips(clips, library, fps)
+    ((source, destination),) = pairs_of((pair,), loaded)
+    switch = Switch(source, destination, Alignment(offset=offset), trigger, trigger)
+    problem = problem_of(loaded, (switch,), options)
+    wanted = Wanted(forward, left, within, None if turn is None else radians(turn), radians(within_turn))
+    found, free = find(problem, switch, trigger, wanted), find(problem, switch, trigger, Wanted())
+    if found is None:
+        where = "" if free is None else (
+            f"; the best of all goes {free.forward_m:.2f} m ahead and {free.left_m:.2f} m to the left, and turns by "
+            f"{degrees(free.turn_rad):.0f} degrees"
+        )  # fmt: skip
+        raise click.UsageError(
+            f"expected a transition from frame {trigger} that ends there, found none{where}. Allow more, give more "
+            "clips, or raise --stay."
+        )
+    entry, names = found.entry, [clip.name for clip in loaded]
+    blend = problem.settings.blend_frames
+    result = {
+        "hop": names[entry.hop],
+        "offset": entry.offset,
+        "stay_source": entry.stay_source,
+        "stay_hop": entry.stay_hop,
+        "cost": found.cost,
+        "cost_anywhere": None if free is None else free.cost,
+        "forward_m": found.forward_m,
+        "left_m": found.left_m,
+        "turn_degrees": degrees(found.turn_rad),
+    }
+    words = (
+        f"hop {names[entry.hop]} at offset {entry.offset}, stays of {entry.stay_source} and {entry.stay_hop} frames: "
+        f"{found.forward_m:.2f} m ahead, {found.left_m:.2f} m to the left, {degrees(found.turn_rad):.0f} degrees; cost "
+        f"{found.cost:.4g}" + ("" if free is None else f", {free.cost:.4g} if it may end anywhere")
+    )
+    steps = [Step(entry.stay_source, entry.hop, entry.offset, blend), Step(entry.stay_hop, destination, offset, blend)]
+    show_played(play_steps(loaded, source, 0, trigger, steps), names, out, result, [words])
 
 
 @one_hop.command()

@@ -186,3 +186,16 @@ def test_the_body_is_played_in_two_parts(capsys: pytest.CaptureFixture[str], tmp
     assert "found others in" in refused
     joint = refusal(capsys, "one-hop", "build", *clips, "--part", "upper", "--distance", "joint", "--out", "x.npz")
     assert "expected --distance pointcloud with --part" in joint
+
+
+def test_a_wanted_place_is_reached(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    clips = ("one-hop", "reach", "walk", "run", "walk_turn_left", "--pair", "walk", "run", *SEARCH, "--at", 20)
+    out = tmp_path / "reached.bvh"
+    found = answer(capsys, *clips, "--forward", 2.5, "--within", 0.3, "--out", out)
+    assert float(str(found["forward_m"])) == pytest.approx(2.5, abs=0.3)
+    assert float(str(found["cost"])) >= float(str(found["cost_anywhere"]))
+    assert read_bvh(out).frames == found["frames"]
+    turned = answer(capsys, *clips, "--turn", 0, "--within-turn", 20)
+    assert abs(float(str(turned["turn_degrees"]))) <= 20
+    assert "found none; the best of all goes" in refusal(capsys, *clips, "--forward", 90)
+    assert "give --forward, --left or --turn" in refusal(capsys, *clips)
