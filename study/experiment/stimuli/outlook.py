@@ -146,8 +146,8 @@ def _row(protocol: Protocol, planned: Planned) -> Row:
         study.name,
         settled.transition.name,
         "practice" if planned.for_practice else "trial",
-        _place(settled.source, settled.start_frame),
-        _place(settled.destination, settled.end_frame),
+        place_of(settled.source, settled.start_frame),
+        place_of(settled.destination, settled.end_frame),
         k_frames,
         k_frames / fps,
         lengths,
@@ -159,7 +159,8 @@ def _row(protocol: Protocol, planned: Planned) -> Row:
     )
 
 
-def _place(supply: Supply, frame: int) -> Place:
+def place_of(supply: Supply, frame: int) -> Place:
+    """Where a frame lies in the motion that the library supplied."""
     at = frame - supply.first
     s = at / supply.clip.fps
     return Place(supply.name, at, round(s, 6), round(file_frame(supply.clip, at), 3), supply.file)

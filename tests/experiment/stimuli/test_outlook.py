@@ -8,8 +8,9 @@ from toys import TOY_PROTOCOL, ToyLibrary
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import open_session
-from study.experiment.stimuli.outlook import look_ahead
+from study.experiment.stimuli.outlook import look_ahead, place_of
 from study.experiment.stimuli.prepare import prepare
+from study.experiment.stimuli.supply import Supply
 
 
 @pytest.fixture
@@ -18,9 +19,7 @@ def protocol() -> Protocol:
     return parse_protocol(TOY_PROTOCOL.replace("differences_frames = [-3, 0, 5]", practice))
 
 
-@pytest.mark.parametrize("entry_s", [0.3, 2.5], ids=["within the clips", "beyond their beginning"])
-def test_the_rows_are_what_is_prepared(protocol: Protocol, toy_library: ToyLibrary, entry_s: float) -> None:
-    protocol = parse_protocol(protocol.text.replace("entry_s = 0.3", f"entry_s = {entry_s}"))
+def test_the_rows_are_what_is_prepared(protocol: Protocol, toy_library: ToyLibrary) -> None:
     ahead, made = look_ahead(protocol, toy_library), prepare(protocol, toy_library)
     assert ahead.problems == ()
     assert ahead.films == len(made.records)
@@ -78,3 +77,11 @@ def test_what_cannot_be_shown_is_said_and_the_rest_is_listed(toy_library: ToyLib
     assert len(found.problems) == 1
     assert {row.transition for row in found.rows} == {"slow_quick"}
     assert found.minutes >= 1
+
+
+def test_frames_are_counted_from_where_the_motion_begins_not_from_what_was_added_before_it(
+    toy_library: ToyLibrary,
+) -> None:
+    clip = toy_library.clip("slow", fps=30)
+    found = place_of(Supply("slow", clip, 12, clip.frames, (20, 30), "slow.bvh"), 27)
+    assert (found.frame, found.s) == (15, 0.5)

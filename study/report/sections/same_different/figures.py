@@ -27,6 +27,9 @@ from study.report.words import readable
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+MOST_TICKS = 14
+"""Labels of levels along an axis; those of staircases and QUEST+ are many."""
+
 
 def _points(axes: Axes, rows: Sequence[PercentDifferent], size: float = 5.0) -> None:
     """Percentages with bars of one standard error, interpolated linearly as in 2004 Figure 6."""
@@ -44,7 +47,13 @@ def _level_axis(axes: Axes, level: float) -> None:
 
 
 def _level_ticks(axes: Axes, levels: Sequence[float]) -> None:
-    axes.set_xticks(levels, [f"{level:+.0f}".replace("-", "−") if level else "k" for level in levels])
+    """The levels, outwards from k, as many as have room."""
+    room = (max(levels, default=0) - min(levels, default=0)) / MOST_TICKS
+    shown: list[float] = []
+    for level in sorted(levels, key=abs):
+        if all(abs(level - other) >= room for other in shown):
+            shown.append(level)
+    axes.set_xticks(shown, [f"{level:+.0f}".replace("-", "−") if level else "k" for level in shown])
 
 
 def _model_threshold(axes: Axes, threshold: Threshold, level: float, label: bool) -> None:
