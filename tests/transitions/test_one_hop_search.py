@@ -22,6 +22,8 @@ from study.transitions.one_hop.problem import (
     Switch,
     weight_in_counts,
 )
+from study.transitions.one_hop.runs import from_runs, to_runs
+from study.transitions.one_hop.table import read_table, write_table
 
 POINT = Skeleton(("root",), np.array([-1]), np.zeros((1, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
 
@@ -283,3 +285,55 @@ def test_refusals() -> None:
         weight_in_counts(-1.0, PointCloudDistance())
     with pytest.raises(TransitionError, match="at least one clip"):
         Problem((), ())
+
+
+# The table as runs
+
+
+def fewest_runs(entries: np.ndarray) -> int:
+    """By dynamic programming over every cut, with each rule for what goes on written out."""
+
+    def goes_on(kind: int, k: int, first: int) -> bool:
+        expected = entries[first].copy()
+        if kind:
+            expected[3 - kind] += (k - first) * (-1 if kind == 1 else 1)
+        return bool((entries[k] == expected).all())
+
+    least = [0] + [len(entries) + 1] * len(entries)
+    for first in range(len(entries)):
+        for kind in range(3):
+            stop = first
+            while stop < len(entries) and goes_on(kind, stop, first):
+                stop += 1
+                least[stop] = min(least[stop], least[first] + 1)
+    return least[-1]
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_runs_give_back_every_entry_and_no_division_has_fewer(seed: int, tmp_path: Path) -> None:
+    problem, _ = random_problem(seed)
+    table = build.build_table(problem, workers=1)
+    runs = to_runs(table.entries)
+    count = len(table.entries)
+    np.testing.assert_array_equal(from_runs(runs, range(count)), table.entries)
+    for place in range(count):
+        np.testing.assert_array_equal(from_runs(runs, range(place, place + 1))[0], table.entries[place])
+    assert len(runs) == fewest_runs(table.entries)
+    flat, words = write_table(table, tmp_path / "t.bin", as_runs=True)
+    assert flat.stat().st_size == 20 * len(runs)
+    again = read_table(words)
+    np.testing.assert_array_equal(again.entries, table.entries)
+    assert again.rows == table.rows
+
+
+def test_blends_of_their_own_length_go_along_in_runs_and_damage_is_told(tmp_path: Path) -> None:
+    entries = np.array([[1, 5, 3, 0, 4, 9], [1, 5, 2, 0, 4, 9], [1, 5, 1, 0, 4, 8], [1, 6, 1, 0, 4, 8]], dtype=np.int32)
+    runs = to_runs(entries)
+    assert runs.tolist() == [[1, 1, 5, 3, 0, 4, 9], [8, 1, 5, 1, 0, 4, 8]]
+    np.testing.assert_array_equal(from_runs(runs, range(4)), entries)
+    assert to_runs(entries[:0]).shape == (0, 7)
+    table = build.build_table(random_problem(3)[0], workers=1)
+    _, words = write_table(table, tmp_path / "t.bin", as_runs=True)
+    words.write_text(words.read_text().replace(f'"entries": {len(table.entries)}', '"entries": 1000000000'))
+    with pytest.raises(TransitionError, match="its triggered frames, found another number"):
+        read_table(words)

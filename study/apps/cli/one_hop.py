@@ -97,6 +97,7 @@ search_options = together(
 @click.option(
     "--near-direct", type=click.IntRange(min=0), help="The hop is DST itself, shifted by at most this many frames."
 )
+@click.option("--runs", is_flag=True, help="X.bin holds neighbouring entries together, without loss.")
 @click.option("--workers", type=click.IntRange(min=1), help="Threads (default: one a core).")
 @json_option
 def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **options: Any) -> None:
@@ -108,30 +109,34 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **
     import numpy as np
 
     from study.files import check_place
+    from study.transitions.one_hop.runs import to_runs
     from study.transitions.one_hop.table import write_table
 
     if out.suffix not in (".npz", ".bin", ".json"):
         raise click.UsageError(f"expected --out as a name that ends in .npz, .bin or .json, found {str(out)!r}.")
+    if options["runs"] and out.suffix == ".npz":
+        raise click.UsageError("expected --out X.bin with --runs; .npz holds every entry, with its costs.")
     loaded = load_clips(clips, library, fps)
     check_place(out)
     options["known_beats"] = known_beats(clips, library, loaded)
     options["genres"] = [find_entry(spec, library)[1].kind for spec in clips]
     table = built(loaded, out, options)
-    files = write_table(table, out)
+    files = write_table(table, out, as_runs=options["runs"])
+    size = to_runs(table.entries).nbytes if options["runs"] else table.entries.nbytes
     both = np.isfinite(table.costs) & np.isfinite(table.direct_costs)
     result = {
         "files": [str(file) for file in files],
         "transitions": len(table.rows),
         "entries": len(table.entries),
         "found": int((table.entries[:, 0] >= 0).sum()),
-        "bytes": int(table.entries.nbytes),
+        "bytes": int(size),
         "weight": table.weight,
         "mean_cost": float(table.costs[both].mean()) if both.any() else None,
         "mean_direct_cost": float(table.direct_costs[both].mean()) if both.any() else None,
     }
     text = (
         f"{', '.join(map(str, files))}: {counted(len(table.rows), 'transition')}, {result['found']} of "
-        f"{counted(len(table.entries), 'triggered frame')}, {counted(table.entries.nbytes, 'byte')}, weight "
+        f"{counted(len(table.entries), 'triggered frame')}, {counted(size, 'byte')}, weight "
         f"{table.weight:.4g} a frame"
     )
     if both.any():

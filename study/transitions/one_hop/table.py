@@ -4,7 +4,7 @@ An entry is (hop clip, temporal alignment offset of the hop, stay in the source,
 Eq. 1; the hop is -1 where no transition fits in the clips. 50 transitions of 1,000 frames are 800,000 bytes.
 
 Files: `NAME.npz` (arrays for NumPy, costs too) and `NAME.bin` with `NAME.json` (little-endian 32-bit integers that a
-game engine reads without us); `docs/one_hop.md` describes both.
+game engine reads without us, every entry or as `runs`); `docs/one_hop.md` describes them.
 """
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ from study.arrays import CountArray, FloatArray
 from study.errors import TransitionError
 from study.files import whole_file, write_whole
 from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem
+from study.transitions.one_hop.runs import KINDS, from_runs, to_runs
 from study.transitions.one_hop.search import Best
 
 FORMAT, VERSION = "segue one-hop table", 1
+VERSION_OF_RUNS = 2
 COLUMNS = ("hop", "offset", "stay_source", "stay_hop")
 # Two more where each transition has blend lengths of its own.
 BLEND_COLUMNS = ("blend_first", "blend_second")
@@ -182,8 +184,10 @@ def header(table: OneHopTable) -> dict[str, Any]:
     }
 
 
-def write_table(table: OneHopTable, path: Path) -> tuple[Path, ...]:
+def write_table(table: OneHopTable, path: Path, *, as_runs: bool = False) -> tuple[Path, ...]:
     """Writes `path` by its suffix: `.npz`, or `.bin` (or `.json`) for the flat file and its header; all at once.
+
+    With `as_runs` the flat file holds neighbouring entries together (`runs`).
 
     Returns
     -------
@@ -198,7 +202,12 @@ def write_table(table: OneHopTable, path: Path) -> tuple[Path, ...]:
     if path.suffix not in (".bin", ".json"):
         raise TransitionError(f"Expected a file name that ends in .npz, .bin or .json, got {path.name!r}.")
     flat, words = path.with_suffix(".bin"), path.with_suffix(".json")
-    write_whole(flat, table.entries.astype("<i4").tobytes())
+    content = table.entries
+    if as_runs:
+        content = to_runs(table.entries)
+        own = {"version": VERSION_OF_RUNS, "runs": len(content), "bytes": int(content.size * 4), "kinds": KINDS}
+        text = json.dumps({**header(table), **own}, indent=2)
+    write_whole(flat, content.astype("<i4").tobytes())
     write_whole(words, text)
     return flat, words
 
@@ -240,8 +249,14 @@ def _read_table(path: Path) -> OneHopTable:
             f"{flat}: expected {said.get('bytes', 'no')} bytes, as {words.name} says, found {len(content)}. "
             "Build it again."
         )
-    width = len(said.get("columns", COLUMNS))
-    return _table(said, np.frombuffer(content, dtype="<i4").astype(np.int32).reshape(-1, width), path)
+    width, numbers = len(said.get("columns", COLUMNS)), np.frombuffer(content, dtype="<i4").astype(np.int32)
+    if said.get("version") == VERSION_OF_RUNS:
+        count = sum(row["triggers"] for row in said["transitions"])
+        if count != said["entries"] or (len(numbers) == 0) != (count == 0):
+            raise TransitionError(f"{words}: expected {count} entries, its triggered frames, found another number.")
+        entries = from_runs(numbers.reshape(-1, 1 + width), range(count))
+        return _table({**said, "version": VERSION}, entries, path)
+    return _table(said, numbers.reshape(-1, width), path)
 
 
 def _table(

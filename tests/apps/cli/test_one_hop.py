@@ -199,3 +199,15 @@ def test_a_wanted_place_is_reached(capsys: pytest.CaptureFixture[str], tmp_path:
     assert abs(float(str(turned["turn_degrees"]))) <= 20
     assert "found none; the best of all goes" in refusal(capsys, *clips, "--forward", 90)
     assert "give --forward, --left or --turn" in refusal(capsys, *clips)
+
+
+def test_a_table_of_runs_says_the_same(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    build = ("one-hop", "build", "dance", "box", "--pair", "dance", "box", *SEARCH)
+    whole, runs = tmp_path / "whole.bin", tmp_path / "runs.bin"
+    large, small = answer(capsys, *build, "--out", whole), answer(capsys, *build, "--runs", "--out", runs)
+    assert int(str(small["bytes"])) == runs.stat().st_size < int(str(large["bytes"])) == whole.stat().st_size
+    for frame in (0, 50, 150):
+        place = ("--at", "dance", "box", frame)
+        first, second = (answer(capsys, "one-hop", "show", path, *place)["shown"] for path in (whole, runs))
+        assert first == second
+    assert "expected --out X.bin with --runs" in refusal(capsys, *build, "--runs", "--out", tmp_path / "t.npz")
