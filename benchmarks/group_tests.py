@@ -118,8 +118,8 @@ def thresholds(studies, seed):
     print("people motions answers sd_people sd_motions   both  these   mean  true")
     levels, crossing = np.array([-15.0, -10, -5, 0, 5, 10, 20]), 7.0
     for people, count, repeats, own, other in (
-        (35, 3, 2, 0.3, 0.25), (35, 8, 1, 0.3, 0.25), (20, 8, 1, 0.3, 0.5), (12, 3, 2, 0.6, 0.5), (12, 4, 2, 0.3, 0.0),
-        (20, 5, 1, 0.3, 0.0),
+        (12, 3, 2, 0.6, 0.5), (20, 3, 2, 0.3, 0.0), (35, 3, 2, 0.3, 0.25), (20, 4, 2, 0.3, 0.5), (12, 6, 1, 0.0, 0.25),
+        (20, 8, 1, 0.3, 0.5), (35, 8, 1, 0.3, 0.25),
     ):  # fmt: skip
         rng, rows, values = np.random.default_rng([seed, 7, people, count, int(100 * other)]), [], []
         for _ in range(studies):

@@ -33,7 +33,7 @@ FRAMES = np.array([[0.0], [1.0]])
 def test_sensr_example(times: int, log_likelihood: float, criterion_error: float, delta_error: float) -> None:
     """8 of 13 same pairs "same", 9 of 13 different pairs "different"."""
     different, shown = times * np.array([5.0, 9.0]), times * np.array([13.0, 13.0])
-    found = fits.fit(FRAMES, different[None], shown[None], largest_lapse=0.0)
+    found = fits.fit(FRAMES, different[None], shown[None], lapse=0.0)
     assert found.criterion[0] == pytest.approx(1.2295508916, abs=1e-6)
     assert found.slopes[0, 0] == pytest.approx(1.8849964801, abs=1e-6)
     assert found.log_likelihood[0] == pytest.approx(log_likelihood, abs=1e-6)

@@ -79,6 +79,12 @@ def _answers(
             f"row {row_of(wrong)}: expected at most {columns.shown} answers, found {wrong.iloc[0]} of "
             f"{shown[wrong.index[0]]:g}"
         )
+    parts = answer[(count % 1 != 0) | (shown % 1 != 0)]
+    if len(parts):
+        raise AnalysisError(
+            f"row {row_of(parts)}: expected whole numbers of answers, found {count[parts.index[0]]:g} of "
+            f"{shown[parts.index[0]]:g}; give counts, not shares or means"
+        )
     if shown.sum() > MOST_ANSWERS:
         raise AnalysisError(
             f"expected at most {MOST_ANSWERS:,} answers in all, found {shown.sum():,.0f}; check --shown"

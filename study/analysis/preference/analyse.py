@@ -127,7 +127,7 @@ def compare(
                 motions=by_motion(part, confidence),
                 motions_as_sample=motions,
                 order=order,
-                no_preference=no_preference(chosen[shown > 0] / shown[shown > 0], margin),
+                no_preference=no_preference(chosen[shown > 0] / shown[shown > 0], margin, alpha),
                 default=default,
                 answer=_order_in_words(*names, order, alpha) or _in_words(*names, published, default, order, alpha),
                 mixed=mixed_preference(part, confidence),

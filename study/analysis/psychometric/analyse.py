@@ -6,6 +6,7 @@ group, since answers of one participant are not independent of each other.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -232,7 +233,7 @@ def _group(own: tuple[OwnFunction, ...], model: Model, confidence: float) -> Gro
         low=back(test.low),
         high=back(test.high),
         standard_deviation=float(axis.std(ddof=1)) if len(axis) > 1 else None,
-        note="; ".join(filter(None, (test.note, f"{left_out} of {have_none}" if left_out else ""))),
+        note="; ".join(filter(None, (test.note if found else "", f"{left_out} of {have_none}" if left_out else ""))),
     )
 
 
@@ -278,6 +279,12 @@ def _in_words(
 
 
 def _with_interval(value: float, low: float | None, high: float | None, confidence: float | None = None) -> str:
-    """A number and its interval; open ends are said."""
-    ends = f"{'open' if low is None else format(low, '.4g')} to {'open' if high is None else format(high, '.4g')}"
-    return f"{value:.4g} ({f'{100 * confidence:g}% interval ' if confidence else ''}{ends})"
+    """A number and its interval, to three digits of the interval's width; open ends are said."""
+    width = abs(value) if low is None or high is None else high - low
+    places = min(max(2 - math.floor(math.log10(width)), 0), 12) if width > 0 else 4
+
+    def told(end: float | None) -> str:
+        return "open" if end is None else f"{end:.{places}f}"
+
+    ends = f"{told(low)} to {told(high)}"
+    return f"{told(value)} ({f'{100 * confidence:g}% interval ' if confidence else ''}{ends})"

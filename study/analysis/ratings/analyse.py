@@ -53,7 +53,8 @@ class Ratings:
                 )
                 for row in self.table
             ]
-        return [
+        omnibus = [_omnibus_headline(question, study, alpha, confidence) for question in self.questions]
+        return [one for one in omnibus if one] + [
             Headline(
                 study=study,
                 statement=f"{question.item or 'rating'}: {_difference(row, alpha)}.",
@@ -147,7 +148,29 @@ def anova_sentences(questions: Sequence[Question], alpha: float) -> list[str]:
         if len(question.differences) > 1:
             found.append(f"{name}: {_omnibus(question, alpha)}")
         found += [f"{name}: {_difference(row, alpha)}" for row in question.differences if row.participants]
+        found += [f"{name}: by the ordinal model, {question.ordinal.note}"] if question.ordinal.note else []
     return found
+
+
+def _omnibus_headline(question: Question, study: str, alpha: float, confidence: float) -> Headline | None:
+    """Whether several methods differ at all; None with two."""
+    if len(question.differences) < 2:
+        return None
+    design = question.mixed_design
+    row = next((effect for effect in design.effects if effect.source == "method"), None)
+    p_value = row.corrected_p_value if row else None
+    return Headline(
+        study=study,
+        statement=f"{question.item or 'rating'}: {_omnibus(question, alpha)}.",
+        estimate=row.f if row else None,
+        unit="F of all methods",
+        interval=Interval(None, None, confidence),
+        p=p_value,
+        p_adjusted=p_value,
+        test="analysis of variance within participants, corrected by Greenhouse and Geisser",
+        generalises_to=holds_for(design.participants),
+        note=design.note,
+    )
 
 
 def _verdict(p_value: float, alpha: float, name: str = "p") -> str:

@@ -123,6 +123,7 @@ class SameDifferent(Thresholds):
         del alpha, confidence
         if (found := self.believed) is None:
             return []
+        caution = self.mixed.note if self.mixed else self.model_note
         return [
             Headline(
                 study=study,
@@ -134,14 +135,20 @@ class SameDifferent(Thresholds):
                 p_adjusted=None,
                 test=threshold.method,
                 generalises_to=found.generalises_to,
-                note="; ".join(filter(None, (threshold.note, self.mixed.note if self.mixed else "", NO_TEST))),
+                note="; ".join(filter(None, (threshold.note, caution, NO_TEST))),
             )
             for side, threshold in found.jnd.items()
         ]
 
 
 def analyse_jnd(
-    answers: pd.DataFrame, *, level: float = 0.75, confidence: float = 0.95, resamples: int = 1000, seed: int = 0
+    answers: pd.DataFrame,
+    *,
+    level: float = 0.75,
+    confidence: float = 0.95,
+    lapse: float | None = None,
+    resamples: int = 1000,
+    seed: int = 0,
 ) -> SameDifferent:
     """Analyse one same-different study.
 
@@ -149,6 +156,8 @@ def analyse_jnd(
     ----------
     level
         Share of "different" at threshold.
+    lapse
+        The lapse rate, held; estimated where it is None, and levels are enough for it.
     confidence, resamples, seed
         Of the intervals, and of the bootstrap behind the standard errors.
 
@@ -161,8 +170,10 @@ def analyse_jnd(
     estimates.check_share(level, "level")
     rng = np.random.default_rng(seed)
     counts = count_answers(answers)
-    found = _thresholds(counts, level, confidence, resamples, rng)
-    mixed = fit_mixed_thresholds(count_answers(answers, by_motion=True), level=level, confidence=confidence)
+    model = fit_model(counts, level=level, confidence=confidence, lapse=lapse)
+    found = _thresholds(counts, model, level, confidence, resamples, rng)
+    by_motion = count_answers(answers, by_motion=True)
+    mixed = fit_mixed_thresholds(by_motion, level=level, confidence=confidence, lapse=lapse)
     among = mixed if isinstance(mixed, MixedThresholds) else None
     moved = counts.differences != 0
     given = same_different_answers(answers)
@@ -194,9 +205,13 @@ def _believed(model: ModelFit | None, mixed: MixedThresholds | None, participant
 
 
 def _thresholds(
-    counts: Counts, level: float, confidence: float, resamples: int, rng: np.random.Generator
+    counts: Counts,
+    fitted: ModelFit | str,
+    level: float,
+    confidence: float,
+    resamples: int,
+    rng: np.random.Generator,
 ) -> Thresholds:
-    fitted = fit_model(counts, level=level, confidence=confidence)
     return Thresholds(
         answers=int(counts.shown.sum()),
         percent_different=percent_different(counts, confidence),
@@ -238,10 +253,11 @@ def _by_motion(
     rows = []
     for motion, part in given.groupby(given["motion"].astype(str), sort=False):
         counts = count_answers(part)
+        model = fit_model(counts, level=level, confidence=confidence)
         moved = counts.differences != 0
         rows.append(
             MotionThresholds(
-                **vars(_thresholds(counts, level, confidence, resamples, rng)),
+                **vars(_thresholds(counts, model, level, confidence, resamples, rng)),
                 motion=str(motion),
                 note="" if moved.any() and not moved.all() else "pairs with a difference only, or without one",
             )

@@ -43,7 +43,7 @@ class Fits:
     """`(fits,)`: whether the search came to rest."""
 
 
-def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, largest_lapse: float = LARGEST_LAPSE) -> Fits:
+def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, lapse: float | None = None) -> Fits:
     """Fit many data sets by maximum likelihood.
 
     Parameters
@@ -52,15 +52,15 @@ def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, largest
         As in `probability_different`, at least 0.
     different, shown : ndarray, shape (fits, levels)
         Counts of answers "different", and of all answers.
-    largest_lapse
-        The lapse rate is sought from 0 to here; 0 leaves it out.
+    lapse
+        The lapse rate, held; sought from 0 to `LARGEST_LAPSE` where it is None.
 
     Notes
     -----
     Criterion and slopes are searched as logarithms within wide bounds, so that "can't tell at all" and "never wrong"
     end at a bound, which `Fits.held` tells, and are no failure.
     """
-    low, high = _bounds(frames, largest_lapse)
+    low, high = _bounds(frames, lapse)
     found = maximise(
         lambda point, rows: _log_likelihood(point, frames, different[rows], shown[rows]),
         lambda point, rows: _scores(point, frames, different[rows], shown[rows]),
@@ -69,15 +69,15 @@ def fit(frames: FloatArray, different: FloatArray, shown: FloatArray, *, largest
         high,
     )
     point = found.point
-    criterion, lapse, slopes = np.exp(point[:, 0]), point[:, 1].copy(), np.exp(point[:, 2:])
-    return Fits(criterion, lapse, slopes, found.value, found.held, found.settled)
+    return Fits(np.exp(point[:, 0]), point[:, 1].copy(), np.exp(point[:, 2:]), found.value, found.held, found.settled)
 
 
-def _bounds(frames: FloatArray, largest_lapse: float) -> tuple[FloatArray, FloatArray]:
+def _bounds(frames: FloatArray, lapse: float | None) -> tuple[FloatArray, FloatArray]:
     """Bounds of log criterion, lapse and log slopes: d-prime at the largest difference from 0.02 to 40."""
     largest = np.maximum(frames.max(axis=0), 1e-9)
-    low = np.concatenate([[np.log(1e-3), 0.0], np.log(0.02 / largest)])
-    high = np.concatenate([[np.log(9.0), largest_lapse], np.log(40.0 / largest)])
+    lapses = (0.0, LARGEST_LAPSE) if lapse is None else (lapse, lapse)
+    low = np.concatenate([[np.log(1e-3), lapses[0]], np.log(0.02 / largest)])
+    high = np.concatenate([[np.log(9.0), lapses[1]], np.log(40.0 / largest)])
     return low, high
 
 
@@ -156,7 +156,7 @@ def d_prime_interval(
     """
     frames, reach = np.array([[0.0], [1.0]]), normal_quantile(confidence)
     counts = (np.array([alarms, hits], dtype=np.float64), np.array([same_pairs, different_pairs], dtype=np.float64))
-    found = fit(frames, counts[0][None], counts[1][None], largest_lapse=0.0)
+    found = fit(frames, counts[0][None], counts[1][None], lapse=0.0)
     near = np.linspace(-6, 6, D_PRIME_POINTS) * float(np.sqrt(covariance(found, frames, *counts)[2, 2]))
     line = np.concatenate([[1e-3], np.exp(np.linspace(np.log(0.03), np.log(WIDEST_D_PRIME), D_PRIME_POINTS))])
     line = np.concatenate([line, np.clip(found.slopes[0, 0] * np.exp(np.clip(near, -9, 9)), 1e-3, WIDEST_D_PRIME)])

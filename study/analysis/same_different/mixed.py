@@ -32,7 +32,7 @@ from study.analysis.same_different.counts import (
     log_threshold,
     sides_in_words,
 )
-from study.analysis.same_different.model import why_no_fit
+from study.analysis.same_different.model import held_lapse, lapse_caution, why_no_fit
 from study.analysis.same_different.observers import (
     ALIKE,
     AVOIDANCE,
@@ -111,13 +111,17 @@ class _Doubt:
     motions: tuple[BetweenMotions, ...]
 
 
-def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) -> MixedThresholds | str:
+def fit_mixed_thresholds(
+    counts: Counts, *, level: float = 0.75, confidence: float = 0.95, lapse: float | None = None
+) -> MixedThresholds | str:
     """Fit the differencing model with a sensitivity and a criterion for each participant.
 
     Parameters
     ----------
     level
         Share of "different" at threshold.
+    lapse
+        The lapse rate, held; estimated where it is None, and levels are enough for it.
 
     Returns
     -------
@@ -141,17 +145,19 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
         return reason
     people, sides = people_of(counts, answered)
     together = replace(people, frames=_by_side(people, len(sides)))
-    group, alike = (_one_curve(part) for part in (together, people))
+    held, why = held_lapse(together.frames, lapse)
+    group, alike = (_one_curve(part, held) for part in (together, people))
     if group.held[0, 2:].any() or group.held[0, 0]:
         return "the group's sensitivity or criterion is at its bound: individual differences cannot be estimated"
     slopes = np.log(group.slopes[0])[people.side_of]
     slopes = np.clip(np.log(alike.slopes[0]), slopes - 1.5 * REACH, slopes + 1.5 * REACH)
+    lapses = (0.0, fits.LARGEST_LAPSE) if held is None else (held, held)
     begin = np.concatenate([np.log(group.criterion), group.lapse, slopes, [0.2, 0.2]])
-    bounds = [(math.log(1e-3), math.log(9.0)), (0.0, fits.LARGEST_LAPSE), *((slope - 3, slope + 3) for slope in slopes)]
+    bounds = [(math.log(1e-3), math.log(9.0)), lapses, *((slope - 3, slope + 3) for slope in slopes)]
     point, value, settled = maximise(people, begin, [*bounds, *[(0.0, LARGEST_SPREAD)] * 2], 0.0)
     near = np.concatenate([point[:-2], np.maximum(point[-2:-1], 0.1), point[-1:]])
     wary, _, _ = maximise(people, near, [*bounds, (2 * ALIKE, LARGEST_SPREAD), (0.0, LARGEST_SPREAD)], AVOIDANCE)
-    doubt = _doubt(wary, people, len(sides))
+    doubt = _doubt(wary, people, len(sides), held is not None)
     mean = _of_mean_motion(people.side_of) @ point
     median = replace(together, sensitivity=np.zeros(1), criterion=np.zeros(1), log_mass=np.zeros(1))
     here = replace(doubt, motions=(NO_SAMPLE,) * len(sides))
@@ -162,13 +168,11 @@ def fit_mixed_thresholds(counts: Counts, *, level: float = 0.75, confidence: flo
     names = tuple(str(name) for name in answering[unable])
     able: dict[Side, Threshold] = {}
     if names:
-        others = fit_mixed_thresholds(_without(counts, names), level=level, confidence=confidence)
+        others = fit_mixed_thresholds(_without(counts, names), level=level, confidence=confidence, lapse=lapse)
         if isinstance(others, MixedThresholds):
             names, able = (*names, *others.unable), others.able or others.typical
-    notes = [
-        "" if settled else "the search for the maximum did not converge",
-        _in_words(names, len(people.shown), able),
-    ]
+    settled_note = "" if settled else "the search for the maximum did not converge"
+    notes = (why, lapse_caution(float(point[1]), held), settled_note, _in_words(names, len(unable), able))
     return MixedThresholds(
         typical=_thresholds(mean, doubt, median, sides, level, confidence),
         criterion_free=_thresholds(mean, doubt, median, sides, level, confidence, "criterion_free"),
@@ -215,9 +219,9 @@ def _curve(
     return tuple((float(x), 100 * float(y)) for x, y in zip(line, share, strict=True))
 
 
-def _one_curve(people: People) -> fits.Fits:
+def _one_curve(people: People, lapse: float | None) -> fits.Fits:
     """The differencing model of all answers as one person's."""
-    return fits.fit(people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None])
+    return fits.fit(people.frames, people.different.sum(axis=0)[None], people.shown.sum(axis=0)[None], lapse=lapse)
 
 
 def _by_side(people: People, sides: int) -> FloatArray:
@@ -234,8 +238,8 @@ def _of_mean_motion(side_of: IntArray) -> FloatArray:
     return turned
 
 
-def _doubt(point: FloatArray, people: People, sides: int) -> _Doubt:
-    covariance, turned = covariance_of(point, people), _of_mean_motion(people.side_of)
+def _doubt(point: FloatArray, people: People, sides: int, lapse_held: bool) -> _Doubt:
+    covariance, turned = covariance_of(point, people, lapse_held), _of_mean_motion(people.side_of)
     places = [2 + np.flatnonzero(people.side_of == side) for side in range(sides)]
     between = tuple(between_motions(point[own], covariance[np.ix_(own, own)]) for own in places)
     return _Doubt(turned @ covariance @ turned.T, turned @ point, len(people.shown), between)

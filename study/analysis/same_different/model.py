@@ -24,6 +24,7 @@ from study.analysis.same_different.counts import (
     log_threshold,
 )
 from study.arrays import FloatArray
+from study.counting import counted
 from study.models.differencing import Kind, probability_different
 
 
@@ -39,6 +40,8 @@ class ModelFit:
     """Share of "different" that the model gives to pairs with no difference."""
     slopes: dict[Side, float]
     """d-prime a frame, by side."""
+    slope_errors: dict[Side, float | None]
+    """Their standard errors."""
     jnd: dict[Side, Threshold]
     """Where `level` of the answers are "different", by side."""
     corrected: dict[Side, Threshold]
@@ -52,13 +55,17 @@ class ModelFit:
     """What to be careful about."""
 
 
-def fit_model(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) -> ModelFit | str:
+def fit_model(
+    counts: Counts, *, level: float = 0.75, confidence: float = 0.95, lapse: float | None = None
+) -> ModelFit | str:
     """Fit the differencing model; a sentence that says why where it can't be fitted.
 
     Parameters
     ----------
     level
         Share of "different", or of right answers, at threshold; above one half.
+    lapse
+        The lapse rate, held; estimated where it is None, and levels are enough for it.
 
     Notes
     -----
@@ -73,8 +80,9 @@ def fit_model(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) 
     present = np.flatnonzero(counts.shown.sum(axis=0) > 0)
     differences, different, shown = counts.differences[present], counts.different[:, present], counts.shown[:, present]
     frames, sides = frames_by_side(differences)
-    best = fits.fit(frames, different.sum(axis=0)[None], shown.sum(axis=0)[None])
-    spread = _spread_of(level, best, frames, different, shown)
+    held, note = held_lapse(frames, lapse)
+    best = fits.fit(frames, different.sum(axis=0)[None], shown.sum(axis=0)[None], lapse=held)
+    spread = _spread_of(level, best, frames, different, shown, held)
 
     def thresholds(kind: Kind) -> dict[Side, Threshold]:
         largest = frames.max(axis=0)
@@ -92,11 +100,12 @@ def fit_model(counts: Counts, *, level: float = 0.75, confidence: float = 0.95) 
         lapse=float(best.lapse[0]),
         false_alarms=float(alarms[0, 0]),
         slopes={SIDES[side]: float(best.slopes[0, place]) for place, side in enumerate(sides)},
+        slope_errors={SIDES[side]: spread.slope_error(best, place) for place, side in enumerate(sides)},
         jnd=thresholds("different"),
         corrected=thresholds("criterion_free"),
         curve=tuple((float(x), 100 * float(y)) for x, y in zip(line, curve, strict=True)),
         log_likelihood=float(best.log_likelihood[0]),
-        note=_caution(best),
+        note="; ".join(filter(None, (note, _caution(best, held)))),
     )
 
 
@@ -123,15 +132,31 @@ class _Spread:
             return estimates.jackknife_error(self.left_out.criterion)
         return float(best.criterion[0]) * math.sqrt(max(float(self.covariance[0, 0]), 0.0))
 
+    def slope_error(self, best: fits.Fits, place: int) -> float | None:
+        """Standard error of one slope."""
+        if self.left_out is not None:
+            return estimates.jackknife_error(self.left_out.slopes[:, place])
+        return float(best.slopes[0, place]) * math.sqrt(max(float(self.covariance[2 + place, 2 + place]), 0.0))
 
-def _spread_of(level: float, best: fits.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray) -> _Spread:
+
+def held_lapse(frames: FloatArray, lapse: float | None) -> tuple[float | None, str]:
+    """Return the lapse rate to hold, and why: the one given, 0 where levels are too few to estimate it, else none."""
+    levels, slopes = frames.shape
+    if lapse is not None or levels >= 2 + slopes:
+        return lapse, ""
+    return 0.0, f"{counted(levels, 'level')} can't tell a lapse rate from criterion and sensitivity: it is taken as 0"
+
+
+def _spread_of(
+    level: float, best: fits.Fits, frames: FloatArray, different: FloatArray, shown: FloatArray, lapse: float | None
+) -> _Spread:
     answered = shown.sum(axis=1) > 0
     different, shown = different[answered], shown[answered]
     count = len(shown)
     if count < FEWEST_FOR_INTERVAL:
         return _Spread(count, level, None, fits.covariance(best, frames, different.sum(axis=0), shown.sum(axis=0)))
     others = (different.sum(axis=0) - different, shown.sum(axis=0) - shown)
-    return _Spread(count, level, fits.fit(frames, *others), np.zeros((0, 0)))
+    return _Spread(count, level, fits.fit(frames, *others, lapse=lapse), np.zeros((0, 0)))
 
 
 def why_no_fit(counts: Counts) -> str:
@@ -149,15 +174,25 @@ def why_no_fit(counts: Counts) -> str:
     return ""
 
 
-def _caution(best: fits.Fits) -> str:
-    notes = []
+def lapse_caution(lapse: float, held: float | None) -> str:
+    """Return what to be careful about where as many answers are lapses as can be; empty else."""
+    if held is not None or lapse < fits.LARGEST_LAPSE - 1e-6:
+        return ""
+    most = f"{100 * fits.LARGEST_LAPSE:g}%"
+    return (
+        f"the lapse rate is at the bound of its range, {most}: more answers are tossed coins, or the curve does not fit"
+    )
+
+
+def _caution(best: fits.Fits, held: float | None) -> str:
+    notes = [lapse_caution(float(best.lapse[0]), held)]
     if best.held[0, 0]:
         notes.append("the criterion is at the bound of its range")
     if best.held[0, 2:].any():
         notes.append("a slope is at the bound of its range: the answers show no effect of the difference, or no error")
     if not best.settled[0]:
         notes.append("the search for the maximum did not converge")
-    return "; ".join(notes)
+    return "; ".join(filter(None, notes))
 
 
 def _threshold(

@@ -158,7 +158,7 @@ def maximise(
     return np.asarray(found.x, dtype=np.float64), -float(found.fun), bool(found.success)
 
 
-def covariance_of(point: FloatArray, people: People) -> FloatArray:
+def covariance_of(point: FloatArray, people: People, lapse_held: bool) -> FloatArray:
     """Inverse of the curvature, avoidance included; parameters at a bound are held there."""
     step, size, here = 1e-5, len(point), log_likelihood(point, people)[1]
     curvature = np.empty((size, size))
@@ -169,7 +169,7 @@ def covariance_of(point: FloatArray, people: People) -> FloatArray:
     curvature = (curvature + curvature.T) / 2
     curvature[-2, -2] += AVOIDANCE / point[-2] ** 2
     held = np.zeros(size, dtype=bool)
-    held[1] = point[1] <= 2e-4 or point[1] >= fits.LARGEST_LAPSE - 1e-9
+    held[1] = lapse_held or point[1] <= 2e-4 or point[1] >= fits.LARGEST_LAPSE - 1e-9
     held[-2:] = (point[-2:] <= ALIKE) | (point[-2:] >= LARGEST_SPREAD - 1e-9)
     free = np.flatnonzero(~held)
     result = np.zeros((size, size))

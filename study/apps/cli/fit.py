@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.console import READABLE, emit, json_option
-from study.counting import counted
+from study.counting import counted, noun
 from study.errors import AnalysisError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ Read = tuple["Foreign", Callable[[], dict[str, Any]]]
 OWN = {
     "2afc": ("level", "motion", "shown", "yes", "sigmoid", "choices", "lapse"),
     "yes-no": ("level", "motion", "shown", "yes", "sigmoid", "guess", "lapse"),
-    "same-different": ("level", "motion", "shown", "yes", "order", "reference_first", "threshold"),
+    "same-different": ("level", "motion", "shown", "yes", "order", "reference_first", "threshold", "lapse"),
     "preference": ("first", "second", "motion", "yes", "tie", "alpha"),
     "rating": ("method", "motion", "item", "scale", "ends", "alpha"),
 }
@@ -100,7 +100,8 @@ def _same_different(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     trials = _trials(table, options)
     level, confidence = options["threshold"] or 0.75, options["confidence"]
     return trials, lambda: _told(
-        analyse_jnd(_pairs_answered(trials.table, options), level=level, confidence=confidence), options
+        analyse_jnd(_pairs_answered(trials.table, options), level=level, confidence=confidence, lapse=options["lapse"]),
+        options,
     )
 
 
@@ -120,8 +121,6 @@ def _pairs_answered(table: pd.DataFrame, options: dict[str, Any]) -> pd.DataFram
     parts = []
     for column, answer in (("yes", "different"), ("no", "same")):
         count = table["yes"] if column == "yes" else table["shown"] - table["yes"]
-        if (count % 1 != 0).any():
-            raise AnalysisError(f"expected whole numbers of answers, found {count[count % 1 != 0].iloc[0]:g}")
         rows = table.loc[np.repeat(table.index.to_numpy(), count.to_numpy(dtype=int))]
         parts.append(rows.assign(answer=answer))
     answers = pd.concat(parts, ignore_index=True).rename(columns={"level": "difference_frames"})
@@ -211,9 +210,8 @@ def fit(data: Path, task: str, **options: Any) -> None:
     _refuse_others(task, options)
     needed = tuple(options[name] for name in COLUMNS if options[name]) + tuple(name for name, _ in _where(options))
     try:
-        read, analysed = FITS[task](
-            read_table(data, needed, options["delimiter"]), options | {"task": task, "study": data.stem}
-        )
+        table = read_table(data, needed, options["delimiter"])
+        read, analysed = FITS[task](table, options | {"task": task, "study": data.stem})
     except AnalysisError as error:
         raise AnalysisError(f"{data}: {error}") from error
     found = analysed()
@@ -223,7 +221,21 @@ def fit(data: Path, task: str, **options: Any) -> None:
         f"{data}: {read.used} of {counted(read.rows, 'row')} used ({read.blank} without a stimulus, "
         f"{read.missed} without an answer), {counted(people, 'participant')}\n{found['answer']}"
     )
-    emit({"file": data.name, "task": task, **found, **counts}, text)
+    if copies := _copied_rows(table, options):
+        text += (
+            f"\n{counted(copies, 'row')} {noun(copies, 'is an exact copy', 'are exact copies')} of another, though "
+            "a column tells all other rows of a participant apart: was the file joined twice?"
+        )
+    emit({"file": data.name, "task": task, **found, **counts, "copies": copies}, text)
+
+
+def _copied_rows(table: pd.DataFrame, options: dict[str, Any]) -> int:
+    """How many rows copy another though a column, such as the trial or its time, tells a participant's others apart."""
+    once = table.drop_duplicates()
+    who = [options["participant"]] if options["participant"] in table.columns else []
+    others = [column for column in table.columns if column not in {options[name] for name in COLUMNS}]
+    numbered = any(len(once[[*who, column]].drop_duplicates()) == len(once) for column in others)
+    return len(table) - len(once) if numbered and len(once) > 1 else 0
 
 
 def _refuse_others(task: str, options: dict[str, Any]) -> None:
