@@ -40,7 +40,7 @@ def test_one_person_has_the_own_interval() -> None:
     found = result.participants[0].threshold
     assert result.mixed is None
     low, high = found.interval.low, found.interval.high
-    assert result.answer == f"The threshold is {found.value:.4g} (95% interval {low:.4g} to {high:.4g})."
+    assert result.answer == f"The threshold is {found.value:.2f} (95% interval {low:.2f} to {high:.2f})."
 
 
 def test_without_a_mixed_model_the_mean_over_people_stands() -> None:
