@@ -106,3 +106,14 @@ def test_a_rig_without_feet_gets_a_plain_blend() -> None:
     bare = [replace(clip, skeleton=skeleton) for clip in (source, destination)]
     found = advise(*bare, cyclic=(True, True))
     assert (found.make, found.makes, found.make_why) == ("slerp", (), "")
+
+
+def test_the_reason_names_what_the_best_has_over_the_plain_blend() -> None:
+    plain = Measured("slerp", 0.2, 0.1, 1.5, 0.04)
+    best = replace(plain, make="inertialize", unsupported_share=0.05, toe_acceleration_times=1.25, own_pose_m=0.025)
+    assert why((best, plain)) == (
+        "no foot stands in 5% of the frames (blend: 20%), a toe accelerates 1.25 times as much as in the clips (1.50), "
+        "poses are 2.5 cm from the clips' own (4.0)"
+    )
+    assert why((plain, best)) == "no make is clearly better in feet, toes and poses together"
+    assert why(()) == ""

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 from study.analysis.same_different.analyse import analyse_jnd
 from study.analysis.same_different.counts import Counts, all_motions, count_answers
@@ -111,6 +111,9 @@ def crossing_at(frames: float, slope: float, found: MixedThresholds) -> float:
 def test_people_who_are_alike_are_not_told_apart() -> None:
     found = fitted(people_alike(np.random.default_rng(6), 20))
     assert found.alike_p_value > 0.05
+    ratio = 2 * (found.log_likelihood - found.alike_log_likelihood)
+    expected = 0.5 * chi2.sf(ratio, 1) + 0.25 * chi2.sf(ratio, 2) if ratio > 0 else 1.0
+    assert found.alike_p_value == pytest.approx(expected)
     for side in ("shorter", "longer"):
         typical, population = found.typical[side].frames, found.population[side].frames
         assert typical == pytest.approx(population, rel=0.02)
