@@ -52,6 +52,15 @@ class Design:
 
 
 @dataclass(frozen=True)
+class MotionsPoint:
+    """How many participants a study needs with this many motions; `points` and `needed` as in `Power`."""
+
+    motions: int
+    points: tuple[PowerPoint, ...]
+    needed: int | None
+
+
+@dataclass(frozen=True)
 class PlannedStudy:
     """How many participants a study needs, with all that this rests on."""
 
@@ -76,6 +85,8 @@ class PlannedStudy:
     """What each of them went through."""
     seed: int
     """Of the simulation."""
+    by_motions: tuple[MotionsPoint, ...]
+    """The same with other numbers of motions, where these were asked for."""
     answers_per_participant: int
     """On average, where trials depend on the responses."""
 
@@ -97,6 +108,8 @@ class Effect:
     """Simulates and analyses many studies at once."""
     found: Callable[[Analysis], bool]
     """Whether the whole analysis of one study found it."""
+    with_motions: Callable[[Design, int], Run] | None = None
+    """The same with so many motions instead of the protocol's; None where that can't be planned."""
     slow: bool = False
     """Whether a study takes so long that fewer are simulated."""
     answers: Callable[[Design], int] = lambda design: len(design.trials()[0])

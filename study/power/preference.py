@@ -26,7 +26,10 @@ from study.tasks.observer import ObserverSettings, default_observer
 def preference_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
     """Return a mean share over participants, their correlation, and what being shown first adds."""
     share, correlation, bias, alpha = options["share"], options["correlation"], options["order_bias"], decided.alpha
+    spread = options.get("motion_sd", 0.0)
     if study.others:
+        if spread:
+            raise AnalysisError("expected no --motion-sd for a study of more than two methods; leave it out")
         return Effect(
             observer=preference_observer(study, share, correlation, bias, options["missed"]),
             stated={"share": share, "correlation": correlation, "order_bias": bias},
@@ -38,14 +41,16 @@ def preference_effect(study: StudySpec, options: Mapping[str, float], decided: A
             found=_no_sessions,
             slow=True,
         )
+    stated = {"share": share, "correlation": correlation, "order_bias": bias}
     return Effect(
-        observer=preference_observer(study, share, correlation, bias, options["missed"]),
-        stated={"share": share, "correlation": correlation, "order_bias": bias},
+        observer=preference_observer(study, share, correlation, bias, options["missed"], spread),
+        stated=stated | ({"motion_sd": spread} if spread else {}),
         icc=correlation,
         test=f"Student's t over participants and motions at {alpha:g}",
         aim=f"find a preference of {100 * share:g}% at the level {alpha:g}",
-        study=lambda design: preference_study(design, alpha, share),
-        found=lambda analysis: preference_found(analysis, study.name, share, alpha),
+        study=lambda design: preference_study(design, alpha, share, spread),
+        found=_no_sessions if spread else lambda analysis: preference_found(analysis, study.name, share, alpha),
+        with_motions=lambda design, motions: preference_study(design, alpha, share, spread, motions),
     )
 
 
@@ -59,10 +64,14 @@ def preference_found(analysis: Analysis, name: str, share: float, alpha: float) 
 
 
 def preference_observer(
-    study: StudySpec, share: float, correlation: float, order_bias: float, missed: float
+    study: StudySpec, share: float, correlation: float, order_bias: float, missed: float, motion_sd: float = 0.0
 ) -> ObserverSettings:
-    """An observer whose shares over participants have this mean and intraclass correlation, orders balanced."""
+    """An observer whose shares have this mean over participants and motions, orders balanced.
+
+    The intraclass correlation is that of the answers to one motion; motions differ by `motion_sd`, in logits.
+    """
     mean, spread = logit_normal(share, correlation, order_bias)
+    mean = mean_logit(share, float(np.hypot(spread, motion_sd)), order_bias) if motion_sd else mean
     utility: dict[str, float] = {study.reference: mean, study.comparison or "": 0.0}
     preference = PreferenceObserver(utility=utility, order_bias=order_bias, lapse=0.0, participant_sd=spread)
     return replace(default_observer(), preference=preference, missed=missed)
@@ -90,37 +99,59 @@ def logit_normal(share: float, correlation: float, order_bias: float = 0.0) -> t
             f"expected a share between 0 and 1 and a correlation from 0 to 0.9, found {share:g} and {correlation:g}"
         )
 
-    points, weights = np.polynomial.hermite_e.hermegauss(61)
-    weights = weights / weights.sum()
-
-    def shares(mean: float, spread: float) -> FloatArray:
-        both = [expit(mean + spread * points + bias) for bias in (order_bias, -order_bias)]
-        return np.asarray(np.mean(both, axis=0), dtype=np.float64)
-
-    def mean_for(spread: float) -> float:
-        return float(brentq(lambda mean: float(weights @ shares(mean, spread)) - share, -60, 60))
-
     def excess(spread: float) -> float:
-        own = shares(mean_for(spread), spread)
+        own, weights = _shares(mean_logit(share, spread, order_bias), spread, order_bias)
         return float(weights @ (own - share) ** 2) / (share * (1 - share)) - correlation
 
-    if correlation == 0:
-        return mean_for(0.0), 0.0
-    spread = float(brentq(excess, 1e-6, 25.0))
-    return mean_for(spread), spread
+    spread = float(brentq(excess, 1e-6, 25.0)) if correlation else 0.0
+    return mean_logit(share, spread, order_bias), spread
 
 
-def preference_study(design: Design, alpha: float, share: float) -> Run:
-    """Whether the default test finds the preference, in the right direction (2004 section 5.2)."""
+def _shares(mean: float, spread: float, order_bias: float) -> tuple[FloatArray, FloatArray]:
+    """Shares over both orders of those who lean by a normal deviate, and the weights of these."""
+    points, weights = np.polynomial.hermite_e.hermegauss(61)
+    both = [expit(mean + spread * points + bias) for bias in (order_bias, -order_bias)]
+    return np.asarray(np.mean(both, axis=0), dtype=np.float64), weights / weights.sum()
+
+
+def mean_logit(share: float, spread: float, order_bias: float) -> float:
+    """Return the mean in logits at which leanings with this standard deviation have this mean share."""
+
+    def off(mean: float) -> float:
+        own, weights = _shares(mean, spread, order_bias)
+        return float(weights @ own) - share
+
+    return float(brentq(off, -60, 60))
+
+
+def preference_study(
+    design: Design, alpha: float, share: float, motion_sd: float = 0.0, motions: int | None = None
+) -> Run:
+    """Whether the default test finds the preference, in the right direction (2004 section 5.2).
+
+    Parameters
+    ----------
+    motion_sd
+        Standard deviation across motions of the leaning, in logits.
+    motions
+        How many are shown, each as often as each is in the plans; theirs where it is None.
+    """
     trials, typical = design.trials(), design.settings.preference
     signs = np.array([[1.0 if trial.a_first else -1.0 for trial in own] for own in trials])
     of_motion = motions_of(trials)
+    if motions is not None:
+        each = max(round(of_motion.shape[1] / of_motion.shape[2]), 1)
+        of_motion = np.broadcast_to(np.repeat(np.eye(motions), each, axis=0), (len(trials), each * motions, motions))
+        signs = np.where((np.arange(each * motions) + np.arange(len(trials))[:, None]) % 2, 1.0, -1.0)
     leaning = lean(typical, design.study.reference, design.study.comparison or "")
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
 
         people = max(sizes)
         own = leaning + typical.participant_sd * rng.standard_normal((studies, people, 1))
+        if motion_sd:
+            by_motion = motion_sd * rng.standard_normal((studies, of_motion.shape[2]))
+            own = own + np.einsum("sm,ptm->spt", by_motion, of_motion[:people])
         chance = expit(own + typical.order_bias * signs[:people])
         chose_a = rng.random(chance.shape) < chance
         response_s, given = times(design, rng, np.abs(2 * chance - 1))
@@ -178,7 +209,9 @@ def strengths_study(design: Design, alpha: float, share: float) -> Run:
 
 
 def _no_sessions(_: Analysis) -> bool:
-    raise AnalysisError("expected no --sessions for a study of more than two methods; leave it out")
+    raise AnalysisError(
+        "expected no --sessions with --motion-sd, nor for a study of more than two methods; leave it out"
+    )
 
 
 def _found(chosen: FloatArray, shown: FloatArray, share: float, alpha: float) -> BoolArray:

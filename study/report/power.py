@@ -37,6 +37,8 @@ class FoundPower:
     needed: int | None
     note: str
     answers_per_participant: int
+    by_motions: tuple[tuple[int, int | None], ...]
+    """Other numbers of motions, and the participants needed with them."""
 
 
 def read_power(folder: Path) -> list[FoundPower]:
@@ -76,6 +78,7 @@ def _parsed(content: Any) -> FoundPower:
         needed=None if content["needed"] is None else int(content["needed"]),
         note=str(content["note"]),
         answers_per_participant=int(content["answers_per_participant"]),
+        by_motions=tuple((row["motions"], row["needed"]) for row in content.get("by_motions", ())),
     )
 
 
@@ -90,6 +93,10 @@ def power_sentence(found: FoundPower) -> str:
     return (
         f"{words.sentence(words.readable(found.study))}: to {found.aim} in {100 * found.target:g}% of studies, "
         f"with {counted(found.answers_per_participant, 'answer')} of each participant, {who}{note}."
+        + "".join(
+            f" With {counted(motions, 'motion')}: {needed or 'none of the numbers tried'}."
+            for motions, needed in found.by_motions
+        )
     )
 
 

@@ -50,11 +50,14 @@ def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
     raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
 
 
-def _sizes(text: str) -> list[int]:
+def _sizes(text: str, option: str = "--participants", example: str = "10,20,40") -> list[int]:
     try:
-        return [int(part) for part in text.split(",")]
-    except ValueError as error:
-        raise AnalysisError(f"expected --participants as numbers such as 10,20,40, found {text!r}") from error
+        found = [int(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if not found or min(found) < 1:
+        raise AnalysisError(f"expected {option} as numbers such as {example}, found {text!r}")
+    return found
 
 
 @click.command()
@@ -67,6 +70,9 @@ def _sizes(text: str) -> list[int]:
 @click.option("--correlation", type=click.FloatRange(0, 0.9), default=0.1, show_default=True,
               help="Preference, rating: intraclass correlation of a participant's responses.")  # fmt: skip
 @click.option("--order-bias", type=float, default=0.1, show_default=True, help="Preference: logits for the first.")
+@click.option("--motion-sd", type=click.FloatRange(0, 3), default=0.0, show_default=True,
+              help="Preference: how motions differ, standard deviation in logits.")  # fmt: skip
+@click.option("--motions", help="Preference: other numbers of motions to try as well, as 4,8,16.")
 @click.option("--difference", type=float, default=0.7, show_default=True,
               help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
 @click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=8.0, show_default=True,
@@ -96,7 +102,7 @@ def power(
     from study.apps.cli.shared import load
     from study.files import check_place
     from study.power.curve import power_curve
-    from study.power.design import Design, PlannedStudy
+    from study.power.design import Design, MotionsPoint, PlannedStudy
     from study.power.registry import effect_of
     from study.power.sessions import whole_sessions
 
@@ -109,16 +115,25 @@ def power(
     design = Design(checked, study, plans, effect.observer, rules_of(checked.analysis.exclusions))
     slow = options["sessions"] or effect.slow
     studies = options["studies"] or (200 if slow else 1000)
+    with_motions = effect.with_motions
+    counts = _sizes(options["motions"], "--motions", "4,8,16") if options["motions"] else []
+    if counts and with_motions is None:
+        raise AnalysisError(f"{study.name}: expected no --motions for this study, which is planned with its own alone")
+    settings = {"studies": studies, "target": options["target"], "seed": options["seed"]}
+    at_once = 10 if slow else AT_ONCE
     with progress("studies") as report:
         found = power_curve(
             whole_sessions(design, effect.found) if options["sessions"] else effect.study(design),
             sizes,
-            studies=studies,
-            target=options["target"],
-            seed=options["seed"],
-            at_once=10 if slow else AT_ONCE,
+            **settings,
+            at_once=at_once,
             progress=lambda done, total: report(done / total, f"{done} of {total}"),
         )
+    surface = []
+    for count in counts:
+        assert with_motions is not None, "refused above"
+        own = power_curve(with_motions(design, count), sizes, **settings, at_once=at_once)
+        surface.append(MotionsPoint(count, own.points, own.needed))
     result = PlannedStudy(
         protocol=checked.name,
         study=study.name,
@@ -134,6 +149,7 @@ def power(
         simulations=studies,
         through="whole sessions" if options["sessions"] else "plan, observers, exclusions and default test",
         seed=options["seed"],
+        by_motions=tuple(surface),
         answers_per_participant=effect.answers(design),
     )
     if out is not None:
@@ -168,4 +184,11 @@ def _in_words(found: PlannedStudy) -> str:
         f"To {found.aim} in {100 * found.target:g}% of studies, "
         f"{counted(found.answers_per_participant, 'answer')} each: {who}" + (f" ({found.note})." if found.note else ".")
     )
+    for row in found.by_motions:
+        powers = ", ".join(f"{point.power:.2f} with {point.participants}" for point in row.points)
+        lines.append(
+            f"With {counted(row.motions, 'motion')}: "
+            + (counted(row.needed, "participant") if row.needed else "no number tried is enough")
+            + f" (power {powers})."
+        )
     return "\n".join(lines)

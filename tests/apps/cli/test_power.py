@@ -21,6 +21,7 @@ from study.power import preference as preferences
 from study.power import ratings, same_different
 from study.power.design import Design
 from study.power.sessions import whole_sessions
+from study.report.power import power_sentence, read_power
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def quasi_f(rng: np.random.Generator, people: int, studies: int, alpha: float) -
     pool = (joined * squares).sum(axis=0) / pool_freedom
     times = 1.0 - keep.sum(axis=0)
     variance = (keep * middle[:2]).sum(axis=0) + times * pool
-    wide = (1 + 0.6 / freedom[:2])[:, None] * middle[:2]
+    wide = (1 + 0.6 / freedom[:2, None] * np.sqrt(np.minimum(pool / middle[:2], 1))) * middle[:2]
     spread = (keep * wide**2 / freedom[:2, None]).sum(axis=0) + (times * pool) ** 2 / pool_freedom
     variance = np.maximum(variance, pool)
     statistic = (mean - 0.5) / np.sqrt(variance / (8 * people))
@@ -83,6 +84,30 @@ def test_two_motions_are_no_sample_and_power_is_that_of_closed_forms(preference:
         noncentrality = 0.15 / np.sqrt(0.65 * 0.35 / 8) * np.sqrt(size)
         theory = nct.sf(t.ppf(1 - 0.001 / 2, size - 1), size - 1, noncentrality)
         assert found == pytest.approx(theory, abs=0.03)
+
+
+def test_more_motions_do_what_more_people_can_not(preference: Design) -> None:
+    """Where motions differ: the level is kept, and power is bounded by the motions whoever looks at them."""
+    design = replace(preference, settings=preferences.preference_observer(preference.study, 0.5, 0.0, 0.0, 0.0, 0.7))
+    assert share_found(preferences.preference_study(design, 0.05, 0.5, 0.7), 35) == pytest.approx(0.05, abs=0.015)
+    design = replace(preference, settings=preferences.preference_observer(preference.study, 0.65, 0.0, 0.0, 0.0, 0.7))
+
+    def power(motions: int, people: int) -> float:
+        return share_found(preferences.preference_study(design, 0.05, 0.65, 0.7, motions), people, 1500)
+
+    assert power(8, 34) < power(8, 17) + 0.15
+    assert power(16, 17) > power(8, 34) + 0.2
+    own = share_found(preferences.preference_study(design, 0.05, 0.65, 0.7), 34)
+    assert power(8, 34) == pytest.approx(own, abs=0.05)
+
+
+def test_motions_that_differ_leave_the_mean_share_as_stated(preference: Design) -> None:
+    settings = preferences.preference_observer(preference.study, 0.7, 0.1, 0.2, 0.0, 0.8)
+    _, own = preferences.logit_normal(0.7, 0.1, 0.2)
+    assert settings.preference.participant_sd == pytest.approx(own)
+    leaning = settings.preference.utility["geodesic"] + np.hypot(own, 0.8) * np.random.default_rng(2).normal(size=10**6)
+    shares = [1 / (1 + np.exp(-leaning - bias)) for bias in (0.2, -0.2)]
+    assert np.mean(shares) == pytest.approx(0.7, abs=0.001)
 
 
 def test_without_an_effect_power_is_the_level(preference: Design) -> None:
@@ -167,6 +192,7 @@ def test_thresholds_are_those_of_whole_sessions() -> None:
 
 def test_the_verb_writes_what_the_report_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--participants", "4,30", "--studies", "200", "--share", "0.8", "--out", str(tmp_path), "--json"]
+    arguments += ["--motions", "16"]
     assert run(["power", "geodesic_vs_fixed", *arguments]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert json.loads((tmp_path / "power_geodesic_vs_fixed.json").read_text(encoding="utf-8")) == printed
@@ -176,6 +202,9 @@ def test_the_verb_writes_what_the_report_reads(tmp_path: Path, capsys: pytest.Ca
     assert 4 < printed["needed"] <= 30
     assert (printed["icc"], printed["simulations"], printed["answers_per_participant"]) == (0.1, 200, 8)
     assert "Student's t over participants and motions at 0.01" in printed["test"]
+    assert [row["motions"] for row in printed["by_motions"]] == [16]
+    (planned,) = read_power(tmp_path)
+    assert "With 16 motions" in power_sentence(planned)
     with (tmp_path / "power_geodesic_vs_fixed.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["power"]) for row in rows] == powers
@@ -199,6 +228,9 @@ def test_every_task_has_a_curve(capsys: pytest.CaptureFixture[str]) -> None:
         (["wang2004_session"], "expected --study with one of"),
         (["geodesic_vs_fixed", "--study", "jnd"], "expected one of the studies geodesic_vs_fixed, found 'jnd'"),
         (["geodesic_vs_fixed", "--participants", "ten"], "expected --participants as numbers"),
+        (["geodesic_vs_fixed", "--motions", "0"], "expected --motions as numbers such as 4,8,16, found '0'"),
+        (["blend_length_jnd", "--motions", "4"], "expected no --motions for this study"),
+        (["geodesic_vs_fixed", "--motion-sd", "0.5", "--sessions"], "expected no --sessions with --motion-sd"),
     ],
 )
 def test_refusals(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
