@@ -76,8 +76,8 @@ def in_the_window(protocol: Protocol, responses: Responses, monkeypatch: pytest.
     stimuli = prepare(protocol, open_library("synthetic"))
     read: dict[str, Read] = {}
     page_of = loop.screens.reading_page
-    for group, name in enumerate(PEOPLE):
-        plan = the_plan(responses, protocol, stimuli, name, None, group)
+    for name in PEOPLE:
+        plan = the_plan(responses, protocol, stimuli, name, None, None)  # the second joins the other group
         own = read.setdefault(name, [])
 
         def noted(protocol: Protocol, step: Any, progress: Any, own: Read = own) -> Any:

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from itertools import combinations
+from pathlib import Path
 
 import pytest
 from toys import FakeStimuli
 
+from study.apps.cli.play import the_plan
 from study.errors import ProtocolError
 from study.experiment.plan import draw_plan, groups_of
 from study.experiment.protocol.whole import find_protocol, load_protocol, parse_protocol
 from study.experiment.sets import own_set, round_robin
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import begin_session
 from study.tasks.trial import Pair
 
 
@@ -106,3 +110,18 @@ def test_what_does_not_fit_is_refused(change: tuple[str, str], message: str) -> 
     parse_protocol(TEXT)
     with pytest.raises(ProtocolError, match=message):
         parse_protocol(TEXT.replace(*change))
+
+
+def test_in_the_laboratory_sets_fill_one_after_another(
+    tmp_path: Path, make_stimuli: Callable[..., FakeStimuli]
+) -> None:
+    protocol = load_protocol(find_protocol("transitions_today"))
+    stimuli = make_stimuli(protocol)
+    with open_responses(tmp_path) as responses:
+        groups = []
+        for name in ("p1", "p2", "p3", "p4", "p5", "p6"):
+            plan = the_plan(responses, protocol, stimuli, name, None, 2 if name == "p1" else None)
+            begin_session(responses, protocol, plan)
+            groups.append(plan.group)
+        assert groups == [2, 0, 1, 3, 0, 1]
+        assert the_plan(responses, protocol, stimuli, "p4", None, None).group == 3, "who comes back keeps the set"

@@ -33,7 +33,8 @@ CENTIMETRES = click.FloatRange(1, 1000)
 @click.command()
 @click.argument("protocol")
 @click.option("--participant", required=True, metavar="ID", help="Participant, such as p01; the same ID resumes.")
-@click.option("--group", type=click.IntRange(min=0), default=0, show_default=True, help="Group, for orders by group.")
+@click.option("--group", type=click.IntRange(min=0),
+              help="Group, for orders by group and for sets of pairs (default: the smallest so far).")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the order of trials (default: the protocol's).")
 @library_option
 @OUT
@@ -49,7 +50,7 @@ CENTIMETRES = click.FloatRange(1, 1000)
 def play(
     protocol: str,
     participant: str,
-    group: int,
+    group: int | None,
     seed: int | None,
     library: str | None,
     out: Path | None,
@@ -96,14 +97,24 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def the_plan(
-    responses: Responses, protocol: Protocol, stimuli: StimulusSet, participant: str, seed: int | None, group: int
+    responses: Responses,
+    protocol: Protocol,
+    stimuli: StimulusSet,
+    participant: str,
+    seed: int | None,
+    group: int | None,
 ) -> Plan:
     """The stored plan of a returning participant, else a new one: the same as `simulate` draws."""
-    from study.experiment.plan import draw_plan
-    from study.experiment.store.sessions import find_session
+    from study.experiment.plan import draw_plan, groups_of
+    from study.experiment.store.sessions import all_sessions, find_session
 
     known = find_session(responses, participant)
     if known is None:
+        groups = groups_of(protocol, stimuli.pairs)
+        if group is None and groups > 1:
+            taken = [session.plan.group % groups for session in all_sessions(responses)]
+            group = min(range(groups), key=taken.count)
+        group = group or 0
         return draw_plan(protocol, stimuli.pairs, participant, seed, group=group)
     if seed is not None and seed != known.plan.seed:
         raise click.UsageError(
