@@ -146,12 +146,37 @@ def _reference_first(order: pd.Series[str], options: dict[str, Any]) -> pd.Serie
 
 def _own_study(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     """Preferences and ratings, through the analysis of our own studies."""
-    from study.analysis.analyse import analyse, analysis_json
     from study.analysis.foreign.answers import read_preferences, read_ratings
+
+    return _all_studies(
+        {"preference": read_preferences, "rating": read_ratings}[options["task"]](table, _columns(options)), options
+    )
+
+
+def _export(table: pd.DataFrame, options: dict[str, Any]) -> Read:
+    """What `segue export` wrote: all its studies, by the columns that they have there."""
+    from study.analysis.foreign.own import read_own
+
+    given = sorted(name for names in OWN.values() for name in (*names, "answer", "participant") if options[name])
+    if unread := [name for name in given if name not in ("threshold", "alpha", "ends")]:
+        raise AnalysisError(
+            f"expected no --{unread[0].replace('_', '-')} with an export of segue's, whose columns are known; leave it "
+            "out, or say --task"
+        )
+    return _all_studies(read_own(table, _where(options)), options)
+
+
+def _all_studies(read: Foreign, options: dict[str, Any]) -> Read:
+    from study.analysis.analyse import analyse, analysis_json
     from study.analysis.study_result import Settings
 
-    read = {"preference": read_preferences, "rating": read_ratings}[options["task"]](table, _columns(options))
-    settings = Settings(confidence=options["confidence"], alpha=options["alpha"] or 0.05)
+    low, high = options["ends"] or (0, 4)
+    settings = Settings(
+        confidence=options["confidence"],
+        alpha=options["alpha"] or 0.05,
+        threshold=options["threshold"] or 0.75,
+        scale_points={str(name): round(high - low) + 1 for name in read.table["study"].unique()},
+    )
 
     def analysed() -> dict[str, Any]:
         analysis = analyse(read.table, settings)
@@ -172,8 +197,8 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 
 @click.command()
 @click.argument("data", type=READABLE)
-@click.option("--task", type=click.Choice(list(FITS)), required=True)
-@click.option("--answer", required=True, help="Column of the response: right or wrong, yes or no, same or different, "
+@click.option("--task", type=click.Choice(list(FITS)), help="Not needed for what segue export wrote.")
+@click.option("--answer", help="Column of the response: right or wrong, yes or no, same or different, "
               "first or second (or the method chosen), a rating.")  # fmt: skip
 @click.option("--level", help="Column of the stimulus level (same-different: the signed difference).")
 @click.option("--participant", help="Column of the participant (default: one participant).")
@@ -202,16 +227,27 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 )
 @click.option("--decimal", type=click.Choice(["point", "comma"]), help="Detected by default.")
 @json_option
-def fit(data: Path, task: str, **options: Any) -> None:
+def fit(data: Path, task: str | None, **options: Any) -> None:
     """Analyse data from another program (PsychoPy, jsPsych, Gorilla): CSV or JSON, with its columns named here.
 
     Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
+
+    The columns of what segue export writes are known: segue fit answers.csv
     """
-    _refuse_others(task, options)
+    from study.analysis.foreign.own import is_own, own_trials
+
+    if task is not None:
+        _refuse_others(task, options)
     needed = tuple(options[name] for name in COLUMNS if options[name]) + tuple(name for name, _ in _where(options))
     try:
         table = read_table(data, needed, options["delimiter"])
-        read, analysed = FITS[task](table, options | {"task": task, "study": data.stem})
+        if is_own(table):
+            table = table if task is None else own_trials(table)
+        elif task is None or options["answer"] is None:
+            missing = "--task" if task is None else "--answer"
+            raise AnalysisError(f"expected {missing}, since this is no export of segue's with known columns; add it")
+        fitting = FITS[task] if task else _export
+        read, analysed = fitting(table, options | {"task": task, "study": data.stem})
     except AnalysisError as error:
         raise AnalysisError(f"{data}: {error}") from error
     found = analysed()
