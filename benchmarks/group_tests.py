@@ -1,20 +1,22 @@
 """How far tests of groups can be trusted: simulated studies, with and without an effect, through the real analysis.
 
 Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of preference, motions,
-crossed, thresholds, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn here, by code
-that the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
+crossed, strengths, thresholds, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn
+here, by code that the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
 from scipy.special import expit, ndtr
 
 from study.analysis.crossed import crossed
+from study.analysis.preference.bradley_terry import fit_bradley_terry
 from study.analysis.preference.motions import motions_as_sample
 from study.analysis.preference.no_effect import no_preference
 from study.analysis.preference.participants import participant_tests
@@ -23,6 +25,8 @@ from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.ratings.comparisons import rating_anova
 from study.analysis.same_different.counts import Counts
 from study.analysis.same_different.mixed import fit_mixed_thresholds
+from study.experiment.sets import own_set
+from study.tasks.trial import Pair
 
 CORRELATIONS = (0.0, 0.1, 0.2, 0.3)
 
@@ -110,6 +114,41 @@ def crossed_test(studies, seed):
                         mean = expit(effect + np.hypot(own, other) * rng.normal(size=400_000)).mean()
                         found.append(float((crossed(chosen, shown).p_values(mean if effect else 0.5) < 0.05).mean()))
             print(f"{count:7} {other:10} {np.mean(found):6.3f} {min(found):7.3f} {max(found):8.3f}", flush=True)
+
+
+def strengths(studies, seed):
+    """Share of 95% intervals of Bradley-Terry strengths that hold the truth.
+
+    Seven methods in balanced sets of 42 pairs on eight motions; people differ by 0.3 logits a method.
+    """
+    methods, names = "abcdefg", [f"motion{number}" for number in range(8)]
+    true = dict(zip(methods, (0.0, 0.2, 0.4, 0.6, -0.3, 0.8, -1.5), strict=True))
+    pairs = [Pair("", "", "", name, "", two, two) for name in names for two in combinations(methods, 2)]
+    for people, apart in ((40, 0.0), (40, 0.4), (40, 0.8), (100, 0.4)):
+        rng, held = np.random.default_rng(seed), {"participants": [], "participants and motions": []}
+        for _ in range(studies):
+            own = {name: {one: true[one] + apart * rng.standard_normal() for one in methods} for name in names}
+            rows = []
+            for person in range(people):
+                taste = {one: 0.3 * rng.standard_normal() for one in methods}
+                seen = own_set(pairs, 4, person)
+                for pair, turned in zip(seen, rng.permutation(np.arange(len(seen)) % 2), strict=True):
+                    first, second = pair.methods[::-1] if turned else pair.methods
+                    liked = own[pair.motion]
+                    chance = expit(liked[first] + taste[first] - liked[second] - taste[second] + 0.1)
+                    rows.append((first, second, float(rng.random() < chance), str(person), pair.motion))
+            first, second, chosen, who, where = (list(part) for part in zip(*rows, strict=True))
+            for over, motions_too in (("participants", None), ("participants and motions", where)):
+                found = fit_bradley_terry(
+                    first, second, chosen, np.ones(len(rows)), reference="a", participants=who, motions=motions_too
+                )
+                held[over] += [
+                    one.interval.low <= true[one.method] <= one.interval.high
+                    for one in found.strengths
+                    if one.method != "a"
+                ]
+        told = ", ".join(f"{np.mean(inside):.3f} over {over}" for over, inside in held.items())
+        print(f"strengths, {people} people, motions {apart:g} logits apart: {told}", flush=True)
 
 
 def thresholds(studies, seed):
@@ -230,6 +269,7 @@ PARTS = {
     "preference": preference,
     "motions": motions,
     "crossed": crossed_test,
+    "strengths": strengths,
     "thresholds": thresholds,
     "ratings": ratings,
     "mixed": mixed,
