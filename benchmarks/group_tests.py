@@ -2,7 +2,8 @@
 
 Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of preference, motions,
 crossed, strengths, thresholds, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn
-here, by code that the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings 2003's.
+here, by code that the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings
+2003's.
 """
 
 from __future__ import annotations
