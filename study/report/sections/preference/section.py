@@ -339,14 +339,15 @@ def pairs_table(name: str, comparisons: Sequence[Comparison]) -> Table:
             "percent": one.default.percent,
             "low": one.default.low,
             "high": one.default.high,
+            "test": one.default.test,
             "p_value": one.default.p_value,
         }
         for one in comparisons
     ]
     return tables.make(
         f"{name}_pairs",
-        f"Each pair of methods by its own answers, tested by {comparisons[0].default.test}.",
-        "comparison answers percent low:one high:one p_value",
+        "Each pair of methods by its own answers alone.",
+        "comparison answers percent low:one high:one test p_value",
         rows,
     )
 
