@@ -13,6 +13,7 @@ from study.analysis.analyse import Analysis
 from study.counting import counted
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.manifest import Manifest
+from study.experiment.wording import question_text
 from study.report import words
 from study.report.sections.registry import SECTIONS
 from study.tasks.registry import task_of
@@ -88,11 +89,12 @@ def _methods(protocol: Protocol) -> dict[str, Method]:
 def _design(protocol: Protocol, analysis: Analysis, who: str) -> str:
     studies = counted(len(protocol.studies), "study", "studies")
     each = analysis.quality.trials / max(analysis.quality.participants, 1)
+    within = " and repetition" if any(study.repeats > 1 for study in protocol.studies) else ""
     return (
         f"{words.sentence(who)} took part in one session of {studies}. "
         f"{' '.join(_study(protocol, study) for study in protocol.studies)} The order of trials was drawn separately "
-        f"for every participant (seed {protocol.seed}); a participant was asked {counted(round(each), 'question')} "
-        "on average."
+        f"for every participant{within} (seed {protocol.seed}); a participant was asked "
+        f"{counted(round(each), 'question')} on average."
     )
 
 
@@ -102,7 +104,9 @@ def _study(protocol: Protocol, study: StudySpec) -> str:
     repeated = f", {study.repeats} times" if study.repeats > 1 else ""
     order = {1: SINGLE_ORDERS, 2: ORDERS}.get(task_of(study).slots, ORDERS_OF_SEVERAL)[study.order]
     chosen = f" Trials were chosen by {by}." if (by := study.procedure.in_words()) else ""
-    return f"In “{title}”, participants {what}. {order}{repeated}.{chosen}"
+    asked = "; ".join([item.question for item in study.items] or [question_text(protocol, study)])
+    tried = f" {counted(study.practice, 'practice trial')} came first." if study.practice else ""
+    return f"In “{title}”, participants {what}. {order}{repeated}.{chosen} They were asked: “{asked}”{tried}"
 
 
 def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:
@@ -124,8 +128,10 @@ def _stimuli(protocol: Protocol, manifest: Manifest) -> str:
     }[shown.camera]
     ground = "above a ground plane" if shown.floor else "without a ground plane"
     how, joint = _made(protocol, manifest)
+    shown_of = {record.transition for record in manifest.records}
+    made = f"{counted(len(manifest.records), 'stimulus', 'stimuli')} of {counted(len(shown_of), 'transition')}"
     return (
-        f"{counted(len(manifest.records), 'transition')} between {motions} {how} Each was rendered as a "
+        f"{made} between {motions} {how} Each was rendered as a "
         f"{shown.style} figure of {shown.width} × {shown.height} pixels at {protocol.fps:g} frames per second, seen by "
         f"{camera} {ground}, with {shown.entry_s:g} s before and {shown.exit_s:g} s after the {joint}."
         f"{''.join(f' {one}' for one in _even_stimuli(protocol))}"
@@ -158,8 +164,8 @@ def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:
     methods = _methods(protocol)
     others = [f" Those by “{words.readable(name)}” {one.make.how}." for name, one in methods.items() if one.make.how]
     plain = [record for record in manifest.records if not methods[record.method].make.how]
-    blended = sum(record.blend_frames > 0 for record in plain)
-    cuts = len(plain) - blended
+    lengths = sorted(record.blend_frames for record in plain if record.blend_frames)
+    blended, cuts = len(lengths), len(plain) - len(lengths)
     if not plain:
         return f"were shown.{''.join(others)}", "transition"
     if not blended:
@@ -168,7 +174,8 @@ def _made(protocol: Protocol, manifest: Manifest) -> tuple[str, str]:
     weights, feet = sorted({make.weight for make in makes}), {make.clean_feet for make in makes}
     how = (
         f"were blended by spherical linear interpolation under a {' or '.join(weights)} weight, between a start frame "
-        f"in the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}."
+        f"in the source and an end frame in the destination{' (cuts were not blended)' if cuts else ''}. "
+        f"Blends were {' to '.join(str(one) for one in sorted({lengths[0], lengths[-1]}))} frames long."
     )
     if True in feet:
         where = ", if the method includes this" if False in feet else ""

@@ -39,7 +39,7 @@ def level_problems(asked: Asked) -> Iterator[Problem]:
 
 
 def levels_in_words(asked: Asked, blends: Callable[[str], str]) -> str:
-    """The reference, and by how much the comparisons are longer."""
+    """The reference, and by how much the comparisons differ from it."""
     each = [f"{value:+d}".replace("-", "−") if value else "0" for value in asked.differences_frames]
     levels = ", ".join(each) if len(each) <= MOST_LISTED else f"{each[0]} to {each[-1]}"
-    return f"{blends(asked.reference)}, against blends longer by {levels} frames"
+    return f"{blends(asked.reference)}, against blends that differ from their length by {levels} frames"

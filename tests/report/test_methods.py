@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -33,10 +34,13 @@ def test_methods_follow_from_the_protocol(results_folder: MakeFolder) -> None:
     told, cited = paragraphs(material)
     assert told["Participants and design"].startswith("Two observers took part in one session of 3 studies.")
     assert (
-        "longer by −15, −10, −5, 0, +5, +10, +20 frames. Each pair was shown in both orders."
+        "differ from their length by −15, −10, −5, 0, +5, +10, +20 frames. Each pair was shown in both orders."
         in told["Participants and design"]
     )
     assert "blends of 10 frames" in told["Participants and design"]
+    assert "They were asked: “Were the two motions the same or different?”" in told["Participants and design"]
+    assert re.match(r"\d+ stimuli of 2 transitions between synthetic motions were blended", told["Stimuli"])
+    assert re.search(r"Blends were \d+ to \d+ frames long\.", told["Stimuli"])
     assert "a camera following it (smoothed over 0.5 s) above a ground plane, with 1.5 s before" in told["Stimuli"]
     assert "No stimulus was shown: observers were simulated." in told["Apparatus and procedure"]
     assert "those of the median observer" in told["Analysis"]
