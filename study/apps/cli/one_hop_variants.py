@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.cli.console import FILE, emit, json_option
+from study.apps.cli.console import FILE, emit, json_option, together
 from study.apps.cli.one_hop import (
     load_clips,
     memory_of,
@@ -19,18 +19,37 @@ from study.apps.cli.one_hop import (
 )
 from study.counting import counted
 
+if TYPE_CHECKING:
+    from study.motion.clip import Clip
+    from study.transitions.one_hop.problem import Problem
+
 __all__ = ["one_hop"]
 
 out_option = click.option("--out", type=FILE, help="X.bvh, X.mp4 or X.png.")
 
+moment_options = together(
+    click.argument("clips", metavar="CLIP...", nargs=-1, required=True),
+    search_options,
+    click.option("--pair", type=(str, str), metavar="SRC DST", required=True, help="The transition."),
+    click.option("--at", "trigger", type=click.IntRange(min=0), required=True, help="Triggered frame of SRC."),
+    click.option("--offset", type=int, default=0, show_default=True, help="Frame of SRC where DST has its frame 0."),
+)
+"""One transition at one triggered frame."""
+
+
+def problem_at(loaded: tuple[Clip, ...], pair: tuple[str, str], options: dict[str, Any]) -> Problem:
+    """The search for one transition at one triggered frame."""
+    from study.transitions.one_hop.problem import Alignment, Switch
+
+    trigger = options["trigger"]
+    ((source, destination),) = pairs_of((pair,), loaded)
+    switch = Switch(source, destination, Alignment(options["offset"]), trigger, trigger)
+    return problem_of(loaded, (switch,), options)
+
 
 @one_hop.command()
-@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
-@search_options
-@click.option("--pair", type=(str, str), metavar="SRC DST", required=True, help="The transition.")
-@click.option("--at", "trigger", type=click.IntRange(min=0), required=True, help="Triggered frame of SRC.")
+@moment_options
 @click.option("--hops", type=click.IntRange(1, 8), default=2, show_default=True, help="The most hops.")
-@click.option("--offset", type=int, default=0, show_default=True, help="Frame of SRC at which DST has its frame 0.")
 @out_option
 @json_option
 def chain(
@@ -38,9 +57,7 @@ def chain(
     library: str | None,
     fps: float,
     pair: tuple[str, str],
-    trigger: int,
     hops: int,
-    offset: int,
     out: Path | None,
     **options: Any,
 ) -> None:
@@ -50,12 +67,10 @@ def chain(
     """
     from study.transitions.one_hop.chains import find_chains
     from study.transitions.one_hop.play import play_steps
-    from study.transitions.one_hop.problem import Alignment, Switch
 
     loaded = load_clips(clips, library, fps)
-    ((source, destination),) = pairs_of((pair,), loaded)
-    switch = Switch(source, destination, Alignment(offset=offset), trigger, trigger)
-    problem = problem_of(loaded, (switch,), options)
+    problem, trigger = problem_at(loaded, pair, options), options["trigger"]
+    (switch,) = problem.switches
     found = [find_chains(problem, switch, most, memory_bytes=memory_of(options))[0] for most in range(1, hops + 1)]
     best = found[-1]
     if best is None:
@@ -71,16 +86,12 @@ def chain(
     costs = [None if one is None else one.cost for one in found]
     said = ", ".join(f"{counted(most, 'hop')} {one.cost:.4g}" for most, one in enumerate(found, start=1) if one)
     result = {"costs": costs, "weight": problem.weight * problem.distance.unit, "steps": steps}
-    played = play_steps(loaded, source, 0, trigger, best.steps)
+    played = play_steps(loaded, switch.source, 0, trigger, best.steps)
     show_played(played, names, out, result, [f"cost by at most {said}"])
 
 
 @one_hop.command()
-@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
-@search_options
-@click.option("--pair", type=(str, str), metavar="SRC DST", required=True, help="The transition.")
-@click.option("--at", "trigger", type=click.IntRange(min=0), required=True, help="Triggered frame of SRC.")
-@click.option("--offset", type=int, default=0, show_default=True, help="Frame of SRC at which DST has its frame 0.")
+@moment_options
 @click.option("--forward", type=float, help="Metres ahead of the figure at the triggered frame.")
 @click.option("--left", type=float, help="Metres to its left; below 0 to its right.")
 @click.option("--within", type=click.FloatRange(min=0), default=0.1, show_default=True, help="Tolerance, metres.")
@@ -94,8 +105,6 @@ def reach(
     library: str | None,
     fps: float,
     pair: tuple[str, str],
-    trigger: int,
-    offset: int,
     forward: float | None,
     left: float | None,
     within: float,
@@ -111,16 +120,14 @@ def reach(
     from math import degrees, radians
 
     from study.transitions.one_hop.play import Step, play_steps
-    from study.transitions.one_hop.problem import Alignment, Switch
     from study.transitions.one_hop.reach import Wanted
     from study.transitions.one_hop.reach import reach as find
 
     if forward is None and left is None and turn is None:
         raise click.UsageError("expected a place or a heading to reach; give --forward, --left or --turn.")
     loaded = load_clips(clips, library, fps)
-    ((source, destination),) = pairs_of((pair,), loaded)
-    switch = Switch(source, destination, Alignment(offset=offset), trigger, trigger)
-    problem = problem_of(loaded, (switch,), options)
+    problem, trigger = problem_at(loaded, pair, options), options["trigger"]
+    (switch,) = problem.switches
     wanted = Wanted(forward, left, within, None if turn is None else radians(turn), radians(within_turn))
     found, free = find(problem, switch, trigger, wanted), find(problem, switch, trigger, Wanted())
     if found is None:
@@ -150,8 +157,9 @@ def reach(
         f"{found.forward_m:.2f} m ahead, {found.left_m:.2f} m to the left, {degrees(found.turn_rad):.0f} degrees; cost "
         f"{found.cost:.4g}" + ("" if free is None else f", {free.cost:.4g} if it may end anywhere")
     )
-    steps = [Step(entry.stay_source, entry.hop, entry.offset, blend), Step(entry.stay_hop, destination, offset, blend)]
-    show_played(play_steps(loaded, source, 0, trigger, steps), names, out, result, [words])
+    last = Step(entry.stay_hop, switch.destination, options["offset"], blend)
+    steps = [Step(entry.stay_source, entry.hop, entry.offset, blend), last]
+    show_played(play_steps(loaded, switch.source, 0, trigger, steps), names, out, result, [words])
 
 
 @one_hop.command()
