@@ -165,6 +165,7 @@ class Warped(Interpolating):
     name = "timewarp"
     words = "time-warped blends (2004) {points}"
     windows = 2
+    moves = True
     sets_span = True
 
 
