@@ -6,6 +6,7 @@ or end in an error of Python's own.
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Sequence
@@ -63,3 +64,8 @@ def key_path(location: Sequence[int | str]) -> str:
         else:
             path += ("." if path else "") + (step if len(step) <= 80 else f"{step[:77]}...")
     return path
+
+
+def quoted(text: str) -> str:
+    """A text as a TOML basic string."""
+    return json.dumps(text, ensure_ascii=False)

@@ -8,7 +8,6 @@ below and whose `[clips.NAME]` name a clip each: a file, or a part of one. Keys 
 from __future__ import annotations
 
 import difflib
-import json
 import math
 import os
 import unicodedata
@@ -22,7 +21,7 @@ from study.files import read_text, write_whole
 from study.motion.clip import HIGHEST_FPS, LOWEST_FPS
 from study.motion.joint_names import CENTRE_ROLES, ROLES
 from study.motion.units import INCH
-from study.toml_text import LARGEST_TEXT, parse_toml
+from study.toml_text import LARGEST_TEXT, parse_toml, quoted
 
 NAME = "library.toml"
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH}
@@ -284,12 +283,7 @@ def write_library_file(folder: Path, tables: Iterable[tuple[str, str, str, str]]
     lines = [_FIRST_LINES]
     for name, file, category, comment in tables:
         comment = "".join(letter if letter.isprintable() else " " for letter in comment)
-        lines += [f"[clips.{_quoted(name)}]  # {comment}", f"file = {_quoted(file)}"]
-        lines += [f"category = {_quoted(category)}", ""] if category else [""]
+        lines += [f"[clips.{quoted(name)}]  # {comment}", f"file = {quoted(file)}"]
+        lines += [f"category = {quoted(category)}", ""] if category else [""]
     write_whole(path, "\n".join(lines))
     return path
-
-
-def _quoted(text: str) -> str:
-    """A TOML basic string."""
-    return json.dumps(text, ensure_ascii=False)

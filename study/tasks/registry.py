@@ -16,8 +16,10 @@ from study.tasks.trial import Trial
 
 TASKS: Mapping[str, Task] = {task.name: task for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING, ODDITY)}
 
-NAMES: tuple[str, ...] = tuple(dict.fromkeys(task.asked_as for task in TASKS.values()))
-"""What a protocol may call a task."""
+DECIDES: Mapping[str, str] = {task.name: task.decides for task in TASKS.values() if task.name == task.asked_as}
+"""What participants decide, by what a protocol calls the task."""
+
+NAMES: tuple[str, ...] = tuple(DECIDES)
 
 
 def task_of(asked: Asked) -> Task:

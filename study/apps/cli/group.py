@@ -27,6 +27,7 @@ from study.files import refused
 # Verb -> module and name of its click command, in the order of a study's life.
 VERBS = {
     "demo": "study:demo",
+    "new": "new:new",
     "motions": "motions:motions",
     "preview": "motions:preview",
     "blend-length": "transition:blend_length",

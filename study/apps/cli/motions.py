@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,7 +42,7 @@ def list_motions(library: str | None, write: bool) -> None:
     if write:
         if not isinstance(opened, FolderLibrary):
             raise click.UsageError("expected --library FOLDER with --write, found the synthetic library.")
-        result["written"] = str(write_library_file(opened.folder, first_tables(opened)))
+        result["written"] = str(write_library_file(opened.folder, first_tables(opened, opened.names())))
     rows = [opened.entry(name) for name in opened.names()]
     skipped = opened.skipped if isinstance(opened, FolderLibrary) else []
     for line in skipped:
@@ -57,15 +57,15 @@ def list_motions(library: str | None, write: bool) -> None:
     emit({**result, "motions": motions, "skipped": skipped}, "\n".join(lines))
 
 
-def first_tables(library: FolderLibrary) -> list[tuple[str, str, str, str]]:
-    """Name, file, category and a comment for each file of a folder, for a first `library.toml`."""
+def first_tables(library: FolderLibrary, names: Iterable[str]) -> list[tuple[str, str, str, str]]:
+    """Name, file, category and a comment for each file behind some names, for a first `library.toml`."""
     import warnings
 
     from study.errors import MotionWarning, SegueError
     from study.motion.readers.registry import read_clip
 
     tables: list[tuple[str, str, str, str]] = []
-    for name in library.names():
+    for name in names:
         entry = library.entry(name)
         place = library.where(entry)
         # Names that are no text, as some archives leave them, have no place in a text file.

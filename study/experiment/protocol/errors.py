@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from study.counting import counted
-from study.toml_text import key_path
+from study.toml_text import key_path, quoted
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -117,23 +117,31 @@ def finding(model: type[BaseModel], detail: Mapping[str, Any]) -> str:
         return _unknown_key(model, location)
     if kind == "missing" and isinstance(location[-1], int):
         return f"expected more than {counted(location[-1], 'entry', 'entries')}; add one."
+    unit, words = _described(model, location)
     if kind == "missing":
-        return "expected this key, found none; add it."
+        return f"expected this key, found none; add it.{words}"
     if kind == "value_error":
         return f"{str(context['error']).removesuffix('?')}{'?' if str(context['error']).endswith('?') else '.'}"
-    unit = _unit(model, location)
     if kind in _BOUNDS:
         bound, words = _BOUNDS[kind]
         return f"expected {words} {context[bound]:g}{unit}, found {short(found)}; change it."
     if kind == "literal_error":
-        return f"expected {context['expected']}, found {short(found)}{_nearest_choice(context['expected'], found)}"
+        choice = _nearest_choice(context["expected"], found) or f"; choose one.{words}"
+        return f"expected {context['expected']}, found {short(found)}{choice}"
     if kind in ("string_pattern_mismatch", "string_too_short", "string_too_long"):
         return f"expected {_text_rule(kind, context)}, found {short(found)}; change it."
     if kind in ("too_short", "too_long"):
         bound, words = ("min_length", "at least") if kind == "too_short" else ("max_length", "at most")
         entries = counted(context[bound], "entry", "entries")
         return f"expected {words} {entries}, found {context['actual_length']}; change it."
-    return f"expected {_EXPECTED.get(kind, detail['msg'])}{unit}, found {_shown(found)}; change it."
+    do = "change it"
+    if (
+        kind == "model_type"
+        and isinstance(found, str)
+        and "name" in getattr(model_at(model, location), "model_fields", ())
+    ):
+        do = f"write {{ name = {quoted(found[:80])} }}"  # a name alone, as in form = ["age"]
+    return f"expected {_EXPECTED.get(kind, detail['msg'])}{unit}, found {_shown(found)}; {do}."
 
 
 def _shown(value: object) -> str:
@@ -172,7 +180,7 @@ def _text_rule(kind: str, context: Mapping[str, Any]) -> str:
 
 def _nearest_choice(expected: str, found: object) -> str:
     near = get_close_matches(str(found)[:80], re.findall(r"'([^']+)'", expected), n=1)
-    return f"; did you mean {near[0]!r}?" if near else "; choose one of these."
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def _unknown_key(model: type[BaseModel], location: Location) -> str:
@@ -245,13 +253,20 @@ def parts(model: type[BaseModel], path: str = "") -> Iterator[tuple[str, type[Ba
             yield from parts(inner, ".".join(filter(None, (path, name, NAMED if named else ""))))
 
 
-def _unit(model: type[BaseModel], location: Location) -> str:
-    """The unit of the key at a location, from its description, with a leading space."""
+def unit_and_words(description: str) -> tuple[str, str]:
+    """The unit that stands in brackets at the end of a key's description, and the words before it."""
+    if found := re.search(r"\s*\[([a-z ]+)\]$", description):
+        return found[1], description[: found.start()]
+    return "", description
+
+
+def _described(model: type[BaseModel], location: Location) -> tuple[str, str]:
+    """The unit of the key at a location, and what it means, each with what leads to it in a sentence."""
     names = [step for step in location if isinstance(step, str)]
     parent = model_at(model, names[:-1]) if names else None
     field = parent.model_fields.get(names[-1]) if parent else None
-    found = re.search(r"\[([a-z ]+)\]$", field.description or "") if field else None
-    return f" in {found[1]}" if found else ""
+    unit, words = unit_and_words((field.description or "") if field else "")
+    return f" in {unit}" if unit else "", f" {words}".rstrip().replace("`", "'")
 
 
 def line_of(lines: Mapping[tuple[int | str, ...], int], location: Location) -> int:

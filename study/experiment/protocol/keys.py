@@ -17,7 +17,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from study.experiment.procedures.registry import PROCEDURES
-from study.experiment.protocol.errors import parts
+from study.experiment.protocol.errors import parts, unit_and_words
 from study.experiment.protocol.settings import table_of
 from study.experiment.protocol.whole import Protocol
 
@@ -51,14 +51,8 @@ _HEAD = ("", "| key | type | default | meaning |", "|---|---|---|---|")
 
 
 def _row(name: str, field: FieldInfo) -> str:
-    unit, words = _unit_and_words(field.description or "")
+    unit, words = unit_and_words(field.description or "")
     return f"| `{name}` | {_type(field, unit)} | {_default(field)} | {words} |"
-
-
-def _unit_and_words(words: str) -> tuple[str, str]:
-    if found := re.search(r"\s*\[([a-z ]+)\]$", words):
-        return found[1], words[: found.start()]
-    return "", words
 
 
 def _default(field: FieldInfo) -> str:

@@ -18,7 +18,7 @@ from study.experiment.protocol.errors import KeyMismatchError, refuse_all
 from study.experiment.protocol.settings import member_of, settings_in
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import Listed, Part, Slug, known_slots
-from study.tasks.registry import NAMES, problems_of
+from study.tasks.registry import DECIDES, NAMES, problems_of
 from study.tasks.task import Order, Show
 from study.transitions.methods.registry import METHODS
 
@@ -70,7 +70,10 @@ class StudySpec(Part):
 
     name: Slug = Field(description="Name in plans, responses and reports; unique.")
     title: str = Field(default="", description="Heading for reports; by default the name.")
-    task: TaskName = Field(description="What the participant decides.")
+    task: TaskName = Field(
+        description="What the participant decides: "
+        f"{'; '.join(f'`{name}`, {words}' for name, words in DECIDES.items())}."
+    )
     transitions: Listed[str] = Field(default=(), description="Names of the transitions shown; by default all.")
     reference: str = Field(
         default="geodesic",

@@ -96,7 +96,8 @@ def supply(library: Library, fps: float, name: str, needs: Needs, within: tuple[
     raise StimulusError(
         f"motion {name!r}: expected {counted(needs.least_before + needs.least_after, 'frame')} at "
         f"{fps:g} fps around a transition point ({needs.words}), found {clip.frames} in {library.name}: "
-        f"{counted(missing, 'frame is', 'frames are')} missing. {why} Or lower entry_s, exit_s or longest_frames."
+        f"{counted(missing, 'frame is', 'frames are')} missing. {why} Or lower entry_s, exit_s or longest_frames by "
+        f"{missing / fps:.2f} s together; `segue new` finds what clips can supply."
     )
 
 

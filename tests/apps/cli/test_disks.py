@@ -26,6 +26,7 @@ ROOT = Path(__file__).parents[3]
 
 # What each verb writes, below the folder OUT; STUDY is a finished study elsewhere.
 WRITES = {
+    "new": ["new", "--from", "demo", "--out", "OUT/x"],
     "preview": ["preview", "walk", "--out", "OUT/x.mp4", "--size", "160x120"],
     "strip": ["preview", "walk", "--out", "OUT/x.png"],
     "blend-length": ["blend-length", "walk", "run", "--start", "60", "--end", "80", "--out", "OUT/x.csv"],

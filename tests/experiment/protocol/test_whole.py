@@ -99,7 +99,9 @@ def test_nothing_can_be_changed_afterwards() -> None:
         ('task = "preference"', 'task = "preferance"', r"studies\[1\].task: .*found 'preferance'; did you mean 'pref"),
         ('name = "demo"', 'name = "The demo"', r"name: expected a name of small letters, digits, - and _, found 'The"),
         ('title = "A small study of blend lengths"', 'title = ""', r"title: expected some text, found ''"),
-        ('title = "A small study of blend lengths"', "", r"demo.toml: title: expected this key, found none; add it"),
+        ('title = "A small study of blend lengths"', "", r"demo.toml: title: expected this key, found none; add it. H"),
+        ('task = "same-different"', 'task = "2afc"', r"'2afc'; choose one. What .* 'preference', which of two "),
+        ("seed = 7", 'seed = 7\nform = ["age"]', r'form\[0\]: .*, found .*; write { name = "age" }\.'),
         ('name = "boxing"', 'name = "walking"', r"demo.toml:\d+: transitions\[3\].name: .*'walking' twice"),
         ('name = "geodesic_vs_fixed"', 'name = "jnd"', r"studies\[1\].name: .*'jnd' twice"),
         ('["walk_run", ', '["walk_ran", ', r"studies\[1\].transitions: .*found 'walk_ran'; did you mean 'walk_run'\?"),
@@ -260,16 +262,3 @@ def test_an_installed_package_carries_its_protocols(tmp_path: Path, monkeypatch:
     (package / "protocols").mkdir()
     (package / "protocols" / "demo.toml").write_text(GOOD)
     assert find_protocol("demo") == package / "protocols" / "demo.toml"
-
-
-def test_the_study_in_the_documentation_can_be_run(repository: Path) -> None:
-    """The walk-through's protocol: sound, nothing left to write, and all of it can be shown."""
-    from study.experiment.protocol.proofreading import to_do
-    from study.experiment.stimuli.prepare import check
-    from study.motion.library import open_library
-
-    document = (repository / "docs" / "protocols.md").read_text(encoding="utf-8")
-    (text,) = (block for block in re.findall(r"```toml\n(.*?)```", document, re.DOTALL) if "[[studies]]" in block)
-    protocol = parse_protocol(text)
-    assert to_do(protocol) == []
-    assert check(protocol, open_library("synthetic")) == []
