@@ -53,7 +53,7 @@ def _level_ticks(axes: Axes, levels: Sequence[float]) -> None:
     for level in sorted(levels, key=abs):
         if all(abs(level - other) >= room for other in shown):
             shown.append(level)
-    axes.set_xticks(shown, [f"{level:+.0f}".replace("-", "−") if level else "k" for level in shown])
+    axes.set_xticks(shown, [f"{level:+g}".replace("-", "−") if level else "k" for level in shown])
 
 
 def _model_threshold(axes: Axes, threshold: Threshold, level: float, label: bool) -> None:
@@ -105,7 +105,7 @@ def _key(axes: Axes, whose: str) -> None:
 
 
 def _spoken_levels(rows: Sequence[PercentDifferent]) -> str:
-    return "; ".join(f"{row.difference_frames:+.0f} frames: {row.percent:.0f}%" for row in rows)
+    return "; ".join(f"{row.difference_frames:+g} frames: {row.percent:.0f}%" for row in rows)
 
 
 def motions_figure(result: SameDifferent, name: str, mark: str) -> str:
