@@ -37,6 +37,7 @@ WRITES = {
     "label": ["label", "walk", "run", "--strips", "--best", "1", "--worst", "0", "--random", "0", "--out", "OUT/x.csv"],
     "one-hop": ["one-hop", "build", "walk", "run", "--fps", "10", "--weight", "0.01", "--out", "OUT/x.npz"],
     "flat": ["one-hop", "build", "walk", "run", "--fps", "10", "--weight", "0.01", "--out", "OUT/x.bin"],
+    "export-engine": ["export-engine", "STUDY/advice/advice.json", "--out", "OUT/x"],
     "advise": ["advise", "walk", "run", "--no-strips", "--out", "OUT/x"],
     "power": ["power", "demo", "--study", "velocity_vs_fixed", "--participants", "4", "--studies=10", "--out", "OUT/x"],
     "render": ["render", "STUDY/protocol.toml", "--out", "OUT/x"],
@@ -67,10 +68,11 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A study with two simulated participants, without films."""
+    """A study with two simulated participants, without films; and advice, for engines."""
     folder = tmp_path_factory.mktemp("finished")
     unfilmed(folder)
     assert run(["simulate", str(folder / "protocol.toml"), "--participants", "2", "--out", str(folder)]) == 0
+    assert run(["advise", "walk", "run", "--no-strips", "--out", str(folder / "advice")]) == 0
     return folder
 
 
