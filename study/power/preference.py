@@ -210,7 +210,7 @@ def strengths_study(design: Design, alpha: float, share: float) -> Run:
 
 def _no_sessions(_: Analysis) -> bool:
     raise AnalysisError(
-        "expected no --sessions with --motion-sd, nor for a study of more than two methods; leave it out"
+        "expected no --sessions for a study of more than two methods, nor with --motion-sd; leave it out"
     )
 
 

@@ -230,7 +230,10 @@ def test_every_task_has_a_curve(capsys: pytest.CaptureFixture[str]) -> None:
         (["geodesic_vs_fixed", "--participants", "ten"], "expected --participants as numbers"),
         (["geodesic_vs_fixed", "--motions", "0"], "expected --motions as numbers such as 4,8,16, found '0'"),
         (["blend_length_jnd", "--motions", "4"], "expected no --motions for this study"),
-        (["geodesic_vs_fixed", "--motion-sd", "0.5", "--sessions"], "expected no --sessions with --motion-sd"),
+        (
+            ["geodesic_vs_fixed", "--motion-sd", "0.5", "--sessions"],
+            "expected no --sessions for a study of more than two methods, nor with --motion-sd",
+        ),
     ],
 )
 def test_refusals(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
