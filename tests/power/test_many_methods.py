@@ -74,5 +74,5 @@ def test_where_nothing_is_to_be_found_hardly_anything_is() -> None:
 def test_whole_sessions_are_refused() -> None:
     design = design_of(4)
     effect = effect_of(design.study, {**OPTIONS, "share": 0.7}, design.protocol.analysis)
-    with pytest.raises(AnalysisError, match="nor for a study of more than two methods"):
+    with pytest.raises(AnalysisError, match="expected no --sessions for a study of more than two methods"):
         whole_sessions(design, effect.found)(np.random.default_rng(0), 1, [4])

@@ -205,9 +205,9 @@ def _in_words(unable: Sequence[str], people: int, able: dict[Side, Threshold]) -
     if len(unable) < max(2, MANY_UNABLE * people):
         return ""
     return (
-        f"{len(unable)} of {people} participants answer as if they could not tell any difference, which people who "
-        "differ log-normally seldom do: the intervals are not to be trusted; without these participants the threshold "
-        f"is {sides_in_words(able) or 'not to be had'}"
+        f"{len(unable)} of {counted(people, 'participant')} answer as if they could not tell any difference, which "
+        "people who differ log-normally seldom do: the intervals are not to be trusted; without these participants the "
+        f"threshold is {sides_in_words(able) or 'not to be had'}"
     )
 
 

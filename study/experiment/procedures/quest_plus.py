@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Ge, Gt, Le
 
+from study.counting import counted
 from study.experiment.procedures.interleaved import Interleaving
 from study.models.quest_plus import QuestRule
 from study.settings import SettingsError, required, setting
@@ -95,7 +96,7 @@ class Quest(Interleaving):
 
     def in_words(self) -> str:
         """What is varied, the priors, and when a track stops."""
-        stops = f"after {self.most_trials} trials"
+        stops = f"after {counted(self.most_trials, 'trial')}"
         if self.narrow > 1:
             stops = f"once the 95% interval of its threshold was narrower than a factor of {self.narrow:g}, or {stops}"
         return (
