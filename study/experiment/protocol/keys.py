@@ -76,15 +76,16 @@ def _type(field: FieldInfo, unit: str) -> str:
 
 
 def _bounds(metadata: list[Any]) -> Iterator[str]:
+    # 1 and 1.0 are one bound: `typing` keeps one of two annotations that are equal, whichever was made first.
     for bound in metadata:
         if isinstance(bound, annotated_types.Ge):
-            yield f"≥ {bound.ge}"
+            yield f"≥ {bound.ge:.10g}"
         elif isinstance(bound, annotated_types.Gt):
-            yield f"> {bound.gt}"
+            yield f"> {bound.gt:.10g}"
         elif isinstance(bound, annotated_types.Le):
-            yield f"≤ {bound.le}"
+            yield f"≤ {bound.le:.10g}"
         elif isinstance(bound, annotated_types.Lt):
-            yield f"< {bound.lt}"
+            yield f"< {bound.lt:.10g}"
 
 
 def _annotation(annotation: Any) -> str:
