@@ -45,16 +45,6 @@ comparison = "fixed"
 fixed_frames = 10
 repeats = {repeats}
 """
-OF_TASK: Mapping[str, tuple[str, str]] = {
-    "same-different": ("How noticeable is the length of a blend?", _LEVELS),
-    "oddity": ("Which of three blends has another length?", _LEVELS),
-    "preference": (
-        "Does a blend of the geodesic length look more natural than one of ten frames?",
-        _METHODS + 'order = "balanced"  # half of the pairs in each order\n',
-    ),
-    "rating": ("How natural do blends of the geodesic length look, and of ten frames?", _METHODS),
-}
-"""What a study of each task is about, and its own keys."""
 _ITEMS = """
 [[studies.items]]  # asked after every film; write as many as you need
 name = "natural"
@@ -62,6 +52,28 @@ question = "How natural was the motion?"
 low = "very unnatural"
 high = "very natural"
 """
+
+
+class Study(NamedTuple):
+    """What the study of a task is about, and what it has of its own."""
+
+    title: str
+    keys: str
+    steps: tuple[int, ...] = ()
+    """Differences of blend length to be told apart, in steps of the room; none where methods are compared."""
+    tables: str = ""
+    """What follows its keys."""
+
+
+OF_TASK: Mapping[str, Study] = {
+    "same-different": Study("How noticeable is the length of a blend?", _LEVELS, (-3, -2, -1, 0, 1, 2, 4)),
+    "oddity": Study("Which of three blends has another length?", _LEVELS, (-3, -2, -1, 1, 2, 4)),
+    "preference": Study(
+        "Does a blend of the geodesic length look more natural than one of ten frames?",
+        _METHODS + 'order = "balanced"  # half of the pairs in each order\n',
+    ),
+    "rating": Study("How natural do blends of the geodesic length look, and of ten frames?", _METHODS, tables=_ITEMS),
+}
 _MATCH = """# Both films of a pair take equally long, so that only the blend tells them apart.
 match = "duration"
 """
@@ -161,22 +173,21 @@ def start_protocol(name: str, task: str, motions: Sequence[str], library: Librar
 
 
 def _written(name: str, task: str, motions: Sequence[str], library: Library, longest: str, room: Room) -> str:
-    title, study = OF_TASK[task]
-    levels = study == _LEVELS
-    differences = [steps * room.step_frames for steps in (-3, -2, -1, 0, 1, 2, 4) if steps or task == "same-different"]
+    study = OF_TASK[task]
+    differences = [step * room.step_frames for step in study.steps]
     text = _TEXT.format(
         name=name,
-        title=title,
+        title=study.title,
         room=room,
-        match=_MATCH if levels else "",
-        apart="" if levels or room == ROOMS[-1] else _APART,
+        match=_MATCH if differences else "",
+        apart="" if differences or room == ROOMS[-1] else _APART,
         to_fill_in=TO_FILL_IN,
         transitions="".join(_transitions(motions, library)),
         practice=quoted(longest),
         task=task,
-        study=study.format(differences=differences, repeats=max(2, 16 // len(motions) // 2 * 2)),
+        study=study.keys.format(differences=differences, repeats=max(2, 16 // len(motions) // 2 * 2)),
     )
-    return text + (_ITEMS if task == "rating" else "")
+    return text + study.tables
 
 
 def _transitions(motions: Sequence[str], library: Library) -> Iterator[str]:

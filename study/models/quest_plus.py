@@ -8,6 +8,7 @@ mean entropy at each point, which takes two products of a matrix and a vector in
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import ClassVar
@@ -126,7 +127,7 @@ class QuestRule(Rule):
     @property
     def target(self) -> float:
         """Half of the way from chance to never wrong."""
-        return TARGETS[self.task]
+        return DECIDING[self.task].target
 
     @property
     def estimate(self) -> str:
@@ -135,7 +136,7 @@ class QuestRule(Rule):
 
     def meaning(self, right: str) -> str:
         """What holds at the threshold: in same-different, whatever a participant's own criterion is."""
-        if self.task == "oddity":
+        if not DECIDING[self.task].has_criterion:
             return super().meaning(right)
         return f"an observer with the best criterion would be right in {100 * self.target:.0f}% of the pairs"
 
@@ -180,8 +181,33 @@ class QuestRule(Rule):
         return _summary(self, track.right, track.wrong)[1]
 
 
-TARGETS = {"same-different": 0.75, "oddity": HALFWAY}
-"""The share of right answers at threshold: of an observer with the best criterion, in same-different."""
+@dataclass(frozen=True)
+class Deciding:
+    """How a task is decided, for QUEST+."""
+
+    target: float
+    """The share of right answers at threshold; with a criterion, that of an observer with the best one."""
+    has_criterion: bool
+    right: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    """Chances of right answers, given the difference over the threshold (0 for none), the criterion, the lapse rate."""
+
+
+def _same_different(over: FloatArray, criterion: FloatArray, lapse: FloatArray) -> FloatArray:
+    different = lapse / 2 + (1 - lapse) * detected(criterion_free_delta(0.75) * over, criterion)
+    return np.where(over > 0, different, 1 - different)
+
+
+def _oddity(over: FloatArray, _criterion: FloatArray, lapse: FloatArray) -> FloatArray:
+    d_prime = d_prime_of(HALFWAY)
+    assert d_prime is not None
+    return lapse * CHANCE + (1 - lapse) * oddity_correct(d_prime * over)
+
+
+DECIDING = {
+    "same-different": Deciding(0.75, True, _same_different),
+    "oddity": Deciding(HALFWAY, False, _oddity),
+}
+"""By the task."""
 
 THRESHOLDS, CRITERIA, LAPSES = 41, 15, 4
 WIDE = 3.0
@@ -194,19 +220,13 @@ def _grid(rule: QuestRule) -> QuestPlus:
     steps = np.linspace(-WIDE, WIDE, THRESHOLDS)
     logs = np.log(rule.threshold_frames) + rule.threshold_spread * steps
     lapses = rule.most_lapses * (np.arange(LAPSES) + 0.5) / LAPSES
-    criteria = np.maximum(rule.criterion + rule.criterion_spread * np.linspace(-2.5, 3.0, CRITERIA), LEAST_CRITERION)
-    if rule.task == "oddity":
-        criteria = np.array([rule.criterion])
+    criteria = np.array([rule.criterion])
+    if DECIDING[rule.task].has_criterion:
+        low, high = (rule.criterion + rule.criterion_spread * ends for ends in (-2.5, WIDE))
+        criteria = np.linspace(max(low, LEAST_CRITERION), high, CRITERIA)
     threshold, criterion, lapse = (part.ravel() for part in np.meshgrid(np.exp(logs), criteria, lapses, indexing="ij"))
     frames = np.array([0, *rule.levels], dtype=np.float64)[:, None]
-    if rule.task == "oddity":
-        d_prime = d_prime_of(HALFWAY)
-        assert d_prime is not None
-        right = lapse * CHANCE + (1 - lapse) * oddity_correct(d_prime * frames / threshold)
-    else:
-        delta = criterion_free_delta(TARGETS[rule.task]) * frames / threshold
-        right = lapse / 2 + (1 - lapse) * detected(delta, criterion)
-        right[0] = 1 - right[0]
+    right = DECIDING[rule.task].right(frames / threshold, criterion, lapse)
     prior = np.exp(-0.5 * (((np.log(threshold) - logs.mean()) / rule.threshold_spread) ** 2))
     prior *= np.exp(-0.5 * ((criterion - rule.criterion) / rule.criterion_spread) ** 2)
     return QuestPlus((logs, criteria, lapses), np.clip(right, 1e-9, 1 - 1e-9), prior / prior.sum())
