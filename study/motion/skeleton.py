@@ -1,4 +1,4 @@
-"""Skeleton: joints in depth-first order, rest offsets in metres, end sites, and the roles that joints play.
+"""Skeleton: joints, parents before children, rest offsets in metres, end sites, and the roles that joints play.
 
 Roles are the same on every rig: `pelvis`, `spine`, `chest`, `neck`, `head`, and with `.L` or `.R`: `hip`, `knee`,
 `ankle`, `toe`, `collar`, `shoulder`, `elbow`, `wrist`. A role that a rig does not have is missing from the mapping.

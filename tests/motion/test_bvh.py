@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,12 @@ from study.motion.readers import numbers
 from study.motion.readers.bvh import read_bvh
 from study.motion.readers.bvh_writing import write_bvh
 from study.motion.readers.frame_times import frame_rate
+from study.motion.readers.gltf_writing import write_glb
 from study.motion.readers.numbers import parse_numbers
+from study.motion.readers.registry import read_clip
+from study.motion.skeleton import Skeleton
 from study.motion.units import CMU_UNIT
+from tests.walks import make_walk
 
 Bvh = Callable[[str | bytes], Path]
 
@@ -310,6 +315,31 @@ def test_writing_and_reading_gives_the_same_motion(tmp_path: Path, bvh: Bvh) -> 
     assert again.fps == clip.fps
     assert np.allclose(joint_positions(again, ends=True), joint_positions(clip, ends=True), rtol=0, atol=1e-9)
     assert [p.name for p in tmp_path.iterdir() if p.name != "clip.bvh"] == ["out.bvh"]
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".glb"])
+def test_joints_that_stand_level_by_level_are_written_as_the_tree_that_they_are(tmp_path: Path, suffix: str) -> None:
+    walk = make_walk(10)
+    rig = walk.skeleton
+    order = np.concatenate([[0], *(joints for joints, _ in rig.levels)])
+    number = np.argsort(order)
+    level = Skeleton(
+        tuple(rig.names[joint] for joint in order),
+        np.array([-1, *number[rig.parents[order[1:]]]]),
+        rig.offsets[order],
+        number[rig.end_parents],
+        rig.end_offsets,
+    )
+    assert np.any(np.diff(order) < 0), "in another order than depth first"
+    clip = replace(walk, skeleton=level, rotations=walk.rotations[:, order])
+    path = tmp_path / f"walk{suffix}"
+    if suffix == ".bvh":
+        write_bvh(clip, path)
+    else:
+        write_glb({"walk": clip}, path)
+    again = read_clip(path)
+    same = [again.skeleton.names.index(name) for name in rig.names]
+    np.testing.assert_allclose(joint_positions(again)[:, same], joint_positions(walk), atol=1e-6)
 
 
 @pytest.mark.parametrize("unit", [1.0, 0.01, 0.0254, CMU_UNIT])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from study.arrays import FloatArray
+from study.arrays import FloatArray, IntArray
 from study.errors import MotionFileError
 from study.files import write_whole
 from study.motion import quaternions as quat
@@ -19,6 +19,8 @@ from study.motion.skeleton import Skeleton
 
 def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float | None = None) -> None:
     """Write a clip as a BVH file, whole or not at all; reading it back gives the same motion.
+
+    Joints stand depth first in it, as the format asks; those of a skeleton in another order are read back so.
 
     Parameters
     ----------
@@ -39,9 +41,10 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float | None = N
     """
     path = Path(path)
     metres_per_unit = clip.metres_per_unit if metres_per_unit is None else metres_per_unit
-    lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, 1.0 / metres_per_unit)]
+    order = _depth_first(clip.skeleton.parents)
+    lines = ["HIERARCHY", *_hierarchy_lines(clip.skeleton, order, 1.0 / metres_per_unit)]
     lines += ["MOTION", f"Frames: {clip.frames}", f"Frame Time: {1.0 / clip.fps!r}"]
-    degrees = np.degrees(quat.to_euler("ZYX", clip.rotations)).reshape(clip.frames, -1)
+    degrees = np.degrees(quat.to_euler("ZYX", clip.rotations[:, order])).reshape(clip.frames, -1)
     table = np.concatenate([clip.root_positions / metres_per_unit, degrees], axis=1)
     if np.max(np.abs(table)) > LARGEST:
         raise MotionFileError(f"Expected to write no number above {LARGEST:.0e}, but the body moves further.", path)
@@ -50,8 +53,17 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float | None = N
     write_whole(path, "\n".join(lines) + "\n")
 
 
-def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:
-    """The lines of the tree, joint by joint: depth first, as a skeleton has them."""
+def _depth_first(parents: IntArray) -> list[int]:
+    """The joints such that all that hang on one directly follow it."""
+    order, waiting = list[int](), [0]
+    while waiting:
+        order.append(waiting.pop())
+        waiting += np.flatnonzero(parents == order[-1])[::-1].tolist()
+    return order
+
+
+def _hierarchy_lines(skeleton: Skeleton, order: list[int], scale: float) -> list[str]:
+    """The lines of the tree, joint by joint."""
 
     def place(offset: FloatArray) -> str:
         return "OFFSET " + " ".join(f"{value:.10g}" for value in offset * scale)
@@ -69,8 +81,8 @@ def _hierarchy_lines(skeleton: Skeleton, scale: float) -> list[str]:
             open_joints.pop()
             lines.append("\t" * len(open_joints) + "}")
 
-    for joint, parent in enumerate(skeleton.parents.tolist()):
-        close_to(parent)
+    for joint in order:
+        close_to(int(skeleton.parents[joint]))
         tab = "\t" * len(open_joints)
         position = "6 Xposition Yposition Zposition" if joint == 0 else "3"
         lines += [f"{tab}{'ROOT' if joint == 0 else 'JOINT'} {names[joint]}", f"{tab}{{"]
