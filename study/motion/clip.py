@@ -231,8 +231,10 @@ def sample(clip: Clip, frames: FloatArray | Sequence[float]) -> Clip:
             f"got {times.min():g} to {times.max():g}."
         )
     before = np.floor(times).astype(np.int64)
-    after = np.minimum(before + 1, clip.frames - 1)
     weight = times - before
+    if not weight.any():
+        return picked(clip, before)
+    after = np.minimum(before + 1, clip.frames - 1)
     rotations = quat.slerp(clip.rotations[before], clip.rotations[after], weight[:, None])
     whole = weight == 0.0
     rotations[whole] = clip.rotations[before[whole]]

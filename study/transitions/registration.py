@@ -9,9 +9,14 @@ its own facing, which is such an alignment of every pair.
 
 The 2004 paper (section 3.1.4) warps both windows evenly. Here the ends of the windows are the same, and what lies
 between them is warped as the motions ask for; at both ends each clip runs at the rate that it has without a warp.
+
+A game finds the curve once a transition (or beforehand, and keeps a few slopes), 3 ms here for 60 frames. A pose then
+costs what that of a plain blend does, and the two places between frames that the curve asks for: `benchmarks/poses.py`.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,8 +33,35 @@ _SMOOTH = 0.03
 """How much a change of its slope from knot to knot counts beside its distance from the path, in the fit."""
 
 
-def registration(source: Clip, destination: Clip) -> FloatArray:
-    """By how much the destination is ahead of the source where both are in step, `(frames,)`, in shares of a window.
+@dataclass(frozen=True, eq=False)
+class Lead:
+    """By how much the destination is ahead of the source where both are in step, in shares of a window.
+
+    `slopes (pieces - 1,)` are those of the curve at even knots between 0 and 1. They add up to 0, and the curve begins
+    and ends at 0 and level; between knots its slope runs straight.
+    """
+
+    slopes: FloatArray
+
+    def at(self, shares: FloatArray) -> FloatArray:
+        """The curve at shares `(n,)` of the blend, from 0 to 1."""
+        return np.asarray(_ramps(shares, len(self.slopes) + 1) @ self.slopes)
+
+    def rate(self, shares: FloatArray) -> FloatArray:
+        """Its slope there."""
+        level = np.concatenate([[0.0], self.slopes, [0.0]])
+        return np.asarray(np.interp(shares, np.linspace(0.0, 1.0, len(level)), level))
+
+
+def _ramps(shares: FloatArray, pieces: int) -> FloatArray:
+    """What a slope of 1 at one inner knot alone adds to a curve up to each share, `(shares, pieces - 1)`."""
+    since = shares[:, None] * pieces - np.arange(1, pieces)
+    rising, falling = np.clip(since + 1.0, 0.0, 1.0), np.clip(since, 0.0, 1.0)
+    return np.asarray((rising**2 + falling * (2.0 - falling)) / (2.0 * pieces))
+
+
+def registration(source: Clip, destination: Clip) -> Lead:
+    """The curve that brings two windows into step.
 
     Parameters
     ----------
@@ -69,41 +101,34 @@ def least_path(distances: FloatArray) -> FloatArray:
     return np.array(path[::-1]) / (poses - 1.0)
 
 
-def smooth_lead(path: FloatArray, count: int) -> FloatArray:
-    """By how much the destination is ahead of the source along a smooth, strictly increasing curve near a path.
+def smooth_lead(path: FloatArray, count: int) -> Lead:
+    """A smooth, strictly increasing curve near a path, by least squares.
 
     Parameters
     ----------
     path : (pairs, 2)
         Shares of the windows, as `least_path` gives them.
     count
-        Steps of the blend.
-
-    Returns
-    -------
-    (count + 1,) in shares of a window, 0 and level at both ends; 0 throughout under 6 frames, too few for a curve.
+        Steps of the blend; under 6, too few for a curve, neither is ahead.
 
     Notes
     -----
-    A quadratic spline with even knots, fitted by least squares. Its slope is a spline of straight pieces, so bounds at
-    the knots bound it everywhere.
+    A quadratic spline with even knots. Its slope is a spline of straight pieces, so bounds at the knots bound it
+    everywhere.
     """
+    pieces = max(_FEWEST, count // _KNOT_FRAMES)
     if count < _SHORTEST:
-        return np.zeros(count + 1)
-    from scipy.interpolate import BSpline
+        return Lead(np.zeros(pieces - 1))
     from scipy.optimize import lsq_linear
 
-    pieces = max(_FEWEST, count // _KNOT_FRAMES)
-    knots = np.concatenate([[0.0, 0.0], np.linspace(0.0, 1.0, pieces + 1), [1.0, 1.0]])
-    # Unknown are the slopes at the inner knots; the curve is their sum and comes back to 0.
-    rises = np.tril(np.ones((pieces + 2, pieces - 1)), k=-2) / pieces
-    at = path.mean(axis=1)
-    fitted = BSpline.design_matrix(at, knots, 2).toarray() @ rises
-    wanted = path[:, 1] - path[:, 0]
+    fitted = _ramps(path.mean(axis=1), pieces)
     bends = _SMOOTH * np.diff(np.eye(pieces + 1)[:, 1:-1], axis=0)
     back = 1e3 * np.ones((1, pieces - 1))
-    rows, values = np.concatenate([fitted, bends, back]), np.concatenate([wanted, np.zeros(pieces + 1)])
+    rows = np.concatenate([fitted, bends, back])
+    values = np.concatenate([path[:, 1] - path[:, 0], np.zeros(pieces + 1)])
     most = 2.0 * (STEEPEST - 1.0) / (STEEPEST + 1.0)
-    slopes = lsq_linear(rows, values, (-most, most), method="bvls").x
-    even = np.arange(count + 1) / count
-    return np.asarray(BSpline.design_matrix(even, knots, 2).toarray() @ (rises @ slopes))
+    found = lsq_linear(rows, values, (-most, most), method="bvls").x
+    # What the fit leaves of the sum is taken from each slope as far as its bound lets it.
+    left = found.sum()
+    room = most + np.sign(left) * found
+    return Lead(found - left * room / room.sum())

@@ -290,7 +290,7 @@ def warped_blend(
     if in_step:
         ahead = registration(
             sample(source, before[0] + source_frames * even), sample(destination, before[1] + destination_frames * even)
-        )
+        ).at(even)
     return join(
         source,
         destination,
