@@ -21,13 +21,17 @@ from parts import unavailable
 
 from study.apps.cli import run
 from study.errors import TransitionError
-from study.motion.clip import Clip, joint_positions, retarget
+from study.motion.clip import Clip, joint_positions, moved, retarget
 from study.motion.library import Library, open_library
 from study.motion.readers.registry import read_clip
 from study.transitions.blending import blend, blend_weights
 from study.transitions.engines.export import Advised, export, read_advice
+from study.transitions.methods.makes.blends import Slerp
+from study.transitions.methods.method import Place
+from study.transitions.methods.registry import DIRECT
 from study.transitions.one_hop.problem import Alignment
 from study.transitions.one_hop.table import OneHopTable, Row
+from study.transitions.point_cloud import alignment
 from tests.walks import make_walk
 
 ROOT = Path(__file__).parents[2]
@@ -74,6 +78,28 @@ def test_the_fade_has_the_shares_of_the_blend_at_every_frame(
     first = round(one["start_s"] * 30)
     assert len(root) == round(one["duration_s"] * 30) + 1
     assert np.abs(root[:, :3] - made.clip.root_positions[first : first + len(root)]).max() < 1e-6
+
+
+@pytest.mark.parametrize("make", [name for name in DIRECT if name != "slerp"])
+def test_what_is_no_fade_is_an_animation_from_the_sources_last_frame_to_the_destination_alone(
+    tmp_path: Path, make: str
+) -> None:
+    library = open_library("synthetic")
+    clips = pair(library, "walk", "run")
+    row = Advised("walk", "run", "geodesic", make, 52, 63, 12)
+    machine = export(tmp_path / "out", clips, [library.clip(name) for name in clips], [row], None)
+    (one,), made = machine["transitions"], as_made(clips, row)
+    read = read_clip(tmp_path / "out" / "clips.glb" / one["animation"])
+    assert (one["animation"], one["root"], read.fps) == ("walk to run", [], 30.0)
+    start = round(30 * one["start_s"])
+    order = [read.skeleton.names.index(name) for name in made.skeleton.names]
+    own, walk = joint_positions(made), joint_positions(clips["walk"])
+    np.testing.assert_allclose(joint_positions(read)[:, order], own[start : start + read.frames], atol=1e-5)
+    np.testing.assert_allclose(own[: start + 1], walk[: start + 1], atol=1e-9)
+    # The destination goes on from its own last frame, placed as the file says.
+    enters = round(30 * (one["offset_s"] + one["duration_s"]))
+    placed = moved(clips["run"], one["turn_radians"], np.array(one["shift_m"]))
+    np.testing.assert_allclose(joint_positions(placed)[enters:], own[start + read.frames - 1 :], atol=1e-5)
 
 
 def test_clips_and_animations_keep_their_names_apart(tmp_path: Path) -> None:
@@ -124,6 +150,8 @@ def test_the_verb_takes_what_advise_and_one_hop_write(capsys: pytest.CaptureFixt
 def test_other_json_is_refused(said: Any) -> None:
     with pytest.raises(TransitionError, match=r"x.json: expected the advice.json of .* found neither"):
         read_advice(Path("x.json"), said)
+    with pytest.raises(TransitionError, match=r"expected makes out of slerp, .*, found 'morph'"):
+        read_advice(Path("x.json"), {"advice": [{**ROW, "make": "morph"}], "fps": 30})
     assert read_advice(Path("x.json"), {"advice": [ROW], "fps": 30})[1] == [Advised(**ROW)]  # type: ignore[arg-type]
 
 
@@ -187,17 +215,28 @@ def godot(folder: Path, *arguments: str, makes: str) -> None:
     assert "SCRIPT ERROR" not in said, said
 
 
+def as_made(clips: dict[str, Clip], row: Advised) -> Clip:
+    """A transition as `segue advise` measures it, or as an engine fades, which leaves the feet as they come."""
+    make = Slerp(clean_feet=False) if row.make == "slerp" else DIRECT[row.make]()
+    place = Place("", ("", ""), clips[row.source], clips[row.destination], row.start_frame, row.end_frame)
+    return make.way(place, (row.blend_frames, row.blend_frames)).made(place).clip
+
+
 def in_godot(folder: Path, clips: dict[str, Clip], there: Advised, back: Advised) -> None:
     """Godot plays a transition and the one back: its joints are where ours are in every frame, to a millimetre."""
     if shutil.which("godot3-server") is None:
         unavailable("Godot", "apt-get install godot3-server", "godot3-server")
-    first, second = clips[there.source], clips[there.destination]
-    once = blend(first, second, there.start_frame, there.end_frame, there.blend_frames)
-    # A blend doesn't depend on where its clips stand: what came out of the first is the source of the next.
-    start = back.start_frame - once.destination_frames[1] + once.blend_stop
-    made = blend(once.clip, first, start, back.end_frame, back.blend_frames)
-    frames = min(made.clip.frames, made.blend_stop + 60)
-    export(folder, clips, list(clips.values()), [there, back], None)
+    once, again = (as_made(clips, row) for row in (there, back))
+    machine = export(folder, clips, list(clips.values()), [there, back], None)
+    # What comes back starts from the second clip, placed as the first transition has left it.
+    later = once.frames - clips[there.destination].frames
+    turn, shift, _ = alignment(joint_positions(once)[-1], joint_positions(clips[there.destination])[-1])
+    over = [round(30 * (one["start_s"] + one["duration_s"])) for one in machine["transitions"]]
+    turning = later + back.start_frame - 1
+    expected = np.concatenate(
+        [joint_positions(once)[:turning], joint_positions(moved(again, turn, shift))[turning - later :]]
+    )
+    frames = min(len(expected), later + over[1] + 60)
     (folder / "project.godot").write_text("config_version=4\n")
     (folder / "clips.glb.import").write_text(IMPORT)
     drive = DRIVE.replace("SOURCE", there.source).replace("DESTINATION", there.destination)
@@ -206,26 +245,29 @@ def in_godot(folder: Path, clips: dict[str, Clip], there: Advised, back: Advised
     godot(folder, "-s", "drive.gd", makes="out.json")
     found = json.loads((folder / "out.json").read_text())
     assert not found["over"], "the clip is past the point"
-    other = [there.destination] * (made.blend_stop - once.blend_stop)
-    assert found["states"] == [there.source] * once.blend_stop + other + [there.source] * (frames - made.blend_stop)
+    other = [there.destination] * (later + over[1] - over[0])
+    assert found["states"] == [there.source] * over[0] + other + [there.source] * (frames - later - over[1])
     # Godot 3 writes names of bones in its own way.
     plain = [re.sub(r"[^a-z0-9]", "", name.lower()) for name in found["names"]]
-    order = [plain.index(re.sub(r"[^a-z0-9]", "", name.lower())) for name in made.clip.skeleton.names]
-    apart = np.linalg.norm(np.array(found["frames"])[:, order] - joint_positions(made.clip)[:frames], axis=-1)
+    order = [plain.index(re.sub(r"[^a-z0-9]", "", name.lower())) for name in once.skeleton.names]
+    apart = np.linalg.norm(np.array(found["frames"])[:, order] - expected[:frames], axis=-1)
     assert apart.max() < 1e-3, f"{1000 * apart.max():.3f} mm in frame {apart.max(axis=1).argmax()}"
 
 
-def test_godot_plays_a_synthetic_transition_as_we_do(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("there", "back"), [("slerp", "slerp"), ("dead-blend", "registration-curve"),
+                                             ("inertialize", "slerp")])  # fmt: skip
+def test_godot_plays_synthetic_transitions_as_they_are_made(tmp_path: Path, there: str, back: str) -> None:
     clips = pair(open_library("synthetic"), "walk", "run")
-    there = Advised("walk", "run", "geodesic", "slerp", 52, 63, 8)
-    in_godot(tmp_path / "game", clips, there, Advised("run", "walk", "geodesic", "slerp", 90, 59, 12))
+    go = Advised("walk", "run", "geodesic", there, 52, 63, 8)
+    in_godot(tmp_path / "game", clips, go, Advised("run", "walk", "geodesic", back, 90, 59, 12))
 
 
 @pytest.mark.mocap
-def test_godot_plays_a_captured_transition_as_we_do(mocap: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("make", ["slerp", "inertialize-quintic"])
+def test_godot_plays_captured_transitions_as_they_are_made(mocap: Path, tmp_path: Path, make: str) -> None:
     clips = pair(open_library(mocap / "cmu"), "walk_turn_left", "dance_modern")
-    there = Advised("walk_turn_left", "dance_modern", "velocity", "slerp", 40, 30, 21)
-    in_godot(tmp_path / "game", clips, there, Advised("dance_modern", "walk_turn_left", "velocity", "slerp", 90, 20, 8))
+    go = Advised("walk_turn_left", "dance_modern", "velocity", make, 40, 30, 21)
+    in_godot(tmp_path / "game", clips, go, Advised("dance_modern", "walk_turn_left", "velocity", make, 90, 20, 8))
 
 
 @pytest.mark.parametrize("motions", [("walk", "run"), ("dance", "box")])
@@ -233,14 +275,15 @@ def test_the_khronos_validator_finds_nothing(tmp_path: Path, motions: tuple[str,
     if not VALIDATOR.is_dir():
         pytest.skip("the glTF validator is missing: npm install --prefix build gltf-validator")
     clips = pair(open_library("synthetic"), *motions)
-    export(tmp_path / "out", clips, list(clips.values()), [], None)
+    row = Advised(*motions, "fixed", "inertialize", 40, 60, 10)
+    export(tmp_path / "out", clips, list(clips.values()), [row], None)
     script = (
         f"require('{VALIDATOR}').validateBytes(new Uint8Array(require('fs').readFileSync('out/clips.glb')))"
         ".then(found => console.log(JSON.stringify(found)))"
     )
     found = json.loads(ran("node", "-e", script, cwd=tmp_path))
     assert found["issues"]["messages"] == []
-    assert found["info"]["animationCount"] == 2
+    assert found["info"]["animationCount"] == 3
 
 
 MAIN = """using System;
@@ -337,8 +380,8 @@ def test_the_importer_for_unreal_sets_the_transition_of_each_number(
     back = Advised("out/run", "slow walk", "velocity", "dead-blend", 20, 30, 7)
     machine = export(tmp_path / "out", clips, list(clips.values()), [there, back], None)
     runpy.run_path(str(tmp_path / "out" / "segue-unreal.py"))
-    durations = [one["duration_s"] for one in machine["transitions"]]
-    assert [node.told.get("crossfade_duration") for node in nodes] == [durations[1], durations[0], None]
+    fade_s = machine["transitions"][0]["duration_s"]
+    assert [node.told.get("crossfade_duration") for node in nodes] == [pytest.approx(8 / 30), fade_s, None]
     assert nodes[0].told["logic_type"] is unreal.TransitionLogicType.TLT_INERTIALIZATION
     assert nodes[1].told["logic_type"] is unreal.TransitionLogicType.TLT_STANDARD_BLEND
     unreal.BlueprintEditorLibrary.compile_blueprint.assert_called_once_with(blueprint)

@@ -1,5 +1,5 @@
-// Unity: makes an Animator Controller of state_machine.json: a state for each clip, a trigger for each destination. Put
-// it into a folder called Editor, import clips.glb (with glTFast), select state_machine.json, and choose
+// Unity: makes an Animator Controller of state_machine.json: a state for each clip and for each transition that is no
+// fade, a trigger for each destination. Put it into a folder called Editor, import clips.glb (with glTFast), select state_machine.json, and choose
 // Assets > Segue > Make Animator Controller.
 using System;
 using System.Collections.Generic;
@@ -11,11 +11,14 @@ using UnityEngine;
 
 public static class SegueImporter {
     // Fields are called as the keys of the JSON are.
-    [Serializable] public class State { public string name, animation; }
+    [Serializable] public class State {
+        public string name, animation;
+        public float length_s;
+    }
 
     [Serializable] public class Transition {
-        public string source, destination;
-        public float start_normalised, offset_normalised, duration_s;
+        public string source, destination, animation;
+        public float start_normalised, offset_s, duration_s;
     }
 
     [Serializable] public class Machine {
@@ -37,24 +40,38 @@ public static class SegueImporter {
         var clips = AssetDatabase.LoadAllAssetsAtPath(file).OfType<AnimationClip>().ToList();
         var controller = AnimatorController.CreateAnimatorControllerAtPath(Path.Combine(folder, "Segue.controller"));
         var states = new Dictionary<string, AnimatorState>();
-        foreach (State one in machine.states) {
-            AnimatorState state = controller.layers[0].stateMachine.AddState(one.animation.Replace('.', '_'));
-            state.motion = clips.FirstOrDefault(clip => clip.name == one.animation);
+        Func<string, AnimatorState> added = animation => {
+            AnimatorState state = controller.layers[0].stateMachine.AddState(animation.Replace('.', '_'));
+            state.motion = clips.FirstOrDefault(clip => clip.name == animation);
             if (state.motion == null) {
-                Debug.LogWarning("Segue: expected an animation " + one.animation + " in " + file + ", found none.");
+                Debug.LogWarning("Segue: expected an animation " + animation + " in " + file + ", found none.");
             }
-            states[one.name] = state;
+            return state;
+        };
+        foreach (State one in machine.states) {
+            states[one.name] = added(one.animation);
             controller.AddParameter(one.name, AnimatorControllerParameterType.Trigger);
         }
         foreach (Transition one in machine.transitions) {
-            AnimatorStateTransition made = states[one.source].AddTransition(states[one.destination]);
+            bool fades = string.IsNullOrEmpty(one.animation);
+            float length = machine.states.First(state => state.name == one.destination).length_s;
+            AnimatorState next = fades ? states[one.destination] : added(one.animation);
+            AnimatorStateTransition made = states[one.source].AddTransition(next);
             made.AddCondition(AnimatorConditionMode.If, 0f, one.destination);
-            made.hasExitTime = true;
-            made.exitTime = one.start_normalised; // where the fade starts, of the source's length
-            made.hasFixedDuration = true;
-            made.duration = one.duration_s;
-            made.offset = one.offset_normalised; // where the destination starts, of its length
+            // Where the source is left, of its length; for how long both play; where the destination starts, of its own.
+            Set(made, one.start_normalised, fades ? one.duration_s : 0f, fades ? one.offset_s / length : 0f);
+            if (!fades) {
+                Set(next.AddTransition(states[one.destination]), 1f, 0f, (one.offset_s + one.duration_s) / length);
+            }
         }
         AssetDatabase.SaveAssets();
+    }
+
+    static void Set(AnimatorStateTransition made, float exitTime, float duration, float offset) {
+        made.hasExitTime = true;
+        made.exitTime = exitTime;
+        made.hasFixedDuration = true;
+        made.duration = duration;
+        made.offset = offset;
     }
 }

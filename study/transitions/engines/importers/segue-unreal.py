@@ -26,16 +26,18 @@ unreal.AssetToolsHelpers.get_asset_tools().import_asset_tasks([task])
 rows = dict(enumerate(machine["transitions"], start=1))
 for number, row in rows.items():
     places = f"at {row['start_s']:.3f} s, enters at {row['offset_s']:.3f} s, takes {row['duration_s']:.3f} s"
-    unreal.log(f"Segue {number}: {row['source']} to {row['destination']} {places}")
+    made = f", made as {row['animation']}" if row["animation"] else ""
+    unreal.log(f"Segue {number}: {row['source']} to {row['destination']} {places}{made}")
 blueprints = [one for one in unreal.EditorUtilityLibrary.get_selected_assets() if isinstance(one, unreal.AnimBlueprint)]
 for blueprint in blueprints:
     for node in [graph.get_outer() for graph in unreal.BlueprintEditorLibrary.list_graphs(blueprint)]:
         row = isinstance(node, unreal.AnimStateTransitionNode) and rows.get(node.get_editor_property("priority_order"))
         if row:
-            # Makes that Unreal has as a node of its own are asked of it, in place of a fade.
+            # Makes that Unreal has as a node of its own are asked of it, for as long as the fade would last.
             inertial = row["make"] in ("inertialize", "inertialize-quintic", "dead-blend")
+            fade_s = (row["blend_frames"] + 1) / row["fps"] if row["animation"] else row["duration_s"]
             kind = "TLT_INERTIALIZATION" if inertial else "TLT_STANDARD_BLEND"
-            node.set_editor_property("crossfade_duration", row["duration_s"])
+            node.set_editor_property("crossfade_duration", fade_s)
             node.set_editor_property("blend_mode", unreal.AlphaBlendOption.LINEAR)
             node.set_editor_property("logic_type", getattr(unreal.TransitionLogicType, kind))
     unreal.BlueprintEditorLibrary.compile_blueprint(blueprint)

@@ -1,10 +1,11 @@
 # Plays a state machine of `segue export-engine`, in Godot 3.2 and later, and in Godot 4: an AnimationTree fades from
-# clip to clip, and the model is moved so that each clip goes on where the last one has come to.
+# clip to clip, or plays what was made between them, and the model is moved so that each clip goes on where the last one
+# has come to.
 #
 #     var character = preload("res://segue_player.gd").new()
 #     character.setup($clips, "res://state_machine.json", "walk")  # $clips is the scene of clips.glb
 #     add_child(character)
-#     character.travel("run")  # fades at the point that Segue chose; false where the clip is past it
+#     character.travel("run")  # goes over at the point that Segue chose; false where the clip is past it
 extends Node
 
 const CLOSE = 1e-5  # seconds, to which times are the same
@@ -43,7 +44,7 @@ func setup(model, path, first):
 		_tree.tree_root.add_node(slot + "_at", AnimationNodeTimeSeek.new())
 		_tree.tree_root.connect_node(slot + "_at", 0, slot)
 		_tree.tree_root.connect_node("fade", int(slot == "destination"), slot + "_at")
-		_play(slot, first)
+		_play(slot, states[first]["animation"])
 	model.add_child(_tree)
 	_tree.anim_player = _tree.get_path_to(_find(model, ["AnimationPlayer"]))
 	_tree.set("callback_mode_process" if _four else "process_mode", 2)  # by hand, in `_pose`
@@ -56,7 +57,7 @@ func travel(to):
 	for one in machine["transitions"]:
 		if one["source"] == state and one["destination"] == to and time < one["start_s"] + CLOSE:
 			coming = one
-			_play("destination", to)
+			_play("destination", one["animation"] if one["animation"] else states[to]["animation"])
 			return true
 	return false
 
@@ -73,12 +74,13 @@ func advance(delta):
 		_placed = _placed * _at(Vector3(0, 1, 0), coming["turn_radians"], shift)
 		state = coming["destination"]
 		coming = null
-		_play("source", state)
+		_play("source", states[state]["animation"])
 	var since = -1.0 if coming == null else time - coming["start_s"]
 	var share = 0.0 if coming == null else max(0.0, since / coming["duration_s"])
-	_pose(share)
+	var made = share > 0.0 and coming["animation"]
+	_pose(1.0 if made else share)
 	_model.transform = _start * _placed
-	if share > 0.0:
+	if share > 0.0 and not made:
 		if _four:
 			# Trees of Godot 4 blend rotations about the rest pose, off by centimetres; this is the shortest way.
 			var from = _rotations(0.0)
@@ -92,13 +94,15 @@ func advance(delta):
 		_model.transform = _start * _placed * root * _skeleton.get_bone_global_pose(0).affine_inverse()
 
 
-func _play(slot, name):
-	_tree.tree_root.get_node(slot).animation = states[name]["animation"]
+func _play(slot, animation):
+	_tree.tree_root.get_node(slot).animation = animation
 
 
 func _pose(share):
 	var seek = "seek_request" if _four else "seek_position"
-	var entered = 0.0 if coming == null else max(0.0, time - coming["start_s"] + coming["offset_s"])
+	var entered = 0.0
+	if coming != null:
+		entered = max(0.0, time - coming["start_s"] + (0.0 if coming["animation"] else coming["offset_s"]))
 	_tree.set("parameters/source_at/" + seek, min(time, states[state]["length_s"]))
 	_tree.set("parameters/destination_at/" + seek, entered)
 	_tree.set("parameters/fade/blend_amount", share)
