@@ -198,7 +198,7 @@ def rating_answers(rng, people, better, own, place):
 def ratings(studies, seed):
     """Type I error and power of every test of the methods, by how alike one person's ratings are."""
     print("ratings: how often the methods are found to differ at .05 (26 people, two ratings each)")
-    names = ("published F", "t", "mixed design", "Wilcoxon", "ordinal")
+    names = ("published F", "t", "mixed design", "Wilcoxon")
     print(f"{'people sd':>9} {'effect':>6}  " + "  ".join(names))
     for own, better in ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.7)):
         rng, rows, spent = np.random.default_rng([seed, 4, int(10 * own), int(10 * better)]), [], 0.0
@@ -216,14 +216,12 @@ def ratings(studies, seed):
 def _p_values(question):
     """The p-values of the methods, test by test."""
     within = {row.source: row for row in question.mixed_design.effects}
-    ordinal = question.ordinal
     people = question.ranks.participants
     return (
         question.anova[0].p_value if question.anova else None,
         question.difference.p_value,
         within["method"].p_value if within else None,
         people.p_value if people else None,
-        ordinal.effects[0].p_value if ordinal.effects else None,
     )
 
 

@@ -166,6 +166,7 @@ def analyse_folder(
     settings = Settings(
         threshold=decided.threshold,
         alpha=decided.alpha,
+        confidence=1 - decided.alpha,
         resamples=resamples,
         margin=decided.equivalence_points / 100.0,
         scale_points=protocol.scale_points,

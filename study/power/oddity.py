@@ -21,19 +21,18 @@ from study.models.oddity import CHANCE, HALFWAY, d_prime_of
 from study.models.population import probability_odd_found
 from study.power.curve import Run
 from study.power.design import Design, Effect
-from study.power.same_different import level_study, narrow, threshold_numbers
+from study.power.same_different import Conditions, level_study, narrow, threshold_numbers
 from study.tasks.observer import ObserverSettings, default_observer
 
 
 def oddity_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
     """Return thresholds shorter and longer, how participants differ, and how precisely both are to be told."""
-    del decided
-    precision = options["precision"]
+    precision, confidence = options["precision"], 1 - decided.alpha
     return Effect(
         **threshold_numbers(oddity_observer, options),
-        test="width of the mixed model's 95% intervals of a typical participant's thresholds",
+        test=f"width of the mixed model's {100 * confidence:g}% intervals of a typical participant's thresholds",
         aim=f"tell both thresholds to ± {precision:g} frames",
-        study=lambda design: oddity_study(design, precision),
+        study=lambda design: oddity_study(design, precision, confidence),
         found=lambda analysis: oddity_found(analysis, study.name, precision),
     )
 
@@ -57,16 +56,16 @@ def _told(found: Sequence[TypicalThreshold | str | None], precision: float) -> b
     return len(known) == len(found) and narrow([Interval(one.low, one.high) for one in known], precision)
 
 
-def oddity_study(design: Design, precision: float) -> Run:
+def oddity_study(design: Design, precision: float, confidence: float) -> Run:
     """Whether the intervals of a typical participant's thresholds are as narrow as asked."""
     model = make_model("2afc", choices=3)
 
-    def told(levels: FloatArray, right: FloatArray, shown: FloatArray) -> bool:
-        people = len(right)
-        counts = {"yes": right.ravel(), "shown": shown.ravel()}
+    def told(conditions: Conditions, right: FloatArray, shown: FloatArray) -> bool:
+        people, levels = len(right), conditions.differences
+        counts = {"yes": right.ravel(), "shown": shown.ravel(), "motion": np.tile(conditions.motions, people)}
         table = pd.DataFrame({"participant": np.repeat(np.arange(people), len(levels)).astype(str), **counts})
         table["level"], side = np.tile(np.abs(levels), people), np.tile(np.sign(levels), people)
         parts = [part for sign in (-1, 1) if len(part := table[(side == sign) & (table["shown"] > 0)])]
-        return _told([typical_threshold(part, model, 0.95) for part in parts], precision)
+        return _told([typical_threshold(part, model, confidence) for part in parts], precision)
 
     return level_study(design, probability_odd_found, CHANCE, told)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from study.analysis.analyse import Analysis
 from study.analysis.estimates import Interval
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import Counts
-from study.analysis.same_different.model import ModelFit, fit_model
+from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.arrays import BoolArray, FloatArray
 from study.experiment.observers import person
 from study.experiment.protocol.studies import AnalysisSettings
@@ -28,9 +28,9 @@ def same_different_effect(study: StudySpec, options: Mapping[str, float], decide
     precision = options["precision"]
     return Effect(
         **threshold_numbers(same_different_observer, options),
-        test="width of the differencing model's 95% intervals",
+        test=f"width of the median observer's {100 - 100 * decided.alpha:g}% intervals, mixed differencing model",
         aim=f"tell both thresholds to ± {precision:g} frames",
-        study=lambda design: same_different_study(design, precision, decided.threshold),
+        study=lambda design: same_different_study(design, precision, decided.threshold, 1 - decided.alpha),
         found=lambda analysis: thresholds_found(analysis, study.name, precision),
     )
 
@@ -52,13 +52,13 @@ def narrow(ends: Collection[Interval], precision: float) -> bool:
 
 
 def thresholds_found(analysis: Analysis, name: str, precision: float) -> bool:
-    """Return whether the model's intervals of both thresholds are as narrow as asked."""
+    """Return whether the intervals of both thresholds of the median observer are as narrow as asked."""
     result = analysis.of(SameDifferent).get(name)
-    return _told(result.model if result else None, precision)
+    return _told(result.mixed if result else None, precision)
 
 
-def _told(model: ModelFit | str | None, precision: float) -> bool:
-    return isinstance(model, ModelFit) and narrow([found.interval for found in model.jnd.values()], precision)
+def _told(mixed: MixedThresholds | str | None, precision: float) -> bool:
+    return isinstance(mixed, MixedThresholds) and narrow([one.interval for one in mixed.typical.values()], precision)
 
 
 def same_different_observer(shorter: float, longer: float, spread: float, missed: float) -> ObserverSettings:
@@ -68,22 +68,30 @@ def same_different_observer(shorter: float, longer: float, spread: float, missed
     return replace(settings, same_different=typical, missed=missed)
 
 
-def same_different_study(design: Design, precision: float, level: float) -> Run:
-    """Whether the model's intervals of both thresholds are as narrow as asked (half their width, in frames)."""
+def same_different_study(design: Design, precision: float, level: float, confidence: float) -> Run:
+    """Whether the median observer's intervals of both thresholds are as narrow as asked (half their width, frames)."""
 
-    def told(levels: FloatArray, different: FloatArray, shown: FloatArray) -> bool:
+    def told(conditions: Conditions, different: FloatArray, shown: FloatArray) -> bool:
         names = tuple(str(place) for place in range(len(shown)))
-        fit = fit_model(Counts(names, levels, different, shown), level=level) if names else None
-        return _told(fit, precision)
+        counts = Counts(names, conditions.differences, different, shown, conditions.motions)
+        return _told(fit_mixed_thresholds(counts, level=level, confidence=confidence) if names else None, precision)
 
     return level_study(design, probability_different, 0.5, told)
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """What was shown: the motion and the difference in frames of each column of counts."""
+
+    motions: tuple[str, ...]
+    differences: FloatArray
 
 
 def level_study(
     design: Design,
     probability: Callable[[SameDifferentObserver, FloatArray], FloatArray],
     hardest: float,
-    found: Callable[[FloatArray, FloatArray, FloatArray], bool],
+    found: Callable[[Conditions, FloatArray, FloatArray], bool],
 ) -> Run:
     """Studies over differences of blend length.
 
@@ -94,10 +102,15 @@ def level_study(
     hardest
         Where that response takes longest: the probability of an observer who does not know.
     found
-        What a study found, from the differences and counts of the responses and of all, shape (participants, levels).
+        What a study found, from counts of the responses and of all, shape (participants, conditions).
     """
-    asked = np.array([[float(trial.difference_frames or 0) for trial in own] for own in design.trials()])
-    levels = np.unique(asked)
+    trials = design.trials()
+    asked = np.array([[float(trial.difference_frames or 0) for trial in own] for own in trials])
+    shown_in = [[(trial.motion, float(trial.difference_frames or 0)) for trial in own] for own in trials]
+    pairs = sorted({pair for own in shown_in for pair in own})
+    conditions = Conditions(tuple(motion for motion, _ in pairs), np.array([level for _, level in pairs]))
+    place_of = {pair: place for place, pair in enumerate(pairs)}
+    column = np.array([[place_of[pair] for pair in own] for own in shown_in])
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
         people = max(sizes)
@@ -111,12 +124,12 @@ def level_study(
             counted = rng.random(chance.shape) < chance
             response_s, given = times(design, rng, (np.abs(chance - hardest) / (1 - hardest))[None])
             kept = kept_of(design, rng, response_s, given)[0]
-            at = asked[:people, :, None] == levels
+            at = column[:people, :, None] == np.arange(len(pairs))
             shown = (at & kept[:, :, None]).sum(axis=1).astype(float)
             yes = (at & (kept & counted)[:, :, None]).sum(axis=1).astype(float)
             for place, size in enumerate(sizes):
                 there = shown[:size].sum(axis=1) > 0
-                verdicts[number, place] = found(levels, yes[:size][there], shown[:size][there])
+                verdicts[number, place] = found(conditions, yes[:size][there], shown[:size][there])
         return verdicts
 
     return run

@@ -45,7 +45,6 @@ RIGHT: Mapping[str, tuple[Callable[[SameDifferentObserver, FloatArray], FloatArr
 
 def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
     """Return thresholds shorter and longer, how participants differ, and how precisely all are to be told."""
-    del decided
     if study.task not in OBSERVERS:
         raise AnalysisError(f"{study.name}: expected one of the tasks {', '.join(OBSERVERS)}, found {study.task!r}")
     precision = options["precision"]
@@ -54,9 +53,10 @@ def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: An
     tracks = f"{rule.title}s"
     return Effect(
         **threshold_numbers(OBSERVERS[study.task], options),
-        test=f"width of the 95% intervals of the {tracks}' thresholds, Student's t over participants",
+        test=f"width of the {100 - 100 * decided.alpha:g}% intervals of the {tracks}' thresholds, "
+        "Student's t over participants",
         aim=f"tell the thresholds of the {tracks} to ± {precision:g} frames",
-        study=lambda design: staircase_study(design, precision),
+        study=lambda design: staircase_study(design, precision, 1 - decided.alpha),
         found=lambda analysis: staircases_found(analysis, study.name, precision),
         answers=trials_each,
     )
@@ -84,7 +84,7 @@ def _procedure(design: Design) -> Interleaving:
     return procedure
 
 
-def staircase_study(design: Design, precision: float) -> Run:
+def staircase_study(design: Design, precision: float, confidence: float) -> Run:
     """Whether the intervals of the staircases' thresholds are as narrow as asked (half their width, in frames)."""
     rule = _procedure(design).rule_of(design.study.task)
 
@@ -95,7 +95,7 @@ def staircase_study(design: Design, precision: float) -> Run:
             parts = [pd.DataFrame(_responses(design, seed, who, rng)) for who in range(max(sizes))]
             for place, size in enumerate(sizes):
                 kept, _ = exclude(pd.concat(parts[:size], ignore_index=True), design.rules)
-                verdicts[number, place] = _told(staircase_thresholds(kept, rule), precision)
+                verdicts[number, place] = _told(staircase_thresholds(kept, rule, confidence), precision)
         return verdicts
 
     return run

@@ -149,7 +149,7 @@ def exclusion_tables(analysis: Analysis) -> tuple[tables.Table, ...]:
     ]
     return rules, tables.make(
         "exclusions",
-        "Main results after exclusions, and for all responses, with 95% intervals over participants.",
+        "Main results after exclusions, and for all responses, with confidence intervals as in the headlines.",
         "result value low high p_value all_value all_low all_high all_p_value",
         rows,
         headings={"value": "by the rules"},

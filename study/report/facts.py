@@ -8,6 +8,7 @@ import platform
 import numpy as np
 
 import study
+from study.analysis.analyse import Analysis
 from study.analysis.quality import Quality
 from study.counting import counted
 from study.report import words
@@ -22,9 +23,9 @@ def who(quality: Quality) -> str:
     return words.joined([*parts, *([counted(simulated, "simulated observer")] if simulated else [])])
 
 
-def facts(material: Material, quality: Quality) -> tuple[str, ...]:
-    """Return what stands at the head of the page: who answered, how much, what was shown."""
-    manifest = material.manifest
+def facts(material: Material, analysis: Analysis) -> tuple[str, ...]:
+    """Return what stands at the head of the page: who answered, how much, what was shown, how sure results are."""
+    manifest, quality = material.manifest, analysis.quality
     motions = (
         "synthetic motions"
         if manifest.synthetic
@@ -35,6 +36,7 @@ def facts(material: Material, quality: Quality) -> tuple[str, ...]:
         f"{counted(quality.answered, 'answer')}, {quality.missed:,} missed",
         f"{counted(len(manifest.records), 'stimulus', 'stimuli')} at {manifest.fps:g} frames per second",
         motions,
+        f"significance level {analysis.alpha:g}, intervals of {100 * analysis.confidence:g}%",
     )
 
 

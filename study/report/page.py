@@ -76,7 +76,7 @@ def compose(material: Material, analysis: Analysis) -> Page:
     return Page(
         title=protocol.title,
         source=words.sentence(protocol.source),
-        facts=facts.facts(material, quality),
+        facts=facts.facts(material, analysis),
         warnings=tuple(words.warnings_of(analysis.data, manifest.synthetic, *asked)),
         comparison=_comparison(sections, analysis),
         sections=sections,
@@ -117,6 +117,7 @@ def _sections(material: Material, analysis: Analysis, mark: str) -> Iterator[Sec
             data=analysis.data,
             mark=mark,
             alpha=analysis.alpha,
+            confidence=analysis.confidence,
             points=study.scale_points,
             ends={item.name: (item.low, item.high) for item in study.items},
             transitions=tuple(transition.name for transition in protocol.transitions_of(study)),

@@ -14,7 +14,6 @@ from study.analysis.preference.analyse import Preference
 from study.analysis.quality import quality
 from study.analysis.ratings.analyse import Ratings
 from study.analysis.same_different.analyse import SameDifferent
-from study.analysis.same_different.motions import across_motions
 from study.analysis.study_result import Settings
 from study.analysis.to_json import to_json
 from study.errors import AnalysisError
@@ -83,21 +82,6 @@ def test_refusals() -> None:
 )
 def test_who_answered(simulated: list[bool], kind: str) -> None:
     assert kind_of_data(pd.DataFrame({"simulated": simulated})) == kind
-
-
-def test_motions_that_differ_are_told_from_motions_that_do_not(same_different_study: Simulate) -> None:
-    rng = np.random.default_rng(5)
-    alike = [across_motions(same_different_study(rng, participants=12, spread=0.2)).f_p_value for _ in range(40)]
-    easier = same_different_study(rng, participants=12, motions={"walking": 1.0, "running": 2.0, "turning": 0.6})
-    assert np.mean(np.array(alike) < 0.05) < 0.2
-    assert across_motions(easier).f_p_value < 0.001
-    assert across_motions(easier).chi_square_p_value < 0.001
-
-
-def test_too_few_participants_for_a_test_across_motions(same_different_study: Simulate) -> None:
-    result = across_motions(same_different_study(np.random.default_rng(5), participants=2))
-    assert result.f is None
-    assert "too few" in result.note
 
 
 def test_quality_counts_what_is_missing_and_implausible(same_different_study: Simulate) -> None:

@@ -109,8 +109,6 @@ def test_unreasonable_preferences(seed: int) -> None:
             assert result.motions_as_sample.both is None
         if people.p_value is None or people.low is None:
             assert people.note or result.published.answers == 0
-        if result.mixed.percent is None:
-            assert result.mixed.note
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -122,13 +120,7 @@ def test_unreasonable_ratings(seed: int) -> None:
     check(questions)
     for question in questions:
         assert question.anova or question.note
-        design, ordinal = question.mixed_design, question.ordinal
-        assert design.effects or design.note
-        assert ordinal.effects or ordinal.note
-        for effect in ordinal.effects:
-            if effect.standard_error is None:
-                assert effect.p_value is None
-                assert ordinal.note
+        assert question.mixed_design.effects or question.mixed_design.note
     anova_sentences(questions, 0.05)
 
 
@@ -140,7 +132,7 @@ def test_both_together_through_the_whole_analysis(seed: int) -> None:
 
 
 def test_a_perfect_preference_is_no_certainty() -> None:
-    """Six people always chose one method: the interval stays open, the exact test speaks, models say why they don't."""
+    """Six people always chose one method: the interval stays open, and the exact test speaks."""
     table = pd.DataFrame(
         [(f"p{p}", f"m{m}", "a", "b", bool(m % 2), True) for p in range(6) for m in range(4)],
         columns=["participant", "motion", "method_a", "method_b", "a_first", "chose_a"],
@@ -150,8 +142,6 @@ def test_a_perfect_preference_is_no_certainty() -> None:
     assert (people.test, people.low, people.high) == ("exact sign test", None, None)
     assert people.p_value == pytest.approx(2 * 0.5**6)
     assert result.published.interval.low < 1
-    assert result.mixed.p_value is None
-    assert "all answers are the same" in result.mixed.note
     assert "all answers are the same" in result.motions_as_sample.note
     assert result.no_preference.equivalence_p_value is None
 

@@ -24,7 +24,7 @@ from study.models.population import probability_odd_found
 from study.power import oddity
 from study.power.design import Design
 from study.power.registry import effect_of
-from study.power.same_different import level_study
+from study.power.same_different import Conditions, level_study
 from study.power.sessions import whole_sessions
 from study.power.staircases import staircase_effect
 from study.tasks.registry import task_of
@@ -35,6 +35,9 @@ name = "planned"
 title = "Planned"
 fps = 30
 seed = 5
+
+[analysis]
+alpha = 0.05
 
 [[transitions]]
 name = "slow_quick"
@@ -96,8 +99,8 @@ def share(run: Callable[..., np.ndarray], size: int, studies: int) -> float:
 def test_oddity_observers_are_right_as_often_as_percepts_drawn_one_by_one() -> None:
     design, seen, shown_in_all = design_of(PROTOCOL + LEVELS, 30), [], []
 
-    def note(levels: np.ndarray, right: np.ndarray, shown: np.ndarray) -> bool:
-        assert list(levels) == [-16, -8, -4, 4, 8, 16]
+    def note(conditions: Conditions, right: np.ndarray, shown: np.ndarray) -> bool:
+        assert list(conditions.differences) == [-16, -8, -4, 4, 8, 16]
         seen.append(right.sum(axis=0))
         shown_in_all.append(shown.sum(axis=0))
         return True
@@ -121,7 +124,7 @@ def test_the_verdict_on_a_study_is_that_of_the_whole_analysis(monkeypatch: pytes
         return typical_threshold(trials, *arguments)
 
     monkeypatch.setattr(oddity, "typical_threshold", kept)
-    oddity.oddity_study(design, 9.0)(np.random.default_rng(5), 1, [10])
+    oddity.oddity_study(design, 9.0, 0.95)(np.random.default_rng(5), 1, [10])
     rows = [
         {"participant": row.participant, "difference_frames": sign * row.level, "correct": right, "answer": "first"}
         for sign, table in zip((-1, 1), tables, strict=True)

@@ -12,6 +12,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from scipy import stats
 
 from study.errors import AnalysisError, SegueError
 from study.report.document import write_report
@@ -91,6 +92,23 @@ def test_every_study_has_a_headline_figures_and_tables(written: Path) -> None:
     for title, description in drawings:
         assert title in page.ids
         assert description in page.ids
+
+
+def test_intervals_are_those_of_the_protocols_alpha(written: Path) -> None:
+    """The protocol's alpha is .01: 99% in words, in the analysis, and by Student's t (over people: two motions)."""
+    text = Page.of(written).text
+    assert "significance level 0.01, intervals of 99%" in text
+    assert "95%" not in text
+    analysis = json.loads((written.parent / "tables" / "analysis.json").read_text(encoding="utf-8"))
+    assert {one["interval"]["confidence"] for one in analysis["headline"]} == {analysis["confidence"]} == {0.99}
+    for row in analysis["ratings"]["naturalness"]:
+        reach = stats.t.ppf(0.995, row["participants"] - 1) * row["standard_error"]
+        assert row["high"] - row["mean"] == pytest.approx(reach)
+    (compared,) = analysis["preference"]["geodesic_vs_fixed"]
+    for end in ("low", "high"):  # Wilson: where the share found is as many standard errors off as 99% leave
+        p, n = compared["published"]["interval"][end], compared["published"]["answers"]
+        off = compared["published"]["favouring"] / n - p
+        assert off**2 * n == pytest.approx(stats.norm.ppf(0.995) ** 2 * p * (1 - p), abs=1e-9)
 
 
 def test_simulated_answers_and_synthetic_motions_are_marked_at_the_top_and_on_every_figure(

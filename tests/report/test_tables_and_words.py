@@ -16,6 +16,7 @@ from study.analysis.same_different.counts import PercentDifferent, Side, Status,
 from study.report import words
 from study.report.media import _moments, strip_of_video
 from study.report.sections.same_different.section import headline
+from study.report.sections.section import About
 from study.report.tables import as_csv, as_json, make, p_value, written
 
 
@@ -77,7 +78,7 @@ def test_a_threshold_that_is_not_reached_is_said_to_be_so() -> None:
     note = "not reached within the levels shown (largest 20 frames: 60%)"
     published = {"longer": threshold("longer", None, note), "shorter": threshold("shorter", 8.0)}
     result = without_model(published=published, answers=84, participants=2)
-    said = headline(replace(result, model_note="every answer was “same”"), 30.0, "collected")
+    said = headline(replace(result, model_note="every answer was “same”"), About("jnd", "JND"))
     assert said.statement == (
         "The just noticeable difference of 2 people is estimated at 8.0 frames (0.27 s) shorter (75% “different”)."
     )
@@ -99,16 +100,16 @@ def level(frames: float, percent: float, low: float, high: float) -> PercentDiff
 )
 def test_a_threshold_outside_the_levels_is_bounded_by_them(levels: tuple[PercentDifferent, ...], expected: str) -> None:
     result = without_model(published=NOWHERE, percent_different=levels, answers=42, participants=1)
-    assert expected in headline(result, 30.0, "collected").statement
+    assert expected in headline(result, About("jnd", "JND")).statement
 
 
 def test_one_answer_is_no_evidence_for_a_bound() -> None:
     levels = (level(5, 100, 20, 100),)
     result = without_model(published=NOWHERE, percent_different=levels, answers=1, participants=1)
-    said = headline(result, 30.0, "collected").statement
+    said = headline(result, About("jnd", "JND")).statement
     assert said == "No just noticeable difference can be given from the answers of 1 person."
     missed = replace(result, answers=0, participants=0, missed=42)
-    assert "all 42 questions had no response" in headline(missed, 30.0, "collected").statement
+    assert "all 42 questions had no response" in headline(missed, About("jnd", "JND")).statement
 
 
 def test_intervals_with_open_ends_are_said_to_be_open() -> None:

@@ -19,7 +19,6 @@ from study.analysis.headline import Headline
 from study.analysis.preference.answers import preference_answers
 from study.analysis.preference.bradley_terry import BradleyTerry, fit_bradley_terry
 from study.analysis.preference.default_test import DefaultTest, default_test
-from study.analysis.preference.mixed import MixedPreference, mixed_preference
 from study.analysis.preference.motions import MotionsAsSample, motions_as_sample
 from study.analysis.preference.no_effect import MARGIN, NoEffect, no_preference
 from study.analysis.preference.order import ONE_ORDER, OrderEffect, order_effect
@@ -52,7 +51,6 @@ class Comparison:
     no_preference: NoEffect
     default: DefaultTest
     answer: str
-    mixed: MixedPreference
 
 
 @dataclass(frozen=True)
@@ -130,7 +128,6 @@ def compare(
                 no_preference=no_preference(chosen[shown > 0] / shown[shown > 0], margin, alpha),
                 default=default,
                 answer=_order_in_words(*names, order, alpha) or _in_words(*names, published, default, order, alpha),
-                mixed=mixed_preference(part, confidence),
             )
         )
     return tuple(results)

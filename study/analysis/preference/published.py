@@ -36,7 +36,7 @@ class Published:
 
 @dataclass(frozen=True)
 class MotionPreference:
-    """The pooled test of one motion pair; percent with Wilson's interval, the exact p-value adjusted by Holm."""
+    """How often the first method was favoured in one motion pair; percent with Wilson's interval."""
 
     motion: str
     favouring: int
@@ -44,10 +44,6 @@ class MotionPreference:
     percent: float | None
     low: float | None
     high: float | None
-    chi_square: float | None
-    p_value: float | None
-    exact_p_value: float | None
-    holm_p_value: float | None
     note: str
 
 
@@ -96,27 +92,12 @@ def without_ties(part: pd.DataFrame, confidence: float) -> Published:
 
 
 def by_motion(part: pd.DataFrame, confidence: float = 0.95) -> tuple[MotionPreference, ...]:
-    """Return the pooled test for every motion.
-
-    Where every participant saw a motion pair once, its answers are independent and these tests are valid.
-    """
+    """Return the preference in every motion; one motion's answers are independent where each participant gave one."""
     column = "motion" if "motion" in part.columns else "pair" if "pair" in part.columns else None
     groups = part.groupby(part[column].astype(str) if column else np.full(len(part), "all"), sort=False)
-    found = [(str(motion), without_ties(answers, confidence)) for motion, answers in groups]
-    exact = estimates.holm([test.exact_p_value for _, test in found])
-    return tuple(
-        MotionPreference(
-            motion=motion,
-            favouring=test.favouring,
-            answers=test.answers,
-            percent=test.percent,
-            low=None if test.interval.low is None else 100 * test.interval.low,
-            high=None if test.interval.high is None else 100 * test.interval.high,
-            chi_square=test.chi_square,
-            p_value=test.p_value,
-            exact_p_value=test.exact_p_value,
-            holm_p_value=adjusted,
-            note=test.note,
-        )
-        for (motion, test), adjusted in zip(found, exact, strict=True)
-    )
+    found = []
+    for motion, answers in groups:
+        test = without_ties(answers, confidence)
+        low, high = (None if end is None else 100 * end for end in (test.interval.low, test.interval.high))
+        found.append(MotionPreference(str(motion), test.favouring, test.answers, test.percent, low, high, test.note))
+    return tuple(found)

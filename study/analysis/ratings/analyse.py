@@ -1,4 +1,4 @@
-"""A rating study as a whole: its answers in; means, comparisons and cells out, or ratings of pairs."""
+"""A rating study as a whole: its answers in; means and comparisons out, or ratings of pairs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from study.analysis.headline import Headline, holds_for
 from study.analysis.ratings.answers import of_pairs
 from study.analysis.ratings.comparisons import MethodDifference, Question, rating_anova
 from study.analysis.ratings.pairs import PairQuestion, pair_ratings, pair_sentences
-from study.analysis.ratings.table import CellRating, MethodRating, rating_cells, rating_table
+from study.analysis.ratings.table import MethodRating, rating_table
 from study.analysis.study_result import Settings
 from study.counting import counted
 from study.errors import AnalysisError
@@ -22,13 +22,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Ratings:
-    """The result of a study in which transitions were rated by themselves: each method, methods compared, and cells."""
+    """The result of a study in which transitions were rated by themselves: each method, and methods compared."""
 
-    keys: ClassVar[Mapping[str, str]] = {"ratings": "table", "rating_anova": "questions", "rating_cells": "cells"}
+    keys: ClassVar[Mapping[str, str]] = {"ratings": "table", "rating_anova": "questions"}
 
     table: tuple[MethodRating, ...]
     questions: tuple[Question, ...]
-    cells: tuple[CellRating, ...]
 
     def sentences(self, alpha: float) -> list[str]:
         """Return the tests of each question in words, and the means."""
@@ -114,9 +113,7 @@ def analyse_ratings(answers: pd.DataFrame, name: str, settings: Settings) -> Rat
     """
     confidence = settings.confidence
     if not of_pairs(answers):
-        return Ratings(
-            rating_table(answers, confidence), rating_anova(answers, confidence), rating_cells(answers, confidence)
-        )
+        return Ratings(rating_table(answers, confidence), rating_anova(answers, confidence))
     if name not in settings.scale_points:
         raise AnalysisError(
             f"expected how many points the scale of {name!r} has, where pairs were rated, found none; name them in "
@@ -148,7 +145,6 @@ def anova_sentences(questions: Sequence[Question], alpha: float) -> list[str]:
         if len(question.differences) > 1:
             found.append(f"{name}: {_omnibus(question, alpha)}")
         found += [f"{name}: {_difference(row, alpha)}" for row in question.differences if row.participants]
-        found += [f"{name}: by the ordinal model, {question.ordinal.note}"] if question.ordinal.note else []
     return found
 
 

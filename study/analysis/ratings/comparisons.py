@@ -2,7 +2,7 @@
 
 As published (2003 section 4.2): a 2 x 2 analysis of variance between subjects, method by order of presentation. It
 treats the ratings of one participant as independent. Beside it are tests that do not: the difference over
-participants, the mixed design with participants as random, ranks, and an ordinal model of the points of a scale.
+participants (and motions), the mixed design with participants as random, and ranks.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from study.analysis import estimates
 from study.analysis.crossed import OVER_BOTH, GeneralTest, general_test
 from study.analysis.rank_tests import NO_RANKS, Friedman, RankTest, friedman, signed_rank
 from study.analysis.ratings.answers import first_seen, rated
-from study.analysis.regression.ordinal import fit_ordinal
 from study.analysis.variance.repeated_measures import WithinEffect, mixed_design
 from study.analysis.variance.two_way import TwoWay, two_way
 from study.arrays import FloatArray
@@ -59,29 +58,6 @@ class Ranks:
 
 
 @dataclass(frozen=True)
-class OrdinalEffect:
-    """An effect in logits, and as an odds ratio; None where it can't be estimated."""
-
-    name: str
-    value: float | None
-    standard_error: float | None
-    interval: estimates.Interval
-    p_value: float | None
-    odds_ratio: float | None
-
-
-@dataclass(frozen=True)
-class Ordinal:
-    """A cumulative-link mixed model; `note` says what is amiss."""
-
-    effects: tuple[OrdinalEffect, ...] = ()
-    spread: float | None = None
-    points: tuple[float, ...] = ()
-    thresholds: tuple[float, ...] = ()
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class Question:
     """Methods compared in one question.
 
@@ -97,7 +73,6 @@ class Question:
     difference: MethodDifference | None
     mixed_design: MixedDesign
     ranks: Ranks
-    ordinal: Ordinal
     note: str
 
 
@@ -137,7 +112,6 @@ def _question(name: str, part: pd.DataFrame, confidence: float) -> Question:
         difference=differences[0] if len(differences) == 1 else None,
         mixed_design=_mixed_design(part, 1 - confidence),
         ranks=Ranks(over, _ranks_note(over)),
-        ordinal=_ordinal(part, confidence),
         note=note,
     )
 
@@ -232,42 +206,3 @@ def _ranks_note(found: RankTest | None) -> str:
     if isinstance(found, Friedman) and found.f is None:
         return "all participants rank the methods alike: no F by ranks, but an exact p-value"
     return NO_RANKS if found is None else ""
-
-
-def _ordinal(part: pd.DataFrame, confidence: float) -> Ordinal:
-    """Cumulative-link mixed model: methods beside the first by name, and the place where each was shown once."""
-    methods = sorted(part["method_a"].unique())
-    columns = [(part["method_a"] == method).to_numpy(dtype=np.float64) for method in methods[1:]]
-    names = [f"{method} over {methods[0]}" for method in methods[1:]]
-    if not columns:
-        return Ordinal(note="one method: nothing to compare")
-    place = _shown_later(part)
-    shared = [place] if place is not None else []
-    design = np.column_stack([*columns, *shared])
-    who = part["participant"].to_numpy()
-    fit = fit_ordinal(design, part["rating"], who, names=[*names, "shown second"], confidence=confidence)
-    if isinstance(fit, str):
-        return Ordinal(note=fit)
-    return Ordinal(
-        effects=tuple(
-            OrdinalEffect(**vars(effect), odds_ratio=float(np.exp(effect.value)))
-            if effect.standard_error
-            else OrdinalEffect(**vars(effect) | {"value": None}, odds_ratio=None)
-            for effect in fit.effects
-        ),
-        spread=fit.spread,
-        points=fit.points,
-        thresholds=fit.thresholds,
-        note=fit.note,
-    )
-
-
-def _shown_later(part: pd.DataFrame) -> FloatArray | None:
-    """1 for what a participant saw second of two, 0 for the first; None where that is not the design, or not known."""
-    if "trial" not in part.columns or part["method_a"].nunique() != 2:
-        return None
-    seen = part.groupby("participant")["trial"]
-    if (seen.nunique() > 2).any() or part["trial"].isna().any() or part["order"].nunique() < 2:
-        return None
-    starts = part["method_a"] + " first" != part["order"]
-    return np.asarray(starts, dtype=np.float64)

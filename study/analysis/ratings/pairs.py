@@ -9,14 +9,13 @@ reference. The middle of the scale means no difference, and stays where it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from study.analysis import estimates
 from study.analysis.crossed import GeneralTest, general_test
-from study.analysis.estimates import Mean, MeanTest, mean_of, mean_test
 from study.analysis.rank_tests import NO_RANKS, signed_rank
 from study.analysis.ratings.answers import rated
 from study.counting import counted
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NEEDED_COLUMNS = ("participant", "answer", "method_a", "method_b", "a_first")
+ONE_ORDER = "one order of presentation: a difference cannot be separated from its effect"
 
 
 @dataclass(frozen=True)
@@ -48,46 +48,11 @@ class ScoreTest(GeneralTest):
 
 
 @dataclass(frozen=True)
-class MotionScore(MeanTest):
-    """The same for one motion, by Student's t, adjusted over the motions by Holm's method."""
-
-    motion: str
-    answers: int
-    holm_p_value: float | None
-
-
-@dataclass(frozen=True)
-class OrderScore(Mean):
-    """Scores where the method `first` was shown first."""
-
-    first: str
-    answers: int
-
-
-@dataclass(frozen=True)
-class OrderTest:
-    """How far a score depends on which method was shown first.
-
-    `kind` is "between" where each participant saw one order, as in 2003, else "within", and empty where there is one
-    order alone. F is of participants' means by order; within participants, t squared of their own differences.
-    """
-
-    rows: tuple[OrderScore, ...] = ()
-    kind: str = ""
-    f: float | None = None
-    degrees_of_freedom: int | None = None
-    error_degrees_of_freedom: int | None = None
-    p_value: float | None = None
-    balanced_mean: float | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class PairQuestion:
     """How method b compares with method a in one question.
 
     `middle` is the score that means no difference; `published` is of all answers, `participants` against the middle,
-    over motions too where there are enough, `motions` of one motion over participants.
+    over motions too where there are enough; `order_note` says so where one of the two was always shown first.
     """
 
     item: str
@@ -99,8 +64,7 @@ class PairQuestion:
     distribution: dict[str, int]
     published: AllAnswers
     participants: ScoreTest
-    order: OrderTest
-    motions: tuple[MotionScore, ...]
+    order_note: str
 
 
 def pair_ratings(answers: pd.DataFrame, points: int, confidence: float = 0.95) -> tuple[PairQuestion, ...]:
@@ -140,8 +104,7 @@ def pair_ratings(answers: pd.DataFrame, points: int, confidence: float = 0.95) -
                     note="" if several else "one answer: no spread",
                 ),
                 participants=_over_participants(part, middle, confidence),
-                order=order_effect(part, confidence),
-                motions=_motions(part, middle, confidence),
+                order_note="" if part["a_first"].nunique() > 1 else ONE_ORDER,
             )
         )
     return tuple(found)
@@ -180,66 +143,6 @@ def _over_participants(part: pd.DataFrame, middle: float, confidence: float) -> 
     note = "; ".join(filter(None, (found.note, NO_RANKS if by_ranks is None else "")))
     spread = float(means.std(ddof=1)) if len(means) > 1 else None
     return ScoreTest(**vars(found) | {"note": note}, standard_deviation=spread, signed_rank_p_value=by_ranks)
-
-
-def order_effect(part: pd.DataFrame, confidence: float = 0.95) -> OrderTest:
-    """Return how far a score depends on which method was shown first.
-
-    Parameters
-    ----------
-    part
-        Of one question: `participant`, `a_first`, `score`.
-    """
-    rows, groups = [], []
-    for a_first in (True, False):
-        own = part[part["a_first"] == a_first]
-        if len(own):
-            groups.append(_means(own))
-            first = str(own.iloc[0]["method_a" if a_first else "method_b"])
-            rows.append(OrderScore(**vars(mean_of(groups[-1], confidence)), first=first, answers=len(own)))
-    if len(groups) < 2:
-        return OrderTest(tuple(rows), note="one order of presentation: its effect can't be estimated")
-    balanced = float(np.mean([group.mean() for group in groups]))
-    between = not set(groups[0].index) & set(groups[1].index)
-    found = _between(*groups) if between else _within(*groups)
-    return replace(found, rows=tuple(rows), kind="between" if between else "within", balanced_mean=balanced)
-
-
-def _between(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
-    """Participants' means by order, between subjects as in 2003."""
-    left = len(first) + len(second) - 2
-    if left < 1:
-        return OrderTest(note="one participant in each order: the effect of order cannot be estimated")
-    squares = sum(float(((group - group.mean()) ** 2).sum()) for group in (first, second))
-    if squares <= 1e-12:
-        return OrderTest(note="all participants of an order gave the same scores: the effect of order can't be tested")
-    apart = float(first.mean() - second.mean())
-    return _tested(apart**2 / (1 / len(first) + 1 / len(second)) / (squares / left), left)
-
-
-def _within(first: pd.Series[float], second: pd.Series[float]) -> OrderTest:
-    """Each participant's own difference between the orders; those who saw only one order are excluded."""
-    test = mean_test(first - second, 0.0)
-    if test.t is None or test.degrees_of_freedom is None:
-        return OrderTest(note=f"effect of order: {test.note}")
-    return _tested(test.t**2, int(test.degrees_of_freedom))
-
-
-def _tested(f: float, left: int) -> OrderTest:
-    p_value = estimates.f_probability(f, 1, left)
-    return OrderTest(f=f, degrees_of_freedom=1, error_degrees_of_freedom=left, p_value=p_value)
-
-
-def _motions(part: pd.DataFrame, middle: float, confidence: float) -> tuple[MotionScore, ...]:
-    if "motion" not in part.columns:
-        return ()
-    groups = [(str(motion), own) for motion, own in part.groupby("motion", sort=False)]
-    tests = [mean_test(_means(own), middle, confidence) for _, own in groups]
-    adjusted = estimates.holm([test.p_value for test in tests])
-    return tuple(
-        MotionScore(**vars(test), motion=motion, answers=len(own), holm_p_value=p_value)
-        for (motion, own), test, p_value in zip(groups, tests, adjusted, strict=True)
-    )
 
 
 def pair_sentences(questions: Sequence[PairQuestion], alpha: float) -> list[str]:

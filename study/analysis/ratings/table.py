@@ -1,8 +1,4 @@
-"""Ratings of naturalness on a scale: answers of a rating task in, a table by method and one by order out.
-
-Wang & Bodenheimer 2003, section 4.2: cost function by presentation order. The order is the method that a participant
-saw first.
-"""
+"""Ratings of naturalness on a scale: answers of a rating task in, a table by method out (2003 section 4.2)."""
 
 from __future__ import annotations
 
@@ -10,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from study.analysis.estimates import Mean, mean_of
-from study.analysis.ratings.answers import first_seen, rated
+from study.analysis.ratings.answers import rated
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,13 +30,6 @@ class MethodRating(MeanRating):
     distribution: dict[str, int]
 
 
-@dataclass(frozen=True)
-class CellRating(MeanRating):
-    """How a method was rated by those who saw the method `order` first."""
-
-    order: str
-
-
 def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[MethodRating, ...]:
     """Return one entry a question and method: how it was rated.
 
@@ -62,32 +51,6 @@ def rating_table(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[Metho
             distribution={f"{value:g}": int(count) for value, count in values.value_counts().sort_index().items()},
         )
         for (item, name), values in part["rating"].groupby([part["item"], method], sort=True)
-    )
-
-
-def rating_cells(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[CellRating, ...]:
-    """Return one entry a question, method and order of presentation; none where one method was rated, or one order.
-
-    Parameters
-    ----------
-    answers
-        Of one rating study: `participant`, `method_a`, `answer`, and where they are known `item` and `trial`.
-
-    Raises
-    ------
-    AnalysisError
-        When an answer is not a number.
-    """
-    part = rated(answers)
-    if part.empty or "method_a" not in part.columns:
-        return ()
-    who, method = part["participant"].astype(str), part["method_a"].astype(str)
-    order = who.map(first_seen(answers))
-    if method.nunique() < 2 or order.nunique() < 2:
-        return ()
-    return tuple(
-        CellRating(**_mean(str(item), str(name), values, who, confidence), order=str(first))
-        for (item, name, first), values in part.groupby([part["item"], method, order], sort=False)["rating"]
     )
 
 

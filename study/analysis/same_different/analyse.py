@@ -1,7 +1,7 @@
 """A same-different study as a whole: its answers in, the just noticeable difference as published and corrected out.
 
-2004 section 5.1: percentages and 75% crossings for all motions together, and the statement that performance did not
-differ across motions. Beside it the differencing model, d-prime at each level, and both per motion.
+2004 section 5.1: percentages and 75% crossings for all motions together. Beside it the differencing model, d-prime at
+each level, and both per motion.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from study.analysis.same_different.d_prime import LevelDPrime, d_prime_table
 from study.analysis.same_different.interpolation import crossings
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
-from study.analysis.same_different.motions import AcrossMotions, across_motions
 from study.analysis.same_different.order import OrderTest, order_test
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
@@ -101,7 +100,6 @@ class SameDifferent(Thresholds):
     clustering: estimates.Clustering
     """How alike the answers of a participant are, at the pairs with a difference."""
     motions: tuple[MotionThresholds, ...]
-    across_motions: AcrossMotions
     order_test: OrderTest
     answer: str
     """The thresholds in sentences."""
@@ -188,7 +186,6 @@ def analyse_jnd(
         d_prime=d_prime_table(counts, confidence),
         clustering=estimates.clustering(counts.different[:, moved].sum(axis=1), counts.shown[:, moved].sum(axis=1)),
         motions=_by_motion(given, level, confidence, resamples, rng),
-        across_motions=across_motions(given),
         order_test=order_test(given),
         answer=in_words(found, _believed(found.model, among, len(counts.participants)), level),
     )

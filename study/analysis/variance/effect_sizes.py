@@ -1,8 +1,8 @@
 """How large an effect of an analysis of variance is: an F and its degrees of freedom in, shares of variance out.
 
-Partial eta squared describes the sample and is too large on average; partial omega squared is less biased. Both
-estimate one number, the share of variance that the effect explains beside the error, so one interval serves both: that
-of the noncentrality which makes the observed F just too large or too small (Steiger 2004, Psychological Methods 9).
+Partial eta squared is the share of variance that the effect explains beside the error. It describes the sample and is
+too large on average; its interval is that of the noncentrality which makes the observed F just too large or too small
+(Steiger 2004, Psychological Methods 9).
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ class Sizes:
 
     partial_eta_squared: float | None = None
     """Sum of squares of the effect over itself and the error's."""
-    partial_omega_squared: float | None = None
-    """The same with the part that chance puts into the effect taken out; not below 0."""
     effect_low: float | None = None
     effect_high: float | None = None
     """`effect_low`, `effect_high`: interval of the share in the population, of 1 - 2 alpha (90% for alpha .05): it
@@ -47,7 +45,6 @@ def sizes(f: float | None, degrees: float, error_degrees: float, alpha: float = 
     low, high = (_noncentrality(f, degrees, error_degrees, share) for share in (1 - alpha, alpha))
     return Sizes(
         partial_eta_squared=degrees * f / (degrees * f + error_degrees),
-        partial_omega_squared=max(degrees * (f - 1) / (degrees * f + error_degrees + 1), 0.0),
         effect_low=None if low is None else low / (low + total),
         effect_high=None if high is None else high / (high + total),
     )

@@ -3,7 +3,7 @@
 A mixed (split-plot) design: every participant gives a value for every combination of the factors within, such as method
 and motion, and belongs to one group, such as an order of presentation. Participants are random: each effect within is
 judged by how much it varies between them. Where an effect has several degrees of freedom, its test needs sphericity,
-and is corrected by how far that fails (Greenhouse & Geisser 1959; Huynh & Feldt 1976 as mended by Lecoutre 1991).
+and is corrected by how far that fails (Greenhouse & Geisser 1959).
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ from study.counting import counted
 class WithinEffect(Sizes):
     """An effect of a mixed design; F and tests are None where nothing varies that it could be judged by.
 
-    `epsilon` is Greenhouse & Geisser's, by which `corrected_p_value` is corrected; `generalized_eta_squared` (Olejnik &
-    Algina 2003) is comparable with a design between participants.
+    `epsilon` is Greenhouse & Geisser's, by which `corrected_p_value` is corrected.
     """
 
     source: str
@@ -38,13 +37,10 @@ class WithinEffect(Sizes):
     error_sum_of_squares: float
     error_degrees_of_freedom: int
     epsilon: float
-    huynh_feldt_epsilon: float
     mean_square: float
     f: float | None
     p_value: float | None
     corrected_p_value: float | None
-    huynh_feldt_p_value: float | None
-    generalized_eta_squared: float | None
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class _Stratum:
     error: str
     error_squares: float
     error_degrees: int
-    epsilons: tuple[float, float]
+    epsilon: float
 
 
 def mixed_design(
@@ -100,8 +96,7 @@ def mixed_design(
     for which in _subsets(len(levels)):
         scores = flat @ _contrasts(levels, which)
         strata.append(_stratum(scores, design, " x ".join(names[axis] for axis in which), between, left))
-    errors = sum(stratum.error_squares for stratum in strata)
-    return tuple(_finished(*effect, stratum, errors, alpha) for stratum in strata for effect in stratum.effects)
+    return tuple(_finished(*effect, stratum, alpha) for stratum in strata for effect in stratum.effects)
 
 
 def _subsets(factors: int) -> list[tuple[int, ...]]:
@@ -121,7 +116,7 @@ def _contrasts(levels: Sequence[int], which: Sequence[int]) -> FloatArray:
 def _stratum(scores: FloatArray, design: FloatArray, within: str, between: str, left: int) -> _Stratum:
     """What is judged by one error: the effect within itself, and how the groups differ in it.
 
-    One group alone leaves no effect between, but its error still counts in generalized eta squared.
+    One group alone leaves no effect between.
     """
     apart = scores - design @ np.linalg.lstsq(design, scores, rcond=None)[0]
     error, dimensions = float((apart**2).sum()), scores.shape[1]
@@ -135,30 +130,22 @@ def _stratum(scores: FloatArray, design: FloatArray, within: str, between: str, 
         kept = scores - others @ np.linalg.lstsq(others, scores, rcond=None)[0] if others.shape[1] else scores
         effects.append((name, max(float((kept**2).sum()) - error, 0.0), dimensions * len(columns)))
     judge = f"{within} x participants" if within else "participants"
-    epsilons = _epsilons(apart.T @ apart, left, design.shape[1])
-    return _Stratum(tuple(effects), judge, error, dimensions * left, epsilons)
+    return _Stratum(tuple(effects), judge, error, dimensions * left, _epsilon(apart.T @ apart))
 
 
-def _epsilons(products: FloatArray, left: int, groups: int) -> tuple[float, float]:
-    """Greenhouse-Geisser's and Huynh-Feldt's epsilon from the residuals' sums of products."""
-    dimensions = len(products)
+def _epsilon(products: FloatArray) -> float:
+    """Greenhouse-Geisser's epsilon from the residuals' sums of products."""
     squares = float((products**2).sum())
-    if dimensions == 1 or squares <= 0:
-        return 1.0, 1.0
-    greenhouse = float(np.trace(products)) ** 2 / (dimensions * squares)
-    people = left + groups
-    below = dimensions * (left - dimensions * greenhouse)
-    huynh = ((people - groups + 1) * dimensions * greenhouse - 2) / below if below > 0 else 1.0
-    return greenhouse, float(min(max(huynh, greenhouse), 1.0))
+    return 1.0 if len(products) == 1 or squares <= 0 else float(np.trace(products)) ** 2 / (len(products) * squares)
 
 
-def _finished(name: str, squares: float, degrees: int, stratum: _Stratum, errors: float, alpha: float) -> WithinEffect:
+def _finished(name: str, squares: float, degrees: int, stratum: _Stratum, alpha: float) -> WithinEffect:
     """An effect with its F, tests and sizes."""
     error, error_degrees = stratum.error_squares, stratum.error_degrees
     f = squares / degrees / (error / error_degrees) if error > 1e-12 * max(squares, 1.0) else None
-    p_value, corrected, huynh_feldt = (
+    p_value, corrected = (
         None if f is None else estimates.f_probability(f, degrees * share, error_degrees * share)
-        for share in (1.0, *stratum.epsilons)
+        for share in (1.0, stratum.epsilon)
     )
     return WithinEffect(
         source=name,
@@ -167,13 +154,10 @@ def _finished(name: str, squares: float, degrees: int, stratum: _Stratum, errors
         error=stratum.error,
         error_sum_of_squares=error,
         error_degrees_of_freedom=error_degrees,
-        epsilon=stratum.epsilons[0],
-        huynh_feldt_epsilon=stratum.epsilons[1],
+        epsilon=stratum.epsilon,
         mean_square=squares / degrees,
         f=f,
         p_value=p_value,
         corrected_p_value=corrected,
-        huynh_feldt_p_value=huynh_feldt,
-        generalized_eta_squared=None if f is None else squares / (squares + errors),
         **vars(sizes(f, degrees, error_degrees, alpha)),
     )

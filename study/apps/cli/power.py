@@ -82,7 +82,7 @@ def _sizes(text: str, option: str = "--participants", example: str = "10,20,40")
 @click.option("--spread", type=click.FloatRange(0, 1), default=0.15, show_default=True,
               help="Same-different, oddity: how participants differ.")  # fmt: skip
 @click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
-              help="Same-different, oddity: required half-width of the 95% intervals, frames.")  # fmt: skip
+              help="Same-different, oddity: required half-width of the intervals (1 - alpha), frames.")  # fmt: skip
 @click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=0.005, show_default=True,
               help="Share of trials without a response because of inattention, besides late responses.")  # fmt: skip
 @click.option("--studies", type=click.IntRange(min=10), help="Simulated studies.  [default: 1000; thresholds 200]")

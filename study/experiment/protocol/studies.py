@@ -237,7 +237,9 @@ class AnalysisSettings(Part):
     threshold: float = Field(
         default=0.75, gt=0, lt=1, description="Proportion that defines the just noticeable difference."
     )
-    alpha: float = Field(default=0.01, gt=0, lt=1, description="Significance level (2004 section 5.2).")
+    alpha: float = Field(
+        default=0.01, gt=0, lt=1, description="Significance level (2004 section 5.2); intervals are of 1 - alpha."
+    )
     equivalence_points: float = Field(
         default=10.0,
         gt=0,

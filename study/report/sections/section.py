@@ -72,7 +72,8 @@ class About:
     mark: str = ""
     """`data`, `mark`: whose answers they are, and what every figure says about its data."""
     alpha: float = 0.05
-    """Level of significance."""
+    confidence: float = 0.95
+    """`alpha`, `confidence`: level of significance, and confidence of intervals."""
     points: int = 5
     ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """`points`, `ends`: of a rating scale, counted from 0, and the words at its lowest and highest point, by
@@ -83,6 +84,11 @@ class About:
     """Blend length in frames of the first stimulus of each transition's pairs: k in a same-different study."""
     known: Mapping[str, Any] = field(default_factory=dict)
     """What is known of simulated observers; empty where people took part."""
+
+    @property
+    def interval(self) -> str:
+        """What an interval is called: "95% interval"."""
+        return f"{100 * self.confidence:g}% interval"
 
     def place(self, motion: str) -> int:
         """Where a motion stands in the protocol; the first participant's plan has another order."""
@@ -121,8 +127,8 @@ def readings_table(sections: Sequence[Section]) -> Table | None:
         ]
     return tables.make(
         "results",
-        "Every result as published and corrected, with 95% intervals in brackets. Published: the statistics of the "
-        "papers, which treat all responses as independent or interpolate thresholds linearly. Corrected: the "
+        "Every result as published and corrected, with confidence intervals in brackets. Published: the statistics of "
+        "the papers, which treat all responses as independent or interpolate thresholds linearly. Corrected: the "
         "participant is the unit, and thresholds come from a model of the task.",
         "result published corrected",
         rows,

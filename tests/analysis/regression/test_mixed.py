@@ -11,7 +11,6 @@ from scipy.integrate import quad
 from scipy.special import expit
 from scipy.stats import norm
 
-from study.analysis.preference.mixed import mixed_preference
 from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.regression.mixed import MixedFit, fit_mixed
 
@@ -59,20 +58,6 @@ def test_a_known_group_is_found_again_by_random_intercept_and_slope() -> None:
     assert found.slope_spread == pytest.approx(0.2, abs=0.07)
 
 
-def test_a_typical_participant_is_further_from_one_half_than_the_population() -> None:
-    rng = np.random.default_rng(3)
-    people = 120
-    chance = expit(1.2 + 1.5 * rng.normal(size=people))
-    first = np.tile([True, False], people * 4)
-    who = np.repeat(np.arange(people), 8)
-    chosen = rng.random(people * 8) < expit(np.log(chance / (1 - chance))[who] + np.where(first, 0.4, -0.4))
-    mixed = mixed_preference(pd.DataFrame({"participant": who, "chose_a": chosen.astype(float), "a_first": first}))
-    assert mixed.percent == pytest.approx(100 * expit(1.2), abs=6)
-    assert mixed.participants_spread == pytest.approx(1.5, abs=0.4)
-    assert mixed.order_logit == pytest.approx(0.8, abs=0.4)
-    assert 100 * chosen.mean() < mixed.percent - 2
-
-
 @pytest.mark.parametrize(
     ("yes", "people", "says"),
     [([8, 8, 8], 3, "all answers are the same"), ([0, 0], 2, "all answers are the same"), ([4], 1, "one participant")],
@@ -90,10 +75,6 @@ def test_missing_cells_and_empty_data() -> None:
     everyone_the_same = fit_mixed(np.ones((6, 1)), np.ones((6, 1)), [4] * 6, [8] * 6, range(6))
     assert isinstance(everyone_the_same, MixedFit)
     assert "spread" in everyone_the_same.note
-    alike = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": 1.0})
-    assert mixed_preference(alike).percent is None
-    separated = pd.DataFrame({"participant": list("aabbccddee"), "chose_a": [1.0, 0] * 5, "a_first": [True, False] * 5})
-    assert mixed_preference(separated).note
 
 
 def test_eight_participants_are_fast() -> None:

@@ -165,13 +165,10 @@ def test_a_group_that_is_not_there_is_said() -> None:
 def test_the_interval_of_an_effect_size_is_where_the_noncentral_f_puts_it() -> None:
     found = sizes(6.39, 1, 48)
     assert found.partial_eta_squared == pytest.approx(6.39 / (6.39 + 48))
-    assert found.partial_omega_squared == pytest.approx((6.39 - 1) / (6.39 + 48 + 1))
     for end, probability in ((found.effect_low, 0.95), (found.effect_high, 0.05)):
         assert end is not None
         assert stats.ncf.cdf(6.39, 1, 48, 50 * end / (1 - end)) == pytest.approx(probability, abs=1e-6)
-    none = sizes(0.5, 2, 30)
-    assert none.partial_omega_squared == 0
-    assert none.effect_low == 0
+    assert sizes(0.5, 2, 30).effect_low == 0
 
 
 def test_the_interval_of_an_effect_size_covers_as_often_as_it_says() -> None:
@@ -186,23 +183,14 @@ def test_the_interval_of_an_effect_size_covers_as_often_as_it_says() -> None:
 
 
 def test_tests_over_participants_agree_where_they_ask_the_same() -> None:
-    """Two methods, two groups: the mixed design's F of the methods is the square of a t; ranks and points agree."""
+    """Two methods, two groups: the mixed design's F of the methods is the square of a t; ranks agree."""
     question = rating_anova(rating_answers(np.random.default_rng(3), participants=40, better=1.0))[0]
     effects = {row.source: row for row in question.mixed_design.effects}
     assert list(effects) == ["order", "method", "method x order"]
     assert effects["method"].f == pytest.approx(question.difference.t**2, rel=0.05)
     assert effects["method"].error_degrees_of_freedom == 38
     assert question.ranks.participants.test == "Wilcoxon's signed ranks"
-    ordinal = question.ordinal.effects[0]
-    assert ordinal.name == "cut-wang2003 over cut-lee2002"
-    assert ordinal.odds_ratio > 2
-    for p_value in (
-        effects["method"].p_value,
-        question.ranks.participants.p_value,
-        ordinal.p_value,
-    ):
-        assert p_value < 0.01
-    assert [effect.name for effect in question.ordinal.effects] == [ordinal.name, "shown second"]
+    assert max(effects["method"].p_value, question.ranks.participants.p_value) < 0.01
 
 
 def test_motions_within_participants_are_a_factor_where_everybody_saw_them() -> None:

@@ -267,5 +267,4 @@ def test_ratings_all_alike_give_a_statement(fitted: Callable[..., dict[str, Any]
     rows = ["m,c,who", *(f"{m},3,p{person}" for person in range(4) for m in "ab")]
     found = fitted("\n".join(rows), "--task", "rating", "--answer", "c", "--method", "m", "--participant", "who")
     question = found["rating_anova"]["rating"][0]
-    assert question["ordinal"]["note"] == "all ratings alike: effects can't be estimated"
     assert question["difference"]["p_value"] is None

@@ -69,20 +69,13 @@ def test_what_is_worse_is_called_worse_and_one_question_is_told_by_its_mean() ->
     assert "was rated below the middle of the scale in 2 of 2 questions" in both.statement
 
 
-def test_the_tables_hold_published_and_corrected_orders_and_motions() -> None:
+def test_the_tables_hold_published_and_corrected_scores() -> None:
     section = section_of(TWO)
     assert [table.name for table in section.tables] == ["compared_published", "compared_corrected"]
-    assert [table.name for table in section.folded] == [
-        "compared_points",
-        "compared_orders",
-        "compared_order_effect",
-        "compared_motions",
-    ]
+    assert [table.name for table in section.folded] == ["compared_points"]
     points = {(row["item"], row["point"]): row["answers"] for row in section.folded[0].rows}
     assert points[("better", 3)] == 4
     assert sum(points.values()) == 16
-    assert [row["order"] for row in section.folded[1].rows[:2]] == ["old cut", "new cut"]
-    assert section.folded[2].rows[0]["error_degrees_of_freedom"] == 6
 
 
 def test_what_can_not_be_told_is_said() -> None:

@@ -8,7 +8,7 @@ import pandas as pd
 from study.analysis.crossed import GeneralTest
 from study.analysis.estimates import MeanTest
 from study.analysis.ratings.analyse import Ratings
-from study.analysis.ratings.comparisons import MethodDifference, MixedDesign, Ordinal, Question, Ranks, rating_anova
+from study.analysis.ratings.comparisons import MethodDifference, MixedDesign, Question, Ranks, rating_anova
 from study.analysis.ratings.table import MethodRating, rating_table
 from study.analysis.variance.two_way import VarianceEffect, VarianceRow
 from study.report.sections.ratings.section import ratings_section
@@ -29,7 +29,6 @@ def question(item: str, mean: float, f: float, p: float) -> Question:
         difference=difference,
         mixed_design=MixedDesign((), ("method",), 26, 0, ""),
         ranks=Ranks(None, ""),
-        ordinal=Ordinal(),
         note="",
     )
 
@@ -48,7 +47,7 @@ def shown(result: Ratings, about: About) -> Section:
 
 def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
     questions = (question("natural", 0.7, 6.39, 0.0148), question("smooth", 0.3, 1.2, 0.28))
-    section = shown(Ratings(ROWS, questions, ()), About("cuts", "Cuts"))
+    section = shown(Ratings(ROWS, questions), About("cuts", "Cuts"))
     (headline,) = section.headlines
     assert "was rated higher than" in headline.statement
     assert "in 2 of 2 questions, in 1 of them significantly at 0.05 across participants" in headline.statement
@@ -60,7 +59,7 @@ def test_the_headline_says_how_many_questions_and_with_which_f() -> None:
 
 
 def test_the_worse_method_is_not_called_better() -> None:
-    result = Ratings(ROWS, (question("natural", -0.7, 6.39, 0.0148),), ())
+    result = Ratings(ROWS, (question("natural", -0.7, 6.39, 0.0148),))
     (headline,) = shown(result, About("cuts", "Cuts")).headlines
     assert headline.statement == (
         "Cut-lee2002 was rated 0.70 points higher than cut-wang2003 on average, on a scale of 0 to 4; across "
@@ -80,7 +79,7 @@ def ratings_of(values: dict[str, list[float]]) -> pd.DataFrame:
 
 def section_of(values: dict[str, list[float]]) -> Section:
     answers = ratings_of(values)
-    return shown(Ratings(rating_table(answers), rating_anova(answers), ()), About("s", "Sliders", points=101))
+    return shown(Ratings(rating_table(answers), rating_anova(answers)), About("s", "Sliders", points=101))
 
 
 def test_three_methods_are_tested_together_and_in_pairs() -> None:
@@ -108,13 +107,10 @@ def test_participants_who_all_differ_alike_are_tested_by_signs() -> None:
     assert "A was rated 4.00 points higher than b" in section.headlines[0].statement
     told = "over participants, for these motions: −4.00 for every participant, exact sign test p < .001"
     assert told in section.headlines[0].detail
-    ordinal = next(table for table in section.folded if table.name == "s_ordinal")
-    assert ordinal.rows[0]["odds_ratio"] is ordinal.rows[0]["value"] is None
-    assert any("separate perfectly" in note for note in section.notes)
 
 
 def test_a_single_method_has_no_comparison() -> None:
-    section = shown(Ratings(ROWS[:1], (), ()), About("cuts", "Cuts"))
+    section = shown(Ratings(ROWS[:1], ()), About("cuts", "Cuts"))
     assert [table.name for table in section.tables] == ["cuts_ratings"]
     assert section.headlines[0].statement == "Natural: cut-lee2002 was rated 1.50 on average, on a scale of 0 to 4."
     assert "26 participants" in section.headlines[0].detail

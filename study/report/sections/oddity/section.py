@@ -29,8 +29,9 @@ def oddity_section(result: Oddity, about: About) -> Section | None:
     name = about.name
     known = [_recovered(name, result, about)] if about.known else []
     caption = (
-        "Right answers by difference in blend length: means over participants with 95% intervals (Student’s t), and "
-        "psychometric functions of all answers. The dashed line is chance; the dotted one, at 67%, defines thresholds."
+        "Right answers by difference in blend length: means over participants with confidence intervals (Student’s t), "
+        "and psychometric functions of all answers. The dashed line is chance; the dotted one, at 67%, defines "
+        "thresholds."
     )
     return Section(
         anchor=f"study-{name}",

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import replace
 
 from study.analysis.analyse import Analysis
 from study.analysis.crossed import OVER_BOTH
@@ -25,16 +24,13 @@ def pair_ratings_section(result: PairRatings, about: About) -> Section | None:
     """Return the section of a study in which pairs were rated; None without a question."""
     if not result.questions:
         return None
-    questions = [
-        replace(question, motions=tuple(sorted(question.motions, key=lambda row: about.place(row.motion))))
-        for question in result.questions
-    ]
+    questions = result.questions
     name, top = about.name, len(questions[0].distribution) - 1
     scale = f"on a scale of 0 to {top}; {questions[0].middle:g} means that both were the same"
     caption = (
         f"How {_other(questions[0])} compares with {_reference(questions[0])}, {scale}. Bars: answers at each point "
-        "with their counts, signed as comparison minus reference. Squares: mean over participants with 95% interval "
-        "(Student’s t)."
+        "with their counts, signed as comparison minus reference. Squares: mean over participants with confidence "
+        "interval (Student’s t)."
     )
     svg = likert_figure(questions, f"study-{name}-compared", about.mark, about.ends)
     return Section(
@@ -44,7 +40,7 @@ def pair_ratings_section(result: PairRatings, about: About) -> Section | None:
         drawings=(Drawing(f"{name}_compared", svg, caption),),
         tables=(published_table(name, questions), corrected_table(name, questions)),
         notes=tuple(dict.fromkeys(note for question in questions for note in _notes(question))),
-        folded=tuple(table for table in _folded(name, questions) if table.rows),
+        folded=(points_table(name, questions),),
         readings=tuple(_readings(questions)),
     )
 
@@ -121,7 +117,7 @@ def _published(found: AllAnswers) -> str:
 
 def _notes(question: PairQuestion) -> list[str]:
     """Why something could not be had."""
-    notes = (question.participants.note, question.order.note)
+    notes = (question.participants.note, question.order_note)
     return [f"{words.sentence(note)}." for note in notes if note]
 
 
@@ -149,15 +145,16 @@ def corrected_table(name: str, questions: Sequence[PairQuestion]) -> Table:
     """Return how the methods compare in each question, over participants."""
     return tables.make(
         f"{name}_corrected",
-        "Corrected: mean score with 95% interval, and tests against the middle of the scale, "
+        "Corrected: mean score with confidence interval, and tests against the middle of the scale, "
         f"{questions[0].middle:g}, by Student’s t and, of one mean a participant, by Wilcoxon’s signed ranks.",
         "item test participants mean low high t degrees_of_freedom p_value signed_rank_p_value",
         [vars(question.participants) | {"item": _item(question)} for question in questions],
     )
 
 
-def _folded(name: str, questions: Sequence[PairQuestion]) -> list[Table]:
-    counts = tables.make(
+def points_table(name: str, questions: Sequence[PairQuestion]) -> Table:
+    """Return how many answers each point of the scale has."""
+    return tables.make(
         f"{name}_points",
         "Answers at each point of the scale, signed as comparison minus reference.",
         "item point answers",
@@ -167,36 +164,6 @@ def _folded(name: str, questions: Sequence[PairQuestion]) -> list[Table]:
             for point, count in question.distribution.items()
         ],
     )
-    orders = tables.make(
-        f"{name}_orders",
-        "Scores by which was shown first. Means over participants with 95% intervals (Student’s t).",
-        "item order answers participants mean standard_error low high",
-        [
-            vars(row) | {"item": _item(question), "order": words.readable(row.first)}
-            for question in questions
-            for row in question.order.rows
-        ],
-    )
-    effects = tables.make(
-        f"{name}_order_effect",
-        "Effect of the order. Analysis of variance of participants’ means between the groups of 2003; where "
-        "participants saw both orders, of their own differences.",
-        "item kind f degrees_of_freedom error_degrees_of_freedom p_value",
-        [
-            vars(question.order) | {"item": _item(question), "kind": f"{question.order.kind} participants"}
-            for question in questions
-            if question.order.f is not None
-        ],
-        headings={"kind": "orders vary"},
-    )
-    motions = tables.make(
-        f"{name}_motions",
-        "Scores by motion: one mean a participant against the middle of the scale, p adjusted over the motions by "
-        "Holm’s method.",
-        "item motion answers participants mean low high t degrees_of_freedom p_value holm_p_value",
-        [vars(row) | {"item": _item(question)} for question in questions for row in question.motions],
-    )
-    return [counts, orders, effects, motions]
 
 
 # Beside the section
@@ -208,8 +175,7 @@ def _methods(found: Collection[PairRatings], analysis: Analysis) -> str:
     return (
         "The sign of comparisons on a scale was reversed where the order was reversed, so that scores compare the "
         "comparison with the reference. Mean scores were tested against the middle of the scale by Student’s t"
-        f"{f', {AS_SAMPLES},' if both else ''} and by Wilcoxon’s signed ranks over participants; between the orders by "
-        "analysis of variance."
+        f"{f', {AS_SAMPLES},' if both else ''} and by Wilcoxon’s signed ranks over participants."
     )
 
 

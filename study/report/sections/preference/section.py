@@ -59,7 +59,7 @@ def preference_section(result: Preference, about: About) -> Section | None:
     return Section(
         anchor=f"study-{name}",
         title=about.title,
-        headlines=tuple(headline(comparison) for comparison in comparisons),
+        headlines=tuple(headline(comparison, about) for comparison in comparisons),
         drawings=tuple(drawings),
         tables=tuple(shown),
         notes=tuple(notes),
@@ -71,13 +71,13 @@ def preference_section(result: Preference, about: About) -> Section | None:
 def _section_of_many(result: Preference, found: BradleyTerry, about: About) -> Section:
     """The section of many pairs of methods: strengths, with a row for each pair in place of a part of its own."""
     caption = (
-        f"Strengths of the methods in logits beside {words.readable(found.reference)}, with 95% intervals over "
+        f"Strengths of the methods in logits beside {words.readable(found.reference)}, with confidence intervals over "
         f"{_whose(found)}. A difference of 1 is a choice of 73 to 27%, of 2 one of 88 to 12%."
     )
     return Section(
         anchor=f"study-{about.name}",
         title=about.title,
-        headlines=(Headline(words.readable(strengths_in_words(found)), f"95% intervals over {_whose(found)}."),),
+        headlines=(Headline(words.readable(strengths_in_words(found)), f"{about.interval}s over {_whose(found)}."),),
         drawings=(
             Drawing(f"{about.name}_strengths", strengths_figure(found, f"study-{about.name}", about.mark), caption),
         ),
@@ -98,7 +98,7 @@ def _whose(found: BradleyTerry) -> str:
 
 def _drawing(name: str, comparison: Comparison, mark: str) -> Drawing:
     caption = (
-        "Answers that favoured the first method, for every motion pair with Wilson’s 95% interval; below, all answers "
+        "Answers that favoured the first method, for every motion pair with Wilson’s interval; below, all answers "
         f"as if independent (Wilson), and the default test ({comparison.default.test}). At the right, how many "
         "favoured it of how many answers."
     )
@@ -113,13 +113,13 @@ def methods_of(comparison: Comparison | ConfirmatoryTest) -> tuple[str, str]:
 # In words
 
 
-def headline(comparison: Comparison) -> Headline:
+def headline(comparison: Comparison, about: About) -> Headline:
     """Return a preference as a statement and what it rests on."""
     published, people, found = comparison.published, comparison.participants, comparison.default
     parts = []
     if found.low is not None:
         parts.append(
-            f"{found.percent:.1f}%; 95% interval over {found.generalises_to}: "
+            f"{found.percent:.1f}%; {about.interval} over {found.generalises_to}: "
             f"{words.interval(found.low, found.high, unit='%')}; {counted(people.participants, 'participant')}, "
             f"{counted(len(comparison.motions), 'motion')}."
         )
@@ -211,52 +211,27 @@ def _margin(found: NoEffect) -> str:
 def preference_table(name: str, comparison: Comparison) -> Table:
     """Return the tests of a preference, as published and corrected."""
     first, second = methods_of(comparison)
-    beyond = "Other participants and motions: the test that takes both for samples. "
-    return tables.make(
-        f"{name}_preference",
-        f"Percent favouring {first} over {second}. As published: all answers as independent (Wilson’s interval), "
-        "which a participant’s "
-        "answers are not. Corrected: each participant’s percentage, by Student’s t and by ranks. Orders balanced: the "
-        "mean of the percentages with the first method shown first and second. A typical participant: a model with a "
-        f"term for the order. {beyond if comparison.motions_as_sample.both else ''}The default test is "
-        f"{comparison.default.test}.",
-        "reading percent low:one high:one test statistic p_value",
-        [*_published_rows(comparison), *_corrected_rows(comparison), *_model_rows(comparison)],
-    )
-
-
-def _published_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    pooled = comparison.published
+    pooled, people, both = comparison.published, comparison.participants, comparison.motions_as_sample.both
     low, high = _percents(pooled.interval)
-    test = {"test": f"chi-square(1, N = {pooled.answers})", "statistic": pooled.chi_square}
-    return [
-        {"reading": "as published", "percent": pooled.percent, "low": low, "high": high, **test}
-        | {"p_value": pooled.p_value},
+    rows: list[dict[str, Any]] = [
+        {"reading": "as published", "percent": pooled.percent, "low": low, "high": high, "p_value": pooled.p_value}
+        | {"test": f"chi-square(1, N = {pooled.answers})", "statistic": pooled.chi_square},
         {"reading": "as published, exact", "test": "binomial", "p_value": pooled.exact_p_value},
-    ]
-
-
-def _corrected_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    people = comparison.participants
-    test = f"t({people.degrees_of_freedom})" if people.t is not None else people.test
-    ends = {"low": people.low, "high": people.high, "p_value": people.p_value}
-    return [
-        {"reading": "corrected", "percent": people.mean_percent, **ends, "test": test, "statistic": people.t},
-        {"reading": "corrected, by ranks", "test": "Wilcoxon", "p_value": people.wilcoxon_p_value},
-        {"reading": "orders balanced", "percent": comparison.order.balanced_percent, "test": ""},
-    ]
-
-
-def _model_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """The mixed model, and the test that holds for other participants and motions, where they could be had."""
-    typical, both = comparison.mixed, comparison.motions_as_sample.both
-    rows = []
-    if typical.percent is not None:
-        rows.append(vars(typical) | {"reading": "a typical participant", "test": "logistic mixed model"})
+        vars(people) | {"reading": "participants", "percent": people.mean_percent, "statistic": people.t}
+        | {"test": people.test if people.t is None else f"t({people.degrees_of_freedom})"},
+        {"reading": "participants, by ranks", "test": "Wilcoxon", "p_value": people.wilcoxon_p_value},
+    ]  # fmt: skip
     if both is not None:
         test = {"test": f"t({both.degrees_of_freedom:.3g})", "statistic": both.t}
-        rows.append(vars(both) | {"reading": "other participants and motions"} | test)
-    return rows
+        rows.insert(0, vars(both) | {"reading": "participants and motions"} | test)
+    return tables.make(
+        f"{name}_preference",
+        f"Percent favouring {first} over {second}. Participants and motions: both taken for samples. Participants: "
+        "each one’s percentage, which holds for these motions. As published: all answers as independent (Wilson’s "
+        f"interval), which a participant’s are not. The default test is {comparison.default.test}.",
+        "reading percent low:one high:one test statistic p_value",
+        rows,
+    )
 
 
 def motion_table(name: str, comparison: Comparison) -> Table:
@@ -264,9 +239,8 @@ def motion_table(name: str, comparison: Comparison) -> Table:
     rows = [vars(row) | {"motion": words.readable(row.motion)} for row in comparison.motions]
     return tables.make(
         f"{name}_preference_by_motion",
-        "Every motion pair. Wilson’s 95% interval, chi-square(1) as published, exact binomial test, and the "
-        "latter adjusted over the motions by Holm’s method.",
-        "motion favouring answers percent low:one high:one chi_square p_value exact_p_value holm_p_value",
+        "Every motion pair. Percentages with Wilson’s intervals.",
+        "motion favouring answers percent low:one high:one",
         rows,
     )
 
@@ -279,14 +253,12 @@ def order_table(name: str, comparison: Comparison) -> Table:
         {"reading": f"{second} shown first: favouring {first}", "percent": order.percent_a_second},
         {"reading": "favouring the one shown first", "percent": order.first_percent, "p_value": order.p_value},
     ]
-    if (logit := comparison.mixed.order_logit) is not None:
-        rows.append({"reading": "order in the mixed model", "order_logit": logit})
-        rows[-1]["p_value"] = comparison.mixed.order_p_value
+    if order.balanced_percent is not None:
+        rows.append({"reading": f"mean of both orders: favouring {first}", "percent": order.balanced_percent})
     return tables.make(
         f"{name}_order",
-        "How far the order of presentation decided. Percentages of answers, with Student’s t over participants; and "
-        "what being shown first adds in the mixed model, in logits.",
-        "reading percent order_logit p_value",
+        "How far the order of presentation decided. Percentages of answers, with Student’s t over participants.",
+        "reading percent p_value",
         rows,
     )
 
@@ -306,11 +278,11 @@ def no_preference_table(name: str, comparison: Comparison) -> Table:
     return tables.make(
         f"{name}_no_preference",
         "Evidence for no preference. Two one-sided t tests over participants (Schuirmann) that the share lies within "
-        f"{_margin(found)}, whose 90% interval then lies in it; and how many times likelier the data are without a "
-        "preference than with one (Bayes factor of Rouder et al. 2009, Cauchy prior of 0.71).",
+        f"{_margin(found)}, whose {100 * found.interval.confidence:g}% interval then lies in it; and how many times "
+        "likelier the data are without a preference than with one (Bayes factor of Rouder et al. 2009, Cauchy prior "
+        "of 0.71).",
         "margin percent low:one high:one equivalence_p_value bayes_factor_null",
         [row],
-        headings={"low": "90% from"},
     )
 
 
@@ -390,8 +362,7 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
     )
     return (
         f"Preferences were tested by {test}.{family} Chi-square and exact binomial tests of all responses are given as "
-        "published, with Wilson’s intervals. A logistic mixed model (random intercept, adaptive Gauss-Hermite "
-        "quadrature) accounts for the order of presentation. Evidence for no preference is an equivalence test "
+        "published, with Wilson’s intervals. Evidence for no preference is an equivalence test "
         f"(Schuirmann 1987) and a Bayes factor (Rouder et al. 2009).{strengths}"
     )
 

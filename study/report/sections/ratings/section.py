@@ -1,7 +1,7 @@
 """A rating study on the page: `rating_table` and `rating_anova` in, headline, figure, tables and notes out.
 
 2003 section 4.2: a two-way analysis of variance, method by order of presentation; beside it each participant's own
-difference between the methods, the mixed design, ranks, and an ordinal model.
+difference between the methods, the mixed design, and ranks.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def ratings_section(result: Ratings, about: About) -> Section | None:
     return Section(
         anchor=f"study-{name}",
         title=about.title,
-        headlines=(_headline(result, about.points, about.alpha),),
+        headlines=(_headline(result, about),),
         drawings=tuple(_drawings(result, about)),
         tables=(
             means_table(name, result.table),
@@ -47,31 +47,27 @@ def ratings_section(result: Ratings, about: About) -> Section | None:
 
 def _drawings(result: Ratings, about: About) -> list[Drawing]:
     name, mark, points = about.name, about.mark, about.points
-    scale = f"on a scale of 0 to {points - 1} with 95% intervals over participants (Student’s t)"
+    scale = f"on a scale of 0 to {points - 1} with confidence intervals over participants (Student’s t)"
     svg = figures.ratings_figure(result.table, f"study-{name}-ratings", mark, points)
-    drawings = [Drawing(f"{name}_ratings", svg, f"Mean ratings {scale}.")]
-    if result.cells:
-        svg = figures.cells_figure(result.cells, f"study-{name}-cells", mark, points)
-        drawings.append(Drawing(f"{name}_cells", svg, f"Mean ratings by method and by which was seen first, {scale}."))
-    return drawings
+    return [Drawing(f"{name}_ratings", svg, f"Mean ratings {scale}.")]
 
 
 # In words
 
 
-def _headline(result: Ratings, points: int, alpha: float) -> Headline:
+def _headline(result: Ratings, about: About) -> Headline:
     known = [
         (question, difference)
         for question in result.questions
         if (difference := question.difference) and difference.mean is not None
     ]
     if not known:
-        highest = _highest(result.table, points)
+        highest = _highest(result.table, about)
         return Headline(highest.statement, " ".join(filter(None, (highest.detail, _tests(result.questions)))))
-    return _of_one(*known[0], points, alpha) if len(known) == 1 else _of_several(known, alpha)
+    return _of_one(*known[0], about.points, about.alpha) if len(known) == 1 else _of_several(known, about.alpha)
 
 
-def _highest(rows: Sequence[MethodRating], points: int) -> Headline:
+def _highest(rows: Sequence[MethodRating], about: About) -> Headline:
     """The highest mean, or the only one, or that there is no highest."""
     top = max(row.mean or 0.0 for row in rows)
     best = [row for row in rows if row.mean == top]
@@ -80,8 +76,8 @@ def _highest(rows: Sequence[MethodRating], points: int) -> Headline:
     row = best[0]
     size = f"{counted(row.answers, 'answer')} of {counted(row.participants, 'participant')}"
     return Headline(
-        f"{words.sentence(what)} {verb} {top:.2f} on average, on a scale of 0 to {points - 1}.",
-        f"{size}; 95% interval over participants {words.interval(row.low, row.high, 2)}.",
+        f"{words.sentence(what)} {verb} {top:.2f} on average, on a scale of 0 to {about.points - 1}.",
+        f"{size}; {about.interval} over participants {words.interval(row.low, row.high, 2)}.",
     )
 
 
@@ -179,7 +175,7 @@ def _p_of(difference: MethodDifference) -> str:
 
 def _notes(question: Question) -> list[str]:
     """Why something could not be had."""
-    parts = [question.note, question.mixed_design.note, question.ranks.note, question.ordinal.note]
+    parts = [question.note, question.mixed_design.note, question.ranks.note]
     return [f"{words.sentence(note)}." for note in parts if note]
 
 
@@ -199,15 +195,15 @@ def means_table(name: str, rows: Sequence[MethodRating]) -> Table:
     """Return mean ratings by question and method."""
     return tables.make(
         f"{name}_ratings",
-        "Ratings by question and method. Mean over participants of their means, with its standard error and 95% "
-        "interval (Student’s t); standard deviation and median of all answers.",
+        "Ratings by question and method. Mean over participants of their means, with its standard error and "
+        "confidence interval (Student’s t); standard deviation and median of all answers.",
         "item method answers participants mean standard_error low high standard_deviation median",
         [_readable(row) for row in rows],
     )
 
 
 _VARIANCE = "item source degrees_of_freedom error_degrees_of_freedom"
-_EFFECT = "partial_eta_squared partial_omega_squared effect_low effect_high"
+_EFFECT = "partial_eta_squared effect_low effect_high"
 
 
 def _readable(row: MeanRating) -> dict[str, Any]:
@@ -227,7 +223,7 @@ def variance_table(name: str, questions: Sequence[Question]) -> Table:
         "As published: two-way analysis of variance between subjects, method by order of presentation. 2003 section "
         "4.2, "
         "type III sums of squares. It treats the ratings of one participant as independent; the next table does not. "
-        "Effect sizes with 90% intervals.",
+        "Effect sizes with intervals that exclude 0 where F is significant (of 1 − 2 alpha).",
         f"{_VARIANCE} sum_of_squares mean_square f p_value {_EFFECT}",
         _by_question(questions, lambda question: question.anova),
     )
@@ -238,26 +234,19 @@ def difference_table(name: str, questions: Sequence[Question]) -> Table:
     return tables.make(
         f"{name}_differences",
         "Corrected: difference between each participant’s ratings of two methods, of the same motion where motions are "
-        "a sample too. Mean, 95% interval, and test; p-values of several pairs adjusted by Holm’s method.",
+        "a sample too. Mean, confidence interval, and test; p-values of several pairs adjusted by Holm’s method.",
         "item of test mean low high t degrees_of_freedom p_value holm_p_value",
         _by_question(questions, lambda question: question.differences),
     )
 
 
 def _folded(name: str, result: Ratings) -> list[Table]:
-    """The cells of the design, and whatever other analyses could be made; those without a row are omitted."""
-    cells_table = tables.make(
-        f"{name}_cells",
-        "Ratings by method and by order of presentation. Order: the method that a participant saw first. Means over "
-        "participants with standard errors and 95% intervals (Student’s t).",
-        "item method order answers participants mean standard_error low high",
-        [_readable(row) | {"order": words.readable(row.order)} for row in result.cells],
-    )
+    """Whatever other analyses could be made; those without a row are omitted."""
     mixed = tables.make(
         f"{name}_mixed_design",
         "Mixed design: participants as random. Methods (and motions, if everybody rated all) vary within "
         "participants, the order between them; p corrected by Greenhouse and Geisser’s epsilon.",
-        f"{_VARIANCE} f p_value epsilon corrected_p_value generalized_eta_squared {_EFFECT}",
+        f"{_VARIANCE} f p_value epsilon corrected_p_value {_EFFECT}",
         _by_question(result.questions, lambda question: question.mixed_design.effects),
     )
     ranks = tables.make(
@@ -266,21 +255,7 @@ def _folded(name: str, result: Ratings) -> list[Table]:
         "item test f chi_square degrees_of_freedom error_degrees_of_freedom p_value",
         _by_question(result.questions, lambda question: [over] if (over := question.ranks.participants) else []),
     )
-    ordinal = tables.make(
-        f"{name}_ordinal",
-        "Ordinal mixed model. Points of the scale as ordinal, participants as random: effects in logits (above 0: "
-        "rated higher), as odds ratios, with 95% intervals.",
-        "item effect value standard_error low high odds_ratio p_value",
-        [
-            vars(effect)
-            | {"item": words.readable(question.item), "effect": words.readable(effect.name)}
-            | {"low": effect.interval.low, "high": effect.interval.high}
-            for question in result.questions
-            for effect in question.ordinal.effects
-        ],
-        headings={"value": "logits"},
-    )
-    return [table for table in (cells_table, mixed, ranks, ordinal) if table.rows]
+    return [table for table in (mixed, ranks) if table.rows]
 
 
 # Beside the section

@@ -14,7 +14,6 @@ from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import PRINTED, Side, Threshold
 from study.analysis.same_different.mixed import MixedThresholds
 from study.analysis.same_different.model import ModelFit
-from study.analysis.same_different.motions import AcrossMotions
 from study.analysis.same_different.staircases import Staircases
 from study.counting import counted
 from study.report import words
@@ -58,7 +57,7 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
     return Section(
         anchor=f"study-{name}",
         title=about.title,
-        headlines=(headline(result, about.fps, about.data),),
+        headlines=(headline(result, about),),
         drawings=tuple(_drawings(result, about)),
         tables=(
             threshold_table(name, result, about.fps),
@@ -84,14 +83,14 @@ def _drawings(result: SameDifferent, about: About) -> Iterator[Drawing]:
         "Answers “different” by the difference in blend length from k, the length that the reference method gives. "
         "Points: means over participants ± one standard error, interpolated linearly as in 2004. Blue "
         "curve: the median observer by the mixed model (without one, the differencing model of all answers); its drop "
-        "lines are the just noticeable differences, the bars at their feet 95% intervals.",
+        "lines are the just noticeable differences, the bars at their feet confidence intervals.",
     )
     yield Drawing(
         f"{name}_thresholds",
         figures.thresholds_figure(result, f"study-{name}-thresholds", mark, truth),
-        "The just noticeable difference with 95% intervals. All motions: of the median observer, as in the headline, "
-        "and by linear interpolation (Fieller’s, over participants); each motion: one model of all answers (jackknife "
-        "over participants). Without a bar, the interval reaches beyond the levels shown.",
+        "The just noticeable difference with confidence intervals. All motions: of the median observer, as in the "
+        "headline, and by linear interpolation (Fieller’s, over participants); each motion: one model of all answers "
+        "(jackknife over participants). Without a bar, the interval reaches beyond the levels shown.",
     )
     if len(result.motions) > 1:
         svg = figures.motions_figure(result, f"study-{name}-motions", mark)
@@ -105,22 +104,24 @@ def _drawings(result: SameDifferent, about: About) -> Iterator[Drawing]:
 # In words
 
 
-def headline(result: SameDifferent, fps: float, data: str) -> Headline:
+def headline(result: SameDifferent, about: About) -> Headline:
     """Return the just noticeable difference as a statement and what it rests on."""
     if not result.answers:
         missed = result.missed
         why = f"all {counted(missed, 'question')} had no response" if missed else "there are no answers"
         return Headline(f"No just noticeable difference can be given: {why}.", "")
-    who = SUBJECTS[data](result.participants)
+    who, fps = SUBJECTS[about.data](result.participants), about.fps
     found = result.believed
     places = _places(result, found.jnd if found else result.published, fps)
     if not places:
-        return Headline(f"No just noticeable difference can be given from the answers of {who}.", _detail(result))
+        return Headline(
+            f"No just noticeable difference can be given from the answers of {who}.", _detail(result, about)
+        )
     of = f"the median of {who}" if result.mixed else who
     statement = f"The just noticeable difference of {of} is estimated at {places} ({_percent(result)} “different”)"
     if found and (free := _places(result, found.criterion_free, fps, told_beyond=False)):
         statement += f"; whatever the criterion, at {free}"
-    return Headline(f"{statement}.", _detail(result))
+    return Headline(f"{statement}.", _detail(result, about))
 
 
 def _percent(result: SameDifferent) -> str:
@@ -150,13 +151,13 @@ def _place(result: SameDifferent, found: Threshold | None, side: Side, fps: floa
     return ""
 
 
-def _detail(result: SameDifferent) -> str:
+def _detail(result: SameDifferent, about: About) -> str:
     size = f"{counted(result.answers, 'answer')} of {counted(result.participants, 'participant')}"
     found, parts = result.believed, []
     if found:
         model = "Mixed differencing model" if result.mixed else "Differencing model"
         ends = [f"{_ends(one)} {side}" for side in PRINTED if (one := found.jnd.get(side)) and _closed(one)]
-        over = f"; 95% intervals across {found.generalises_to}: {words.joined(ends)}" if ends else ""
+        over = f"; {about.interval}s across {found.generalises_to}: {words.joined(ends)}" if ends else ""
         parts.append(
             f"{model}, {size}{over}. {_percent(result)} “different” moves with how readily participants say so; the "
             f"second threshold is where {_percent(result)} would be right by the best criterion, and rests on "
@@ -231,7 +232,6 @@ def _notes(result: SameDifferent) -> list[str]:
             f"By order: {words.signed(order.difference_percent)} percentage points more “different” if the "
             f"reference came first, {words.p(order.p_value)} over participants; differencing predicts none."
         )
-    notes += _across_motions(result.across_motions)
     effect, likeness = result.clustering.design_effect, result.clustering.intraclass_correlation
     if effect is not None and likeness is not None:
         correlation = words.signed(likeness, 3, plus=False)
@@ -258,7 +258,7 @@ def _weber(result: SameDifferent, lengths: Mapping[str, int]) -> Iterator[str]:
         several = (
             f"{min(known)} to {max(known)} frames, {mean:.1f} on average" if len(known) > 1 else f"{mean:g} frames"
         )
-        yield f"k was {several}; the thresholds are {words.joined(shares)} of it (Weber fractions)."
+        yield f"k was {several}; the thresholds are {words.joined(shares)} (Weber fractions)."
 
 
 def _model_notes(model: ModelFit) -> list[str]:
@@ -283,20 +283,6 @@ def _mixed_note(mixed: MixedThresholds) -> str:
         spreads = [f"{spread:.2f} {side}" for side, spread in mixed.motion_spread.items()]
         text += f" Thresholds’ logarithms differ across motions by a standard deviation of {words.joined(spreads)}."
     return f"{text} Caution: {mixed.note}." if mixed.note else text
-
-
-def _across_motions(test: AcrossMotions) -> list[str]:
-    if test.chi_square_p_value is None:
-        return []
-    text = (
-        f"Correct answers across motions: chi-square({test.chi_square_degrees_of_freedom}) = "
-        f"{test.chi_square:.2f}, {words.p(test.chi_square_p_value)} with answers treated as independent"
-    )
-    if test.f_p_value is None or test.f_degrees_of_freedom is None:
-        return [f"{text}; {test.note}."]
-    first, second = test.f_degrees_of_freedom
-    tested = f"F({first}, {second}) = {test.f:.2f}, {words.p(test.f_p_value)}"
-    return [f"{text}; over participants {tested} (Hotelling)."]
 
 
 # Beside the section

@@ -53,7 +53,7 @@ def threshold_table(name: str, result: SameDifferent, fps: float) -> Table:
     rows = _threshold_rows(result, fps)
     return make(
         f"{name}_thresholds",
-        f"The just noticeable difference in frames, with 95% intervals. Where {percent} of the answers are "
+        f"The just noticeable difference in frames, with confidence intervals. Where {percent} of the answers are "
         "“different”: of the median observer and over all observers, by a mixed model of participants with individual "
         "sensitivities and criteria; on one curve fitted to all answers (jackknife over participants); and by linear "
         "interpolation between the levels (Fieller), which depends on the levels and is biased for a curved function. "
