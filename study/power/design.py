@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study.analysis.analyse import Analysis
+from study.analysis.analyse import Analysis, analyse_folder
 from study.analysis.exclusions import Rules, exclude
 from study.arrays import BoolArray, FloatArray
 from study.experiment.plan import Plan
@@ -91,6 +92,11 @@ class PlannedStudy:
     """On average, where trials depend on the responses."""
 
 
+def _whole(design: Design, answers: pd.DataFrame, checks: pd.DataFrame) -> Analysis:
+    """The whole analysis."""
+    return analyse_folder(design.protocol, answers, checks, rules=design.rules, resamples=10)
+
+
 @dataclass(frozen=True, eq=False)
 class Effect:
     """What a study is to find."""
@@ -106,10 +112,14 @@ class Effect:
     """`test`, `aim`: what finds it, and what that is, in words: "to {aim} in 80% of studies"."""
     study: Callable[[Design], Run]
     """Simulates and analyses many studies at once."""
-    found: Callable[[Analysis], bool]
-    """Whether the whole analysis of one study found it."""
+    found: Callable[[Any], bool]
+    """Whether the analysis of one study found it."""
     with_motions: Callable[[Design, int], Run] | None = None
     """The same with so many motions instead of the protocol's; None where that can't be planned."""
+    analysed: Callable[[Design, pd.DataFrame, pd.DataFrame], Any] = _whole
+    """The analysis that `found` looks at, of a study's answers and of those to its attention checks."""
+    motion_sd: float = 0.0
+    """By how much a leaning between two methods varies over motions, standard deviation in logits."""
     slow: bool = False
     """Whether a study takes so long that fewer are simulated."""
     answers: Callable[[Design], int] = lambda design: len(design.trials()[0])

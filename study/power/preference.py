@@ -10,8 +10,10 @@ from scipy.optimize import brentq
 from scipy.special import expit
 
 from study.analysis.analyse import Analysis
-from study.analysis.preference.analyse import Preference
-from study.analysis.preference.bradley_terry import fit_bradley_terry
+from study.analysis.estimates import NotFitted
+from study.analysis.exclusions import exclude
+from study.analysis.preference.analyse import Preference, strengths
+from study.analysis.preference.bradley_terry import BradleyTerry, fit_bradley_terry
 from study.analysis.preference.default_test import p_values_of_studies
 from study.arrays import BoolArray, FloatArray
 from study.errors import AnalysisError
@@ -27,30 +29,32 @@ def preference_effect(study: StudySpec, options: Mapping[str, float], decided: A
     """Return a mean share over participants, their correlation, and what being shown first adds."""
     share, correlation, bias, alpha = options["share"], options["correlation"], options["order_bias"], decided.alpha
     spread = options.get("motion_sd", 0.0)
-    if study.others:
-        if spread:
-            raise AnalysisError("expected no --motion-sd for a study of more than two methods; leave it out")
-        return Effect(
-            observer=preference_observer(study, share, correlation, bias, options["missed"]),
-            stated={"share": share, "correlation": correlation, "order_bias": bias},
-            icc=correlation,
-            test=f"Bradley-Terry strengths over participants and motions at {alpha:g}",
-            aim=f"find that {study.reference} is chosen over {study.comparison} in {100 * share:g}% at the level "
-            f"{alpha:g}, where all other methods are as {study.comparison}",
-            study=lambda design: strengths_study(design, alpha, share),
-            found=_no_sessions,
-            slow=True,
-        )
     stated = {"share": share, "correlation": correlation, "order_bias": bias}
-    return Effect(
+    effect = Effect(
         observer=preference_observer(study, share, correlation, bias, options["missed"], spread),
         stated=stated | ({"motion_sd": spread} if spread else {}),
         icc=correlation,
         test=f"Student's t over participants and motions at {alpha:g}",
         aim=f"find a preference of {100 * share:g}% at the level {alpha:g}",
         study=lambda design: preference_study(design, alpha, share, spread),
-        found=_no_sessions if spread else lambda analysis: preference_found(analysis, study.name, share, alpha),
+        found=lambda analysis: preference_found(analysis, study.name, share, alpha),
         with_motions=lambda design, motions: preference_study(design, alpha, share, spread, motions),
+        motion_sd=spread,
+    )
+    if not study.others:
+        return effect
+    return replace(
+        effect,
+        test=f"Bradley-Terry strengths over participants and motions at {alpha:g}",
+        aim=f"find that {study.reference} is chosen over {study.comparison} in {100 * share:g}% at the level "
+        f"{alpha:g}, where all other methods are as {study.comparison}",
+        study=lambda design: strengths_study(design, alpha, share, spread),
+        analysed=lambda design, answers, checks: strengths(
+            exclude(answers, design.rules, checks)[0], 1 - alpha, study.comparison
+        ),
+        found=lambda fitted: _apart(fitted, study.reference, share),
+        with_motions=None,
+        slow=True,
     )
 
 
@@ -165,8 +169,11 @@ def preference_study(
     return run
 
 
-def strengths_study(design: Design, alpha: float, share: float) -> Run:
-    """Whether Bradley-Terry strengths tell the reference from the comparison, in the right direction."""
+def strengths_study(design: Design, alpha: float, share: float, motion_sd: float = 0.0) -> Run:
+    """Whether Bradley-Terry strengths tell the reference from the comparison, in the right direction.
+
+    Motions differ in how they suit each method, so that any two methods differ by `motion_sd` logits.
+    """
     trials, typical = design.trials(), design.settings.preference
     a, b = (np.array([[trial.methods[k] for trial in own] for own in trials]) for k in (0, 1))
     first = np.array([[trial.a_first for trial in own] for own in trials])
@@ -175,11 +182,13 @@ def strengths_study(design: Design, alpha: float, share: float) -> Run:
     apart = np.vectorize(lambda *pair: lean(typical, *pair))(a, b)
     shown, other = np.where(first, a, b), np.where(first, b, a)
     reference, comparison = design.study.reference, design.study.comparison or ""
+    names, places = np.unique(np.stack([a, b]), return_inverse=True)
+    films, where = np.unique(motions, return_inverse=True)
 
     def tells(size: int, kept: BoolArray, chose_first: BoolArray) -> bool:
         rows = kept[:size]
-        which, against, who, where = (
-            [str(name) for name in names[:size][rows]] for names in (shown, other, people, motions)
+        which, against, who, what = (
+            [str(name) for name in each[:size][rows]] for each in (shown, other, people, motions)
         )
         found = fit_bradley_terry(
             which,
@@ -189,16 +198,17 @@ def strengths_study(design: Design, alpha: float, share: float) -> Run:
             reference=comparison,
             confidence=1 - alpha,
             participants=who,
-            motions=where,
+            motions=what,
         )
-        if isinstance(found, str):
-            return False
-        low, high = next((row.interval.low, row.interval.high) for row in found.strengths if row.method == reference)
-        return low is not None and high is not None and (low > 0 if share > 0.5 else high < 0)
+        return _apart(found, reference, share)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
         count = max(sizes)
         own = typical.participant_sd * rng.standard_normal((studies, count, 1))
+        if motion_sd:
+            suits = motion_sd / np.sqrt(2.0) * rng.standard_normal((studies, len(films), len(names)))
+            sides = (suits[:, where.reshape(a.shape), side.reshape(a.shape)] for side in places.reshape(2, -1))
+            own = own + np.subtract(*sides)[:, :count]
         towards_a = apart[:count] + own
         chance = expit(np.where(first[:count], towards_a, -towards_a) + typical.order_bias)
         chose_first = rng.random(chance.shape) < chance
@@ -208,10 +218,12 @@ def strengths_study(design: Design, alpha: float, share: float) -> Run:
     return run
 
 
-def _no_sessions(_: Analysis) -> bool:
-    raise AnalysisError(
-        "expected no --sessions for a study of more than two methods, nor with --motion-sd; leave it out"
-    )
+def _apart(found: BradleyTerry | NotFitted | str | None, reference: str, share: float) -> bool:
+    """Whether the reference's strength lies beyond that of the comparison, which is 0, in the right direction."""
+    if not isinstance(found, BradleyTerry):
+        return False
+    low, high = next((row.interval.low, row.interval.high) for row in found.strengths if row.method == reference)
+    return low is not None and high is not None and (low > 0 if share > 0.5 else high < 0)
 
 
 def _found(chosen: FloatArray, shown: FloatArray, share: float, alpha: float) -> BoolArray:

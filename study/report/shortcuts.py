@@ -34,7 +34,7 @@ def _sentence(study: StudySpec, own: list[ShortcutShare], needed: float | None) 
         most = max(own, key=lambda one: abs(one.share - 0.5))
         return (
             f"{name}: an observer who sees nothing but the {most.cue} and prefers more of it (longer, further left, "
-            f"larger) would choose {study.comparison} in {100 * most.share:.0f}% of the trials; none of the other "
+            f"larger) would choose {most.method} in {100 * most.share:.0f}% of the trials; none of the other "
             "properties looked at is tied more closely to the methods."
         )
     most = max(own, key=lambda one: one.furthest)
@@ -67,9 +67,13 @@ def shortcut_tables(material: Material) -> tuple[Table, ...]:
                 f"What gives pairs away: {study.title or words.readable(study.name)}. "
                 f"{words.sentence(shares_in_words(study, needed))}. For all transitions together, and for the one at "
                 "which it is furthest from guessing.",
-                "cue difference_frames percent furthest_percent motion",
+                "cue method difference_frames percent furthest_percent motion",
                 rows,
-                files_only="" if own[0].level is not None else "difference_frames",
+                files_only=" ".join(
+                    key
+                    for key, told in (("method", study.others), ("difference_frames", own[0].level is not None))
+                    if not told
+                ),
             )
         )
     chosen = [row for study in protocol.studies for row in _choices(study, material)]

@@ -178,7 +178,7 @@ def test_staircases_are_as_precise_as_those_replayed_by_hand() -> None:
 def test_staircases_of_whole_sessions_are_as_precise() -> None:
     design = design_of(PROTOCOL + STAIRCASES, 8)
     effect = staircase_effect(design.study, OPTIONS, design.protocol.analysis)
-    slow = share(whole_sessions(design, effect.found), 8, 6)
+    slow = share(whole_sessions(design, effect), 8, 6)
     assert slow == pytest.approx(share(effect.study(design), 8, 60), abs=4 * np.sqrt(0.25 / 6))
 
 

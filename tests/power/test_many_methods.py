@@ -8,7 +8,6 @@ from scipy.special import expit, logit
 from scipy.stats import nct, t
 
 from study.analysis.exclusions import Rules
-from study.errors import AnalysisError
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import parse_protocol
 from study.power.design import Design
@@ -71,8 +70,23 @@ def test_where_nothing_is_to_be_found_hardly_anything_is() -> None:
     assert found_in(0.5, 12, 40) <= 0.1
 
 
-def test_whole_sessions_are_refused() -> None:
-    design = design_of(4)
-    effect = effect_of(design.study, {**OPTIONS, "share": 0.7}, design.protocol.analysis)
-    with pytest.raises(AnalysisError, match="expected no --sessions for a study of more than two methods"):
-        whole_sessions(design, effect.found)(np.random.default_rng(0), 1, [4])
+def power_of(options: dict[str, float], people: int, studies: int, *, whole: bool = False) -> float:
+    design = design_of(people)
+    effect = effect_of(design.study, {**OPTIONS, **options}, design.protocol.analysis)
+    typical = Design(design.protocol, design.study, design.plans, effect.observer, Rules())
+    run = whole_sessions(typical, effect) if whole else effect.study(typical)
+    return float(run(np.random.default_rng(3), studies, [people]).mean())
+
+
+def test_motions_that_differ_cost_power_and_make_no_false_findings() -> None:
+    alike, apart = (power_of({"share": 0.85, "motion_sd": spread}, 24, 60) for spread in (0.0, 1.5))
+    assert apart < alike - 0.2
+    assert power_of({"share": 0.5, "motion_sd": 1.5}, 12, 60) <= 0.1
+
+
+@pytest.mark.parametrize("motion_sd", [0.0, 0.5])
+def test_strengths_at_once_are_those_of_whole_sessions(motion_sd: float) -> None:
+    options = {"share": 0.8, "correlation": 0.1, "motion_sd": motion_sd}
+    at_once, whole = power_of(options, 24, 100), power_of(options, 24, 30, whole=True)
+    assert 0.15 < at_once < 0.95
+    assert at_once == pytest.approx(whole, abs=3.5 * 0.5 * np.sqrt(1 / 30 + 1 / 100))

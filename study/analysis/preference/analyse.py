@@ -140,8 +140,12 @@ def analyse_preference(answers: pd.DataFrame, name: str, settings: Settings) -> 
     return Preference(compared, strengths(answers, settings.confidence))
 
 
-def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> BradleyTerry | NotFitted | None:
+def strengths(
+    answers: pd.DataFrame, confidence: float = 0.95, reference: str | None = None
+) -> BradleyTerry | NotFitted | None:
     """Return Bradley-Terry strengths of the methods of one study; None where only two were compared.
+
+    `reference` as `fit_bradley_terry` takes it.
 
     With two methods the strengths say nothing that their percentage does not.
     """
@@ -160,6 +164,7 @@ def strengths(answers: pd.DataFrame, confidence: float = 0.95) -> BradleyTerry |
         favoured,
         np.ones(len(given)),
         with_order=bool(ordered),
+        reference=reference,
         confidence=confidence,
         participants=[str(name) for name in given["participant"]],
         motions=[str(name) for name in given["motion"]] if "motion" in given.columns else None,

@@ -123,7 +123,7 @@ def power(
     at_once = 10 if slow else AT_ONCE
     with progress("studies") as report:
         found = power_curve(
-            whole_sessions(design, effect.found) if options["sessions"] else effect.study(design),
+            whole_sessions(design, effect) if options["sessions"] else effect.study(design),
             sizes,
             **settings,
             at_once=at_once,

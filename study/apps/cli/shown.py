@@ -41,18 +41,21 @@ def shortcut_lines(protocol: Protocol, outlook: Outlook) -> Iterator[str]:
         if not own:
             continue
         yield f"{study.name}: {shares_in_words(study, needed_share(protocol, study))}"
-        levels = list(dict.fromkeys(share.level for share in own))
-        shown = levels if len(levels) <= MOST_LEVELS else levels[:: -(-len(levels) // MOST_LEVELS)]
-        cells = {(share.cue, share.level): share for share in own}
-        cues = dict.fromkeys(share.cue for share in own)
         rows: list[tuple[str, ...]]
-        if levels == [None]:
+        if study.others or own[0].level is not None:
+            heads = list(dict.fromkeys((share.level, share.method) for share in own))
+            shown = heads if len(heads) <= MOST_LEVELS else heads[:: -(-len(heads) // MOST_LEVELS)]
+            cells = {(one.cue, one.level, one.method): one.share if one.method else one.furthest for one in own}
+            rows = [("seen alone", *(method or f"{level:+d}" for level, method in shown))]
+            rows += [
+                (cue, *(f"{100 * cells[cue, *head]:.0f}" for head in shown))
+                for cue in dict.fromkeys(share.cue for share in own)
+            ]
+            yield from columns(rows, left=(0,))
+        else:
             rows = [("seen alone", "all", "furthest", "at")]
             rows += [(one.cue, f"{100 * one.share:.0f}", f"{100 * one.furthest:.0f}", one.motion) for one in own]
-        else:
-            rows = [("seen alone", *(f"{level:+d}" for level in shown))]
-            rows += [(cue, *(f"{100 * cells[cue, level].furthest:.0f}" for level in shown)) for cue in cues]
-        yield from columns(rows, left=(0, len(rows[0]) - 1) if levels == [None] else (0,))
+            yield from columns(rows, left=(0, 3))
         yield ""
 
 
@@ -79,7 +82,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         *_point(row.destination),
         str(row.k_frames),
         f"{row.k_s:.2f}",
-        "; ".join(f"{method} {' '.join(map(str, lengths))}" for method, lengths in row.lengths.items()),
+        "; ".join(f"{method} {' '.join(map(str, lengths))}" for method, lengths in row.lengths.items() if lengths),
         "practice" if row.trials is None else str(row.trials),
         str(row.films),
         shortest if shortest == longest else f"{shortest}-{longest}",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,16 +93,19 @@ class ShortcutShare:
     ----------
     study, level
         `level` is the difference in blend length, in frames; None where methods are compared.
+    method
+        The method that answers are counted for; empty where right ones are.
     cue
         The property; see `CUES`.
     share
-        Right answers, or answers for the comparison by an observer who chooses what has more: over all transitions.
+        Right answers, or answers for the method by an observer who chooses what has more: over all transitions.
     furthest, motion
         The same for the transition at which it is furthest from chance, and that transition.
     """
 
     study: str
     level: int | None
+    method: str
     cue: str
     share: float
     furthest: float
@@ -132,31 +136,39 @@ def shortcut_shares(
     shortcut = task_of(study).shortcut
     known = {one.pair: one for one in audits}
     own = [pair for pair in pairs if pair.study == study.name and pair.motion in transitions and pair.name in known]
-    if shortcut is None or not own or study.others:  # of many methods there is no comparison that all pairs share
+    if shortcut is None or not own:
         return []
+    levels = sorted({pair.difference_frames for pair in own if pair.difference_frames != 0}, key=lambda n: n or 0)
+    # Of two methods, what is not for the one is for the other.
+    methods = study.methods if study.others else (study.comparison or "",)
     found = []
-    for level in sorted({pair.difference_frames for pair in own if pair.difference_frames != 0}, key=lambda n: n or 0):
-        for cue in CUES:
-            shares = {motion: _share(shortcut, cue, chosen, known) for motion, chosen in _by_motion(own, level)}
-            everyone = _share(shortcut, cue, [pair for pair in own if pair.difference_frames in (level, 0)], known)
-            motion = max(shares, key=lambda name: abs(shares[name] - shortcut.chance))
-            found.append(ShortcutShare(study.name, level, cue.name, everyone, shares[motion], motion))
+    for level, method, cue in product(levels, methods if shortcut.counts == "comparison" else ("",), CUES):
+        told = [pair for pair in own if pair.difference_frames in (level, 0) and (not method or method in pair.methods)]
+        shares = {motion: _share(shortcut, cue, method, part, known) for motion, part in _by_motion(told, level)}
+        everyone = _share(shortcut, cue, method, told, known)
+        motion = max(shares, key=lambda name: abs(shares[name] - shortcut.chance))
+        found.append(ShortcutShare(study.name, level, method, cue.name, everyone, shares[motion], motion))
     return found
 
 
 def _by_motion(pairs: Sequence[Pair], level: int | None) -> Iterator[tuple[str, list[Pair]]]:
     """For each transition its pairs of a level and those without a difference."""
     for motion in dict.fromkeys(pair.motion for pair in pairs):
-        chosen = [pair for pair in pairs if pair.motion == motion and pair.difference_frames in (level, 0)]
+        chosen = [pair for pair in pairs if pair.motion == motion]
         if any(pair.difference_frames == level for pair in chosen):
             yield motion, chosen
 
 
-def _share(shortcut: Shortcut, cue: Cue, pairs: Sequence[Pair], known: Mapping[str, PairAudit]) -> float:
+def _share(shortcut: Shortcut, cue: Cue, method: str, pairs: Sequence[Pair], known: Mapping[str, PairAudit]) -> float:
     """The share over some pairs, of which those without a difference are there to be told from the others."""
-    read = cue.more if shortcut.counts == "comparison" else cue.apart
-    differ = [read(known[pair.name]) for pair in pairs if pair.difference_frames != 0]
-    same = [read(known[pair.name]) for pair in pairs if pair.difference_frames == 0]
+
+    def read(pair: Pair) -> float:
+        if not method:
+            return cue.apart(known[pair.name])
+        return cue.more(known[pair.name]) * (1.0 if pair.methods[-1] == method else -1.0)
+
+    differ = [read(pair) for pair in pairs if pair.difference_frames != 0]
+    same = [read(pair) for pair in pairs if pair.difference_frames == 0]
     return round(shortcut.share(np.array(differ), np.array(same or [0.0])), 6)
 
 
@@ -171,9 +183,10 @@ def needed_share(protocol: Protocol, study: StudySpec) -> float | None:
 def shares_in_words(study: StudySpec, needed: float | None) -> str:
     """What the numbers of a study's table mean, for somebody who reads it the first time."""
     if needed is None:
+        which, neither = ("each method", "no method") if study.others else (study.comparison, "neither method")
         return (
-            f"responses for {study.comparison}, in percent, of observers who see one property of the stimuli alone and "
-            "choose the one with more of it (longer, figure further left, larger); 50 favours neither method"
+            f"responses for {which}, in percent, of observers who see one property of the stimuli alone and "
+            f"choose the one with more of it (longer, figure further left, larger); 50 favours {neither}"
         )
     chance = 0.0 if (shortcut := task_of(study).shortcut) is None else shortcut.chance
     return (

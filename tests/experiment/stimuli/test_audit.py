@@ -189,6 +189,25 @@ def test_a_preference_for_longer_stimuli_is_counted_as_answers_for_the_longer_me
     assert shares["place in the last frame"] == pytest.approx((places[1] < places[0]).mean(), abs=0.02)
 
 
+def test_of_many_methods_each_has_its_share_of_the_answers_in_its_pairs() -> None:
+    """Whoever takes the longer of two films, all films drawn once: answers for each method, counted."""
+    text = PREFERENCE.replace('comparison = "geodesic"', 'comparison = "geodesic"\nothers = ["cut", "inertialize"]')
+    made = prepare(parse_protocol(text), open_library("synthetic"))
+    shares = shortcuts_of(made.protocol, made.pairs, made.audits)
+    duration = {share.method: share.share for share in shares if share.cue == "duration"}
+    assert len(made.audits) == 6
+    rng, chosen = np.random.default_rng(5), dict.fromkeys(("fixed", "geodesic", "cut", "inertialize"), 0.0)
+    for pair in made.pairs:
+        one, other = (
+            np.log(len(stimulus.positions) / 30) + 0.05 * rng.standard_normal(200_000)
+            for stimulus in members(made, pair.name)
+        )
+        for method, more in zip(pair.methods, (one > other, other > one), strict=True):
+            chosen[method] += float(more.mean()) / 3
+    assert duration == pytest.approx(chosen, abs=0.005)
+    assert min(duration.values()) < 0.2 < 0.8 < max(duration.values())
+
+
 def test_matched_stimuli_run_through_the_same_frames_at_the_same_times() -> None:
     made = prepare(load_protocol(find_protocol("blend_length_jnd_matched")), open_library("synthetic"))
     for pair in made.pairs:
