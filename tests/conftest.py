@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `segue` has it; read when numpy is loaded
+
 # Tests are imported by path, without packages: this makes the modules beside this file importable.
 sys.path.append(str(Path(__file__).parent))
 

@@ -20,7 +20,7 @@ from study.transitions.blend_length import joint_speeds, length_range
 from study.transitions.distances import distance_matrix, joint_differences, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 
-# Costs looked up at once: 64 MB of them.
+# Numbers held at once: 64 MB of them.
 _BLOCK = 8_000_000
 
 
@@ -51,19 +51,15 @@ def geodesic_lengths(
     destination = on_joints_of(source, destination)
     starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames)
     sums = _diagonal_sums(distance_matrix(source, destination, joint_weights(source.skeleton)))
-    lengths = np.arange(low, longest_there.max(initial=low) + 1)
-    best, cost = np.empty(len(starts), dtype=np.int64), np.empty(len(starts))
-    block = max(1, _BLOCK // len(lengths))
-    for at in range(0, len(starts), block):
-        i, j = starts[at : at + block, None], ends[at : at + block, None]
-        there = longest_there[at : at + block, None]
-        held = np.minimum(lengths, there)
+    flat, row = sums.ravel(), sums.shape[1]
+    at = starts * row + ends + 1
+    best, cost = np.zeros(len(starts), dtype=np.int64), np.full(len(starts), np.inf)
+    for length in range(low, longest_there.max(initial=low) + 1):
+        held = np.minimum(length, longest_there)
         # Pairs (i, j-b+1) to (i+b-1, j): the sum to the last of them less the sum to the one before the first.
-        costs = (sums[i + held, j + 1] - sums[i, j + 1 - held]) / held
-        costs[lengths > there] = np.inf
-        found = np.argmin(costs, axis=1)
-        best[at : at + block] = lengths[found]
-        cost[at : at + block] = costs[np.arange(len(found)), found]
+        costs = (flat[at + held * row] - flat[at - held]) / held
+        less = costs < cost
+        best[less], cost[less] = length, costs[less]
     return best, cost
 
 

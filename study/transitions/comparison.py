@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from study.transitions.flaws import ACCELERATION_TIMES, SHARE_OVER, find_flaws
 from study.transitions.methods.makes.blends import Slerp
 from study.transitions.methods.method import Made, Place
 from study.transitions.methods.registry import DIRECT
-from study.transitions.point_cloud import point_cloud, window_distances
+from study.transitions.point_cloud import PointCloud, point_cloud, window_distances
 
 _LEAST_POSE_M = 0.005
 """A distance of poses that nobody sees: a blend this near is taken to be so far, so that a ratio says something."""
@@ -80,10 +81,16 @@ def own_pose_m(clip: Clip, blend: tuple[int, int], motions: Sequence[Clip]) -> f
         return 0.0
     ours = point_cloud(trim(clip, *blend))
     apart = [
-        window_distances(ours, point_cloud(retarget(motion, clip.skeleton)), 1, precision="double").min(axis=1)
+        window_distances(ours, _cloud(retarget(motion, clip.skeleton)), 1, precision="double").min(axis=1)
         for motion in motions
     ]
     return float(np.sqrt(np.min(apart, axis=0)).mean())
+
+
+@lru_cache(maxsize=8)
+def _cloud(motion: Clip) -> PointCloud:
+    """The point cloud of a motion, kept for the last few: many transitions are made of the same two."""
+    return point_cloud(motion)
 
 
 def why(measured: Sequence[Measured]) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import os
 import sys
 import traceback
 import warnings
@@ -126,6 +127,10 @@ def _refuse(why: str) -> int:
 
 def main() -> None:
     """Entry point of the `segue` script."""
+    # Read when numpy is loaded: our matrices are too small to share, and threads that wait for each other take more
+    # than they give, most of all on a machine that does other work.
+    for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+        os.environ.setdefault(library, "1")
     # Imports and tables are many objects that stay: looking through them for garbage takes a tenth of a report's time.
     gc.set_threshold(100_000, 20, 20)
     print_in_any_encoding()

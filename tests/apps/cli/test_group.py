@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,15 @@ def test_the_command_line_runs_as_a_module_too() -> None:
     asked = [sys.executable, "-m", "study.apps.cli", "--version"]
     told = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True)
     assert __version__ in told.stdout
+
+
+def test_matrix_products_take_one_thread_each() -> None:
+    told = "from threadpoolctl import threadpool_info as all; print([one['num_threads'] for one in all()])"
+    asked = f"from study.apps.cli import main\ntry:\n    main()\nfinally:\n    import numpy; {told}"
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
+    command = [sys.executable, "-c", asked, "-h"]
+    shown = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+    assert shown.stdout.splitlines()[-1] == "[1]"
 
 
 def test_every_verb_is_in_the_readme_or_the_docs() -> None:
