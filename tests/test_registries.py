@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from study.report.sections.registry import SECTIONS
 from study.tasks.answer import Answer
 from study.tasks.observer import default_observer
 from study.tasks.registry import NAMES, TASKS, answer_columns, task_of, task_of_trial
-from study.tasks.task import Item, Task
+from study.tasks.task import Item, Kind, Task
 from study.tasks.trial import PLACES, Pair, trial_of
 
 ROOT = Path(__file__).parents[1]
@@ -46,6 +47,9 @@ class Study:
     items: tuple[Item, ...] = ()
     others: tuple[str, ...] = ()
     sets: int | None = None
+    ties: bool = False
+    confidence_points: int | None = None
+    slider: str | None = None
 
 
 def study_of(task: Task) -> Study:
@@ -146,17 +150,17 @@ def test_a_task_that_compares_says_how_one_property_alone_would_be_answered(task
 def test_the_page_has_a_part_for_the_layout_and_for_the_kind_of_answer(task: Task) -> None:
     script = (ROOT / "study/apps/pages/trial.js").read_text(encoding="utf-8")
     layouts = re.search(r"const LAYOUTS = \{(.*?)\};", script, re.DOTALL)
-    buttons = re.search(r"const BUTTONS = \{(.*?)\};", script, re.DOTALL)
+    answers = re.search(r"const ANSWERS = \{(.*?)\};", script, re.DOTALL)
     assert layouts is not None
-    assert buttons is not None
+    assert answers is not None
     assert f'"{task.layout}":' in layouts[1]
-    assert f"{task.kind}:" in buttons[1]
+    assert set(get_args(Kind)) == {part.split(":")[0].strip() for part in answers[1].split(",")}
 
 
 @every_task
 def test_the_window_has_a_part_for_the_layout_and_for_the_kind_of_answer(task: Task) -> None:
     assert task.layout in LAYOUTS
-    assert task.kind in ANSWERS
+    assert set(get_args(Kind)) == set(ANSWERS)
 
 
 @every_task

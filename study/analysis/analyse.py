@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
 
+from study.analysis.confidence import HowSure, how_sure
 from study.analysis.confirmatory import ConfirmatoryTest, confirmatory
 from study.analysis.exclusions import Exclusions, Rules, exclude, rules_of
 from study.analysis.headline import Headline
@@ -59,6 +60,8 @@ class Results:
     """By name."""
     confirmatory: tuple[ConfirmatoryTest, ...]
     """The default tests of preference studies, adjusted together by Holm's method."""
+    how_sure: tuple[HowSure, ...] = ()
+    """How sure participants were, where they were asked."""
 
     def of(self, kind: type[Kind]) -> dict[str, Kind]:
         """Return the results of one kind, by name of the study."""
@@ -70,7 +73,7 @@ class Results:
         return _adjusted(found, self.confirmatory)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Analysis(Results):
     """What answers say, and what it rests on."""
 
@@ -132,6 +135,7 @@ def analyse(
     return Analysis(
         studies=found.studies,
         confirmatory=found.confirmatory,
+        how_sure=found.how_sure,
         exclusions=left_out,
         without_exclusions=_results(answers, settings, family) if left_out.answers_left_out else None,
         quality=quality(answers),
@@ -185,7 +189,7 @@ def _results(answers: pd.DataFrame, settings: Settings, family: Sequence[str] | 
             raise AnalysisError(f"expected one task a study, found {task!r} in {name!r} too; name the studies apart")
         studies[str(name)] = analysis_of(str(task)).analyse(part, str(name), settings)
     found = Results(studies, ())
-    return Results(studies, confirmatory(found.of(Preference), family))
+    return Results(studies, confirmatory(found.of(Preference), family), how_sure(answers, settings.confidence))
 
 
 def analysis_json(analysis: Analysis) -> dict[str, Any]:
@@ -208,7 +212,7 @@ def _results_json(results: Results) -> dict[str, Any]:
         own = results.of(kind)
         for key, attribute in kind.keys.items():
             found[key] = {name: to_json(getattr(one, attribute) if attribute else one) for name, one in own.items()}
-    return found | {"confirmatory": to_json(results.confirmatory)}
+    return found | {"confirmatory": to_json(results.confirmatory), "how_sure": to_json(results.how_sure)}
 
 
 def _adjusted(headlines: Iterable[Headline], tests: Iterable[ConfirmatoryTest]) -> tuple[Headline, ...]:

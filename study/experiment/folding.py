@@ -14,7 +14,7 @@ from study.experiment.plan import Plan
 from study.experiment.procedures.procedure import Procedure
 from study.experiment.protocol.whole import Protocol
 from study.experiment.steps import Earlier, breaks_of, by_trial, showing_due
-from study.tasks.answer import Answer
+from study.tasks.answer import CONFIDENCE, Answer
 from study.tasks.trial import Trial
 
 
@@ -69,7 +69,7 @@ def _known(protocol: Protocol, procedure: Procedure, earlier: Earlier) -> tuple[
     while fresh := procedure.next(given):
         known += fresh
         ends = [
-            earlier[trial.trial][-1]
+            [end for end in earlier[trial.trial] if end[1].item != CONFIDENCE][-1]
             for trial in fresh
             if trial.trial in earlier and showing_due(protocol, trial, earlier)[1] is None
         ]

@@ -16,6 +16,7 @@ from study.experiment.protocol.whole import Protocol
 from study.experiment.steps import Step
 from study.models.population import LEAST_CRITERION
 from study.models.up_down import UpDown
+from study.tasks.answer import CONFIDENCE
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.registry import task_of, task_of_trial
 from study.tasks.trial import Trial
@@ -88,13 +89,16 @@ def respond(who: Person, trial: Trial, step: Step) -> tuple[str | None, float | 
     Chance depends only on person, trial, item and attempt, so an interrupted session continues as it would
     have gone.
     """
-    rng = generator(who.seed, "answer", who.name, trial.trial, step.item, step.attempt)
+    sure = step.item == CONFIDENCE  # of the very answer that they gave
+    rng = generator(who.seed, "answer", who.name, trial.trial, "" if sure else step.item, step.attempt)
     if who.careless:
         value, ease = str(rng.choice(step.legal)), 1.0
     elif trial.role == "check":
         value, ease = trial.expected, 1.0
     else:
         value, ease = task_of_trial(trial).judge(who, trial, step.legal, rng)
+        if sure:
+            value = step.legal[round(ease * (len(step.legal) - 1))]
     # Near the threshold people take longer: up to half as long again.
     median = _CARELESS_S if who.careless else who.settings.response_median_s * (1.5 - 0.5 * ease)
     response_s = float(median * np.exp(who.settings.response_log_sd * rng.standard_normal()))

@@ -201,6 +201,6 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
 
 def questions(protocol: Protocol, plan: Plan) -> int:
     """How many answers a plan asks for at most, without repeats after display failures."""
-    items = {study.name: max(1, len(study.items)) for study in protocol.studies}
+    items = {study.name: max(1, len(study.items)) + bool(study.confidence_points) for study in protocol.studies}
     known = sum(1 if trial.role == "check" else items[trial.study] for trial in plan.trials)
     return known + sum(course.most * items[course.study] for course in plan.courses)

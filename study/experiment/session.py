@@ -29,7 +29,7 @@ from study.experiment.steps import (
     steps_left,
     trial_steps,
 )
-from study.tasks.answer import Answer
+from study.tasks.answer import CONFIDENCE, Answer
 from study.tasks.trial import Trial
 
 
@@ -40,7 +40,8 @@ class Session:
     `steps` are those of all trials that are known; where a procedure waits for an answer (`folding`), the steps of its
     next trial are added after it. `trials_left` has for each step how many trials have steps from there on: an answer
     then costs the same however long the plan is. `badly_shown` are the showings (trial and attempt) of which an answer
-    says that they were faulty: a trial with several items comes again where any of them does.
+    says that they were faulty: a trial with several items comes again where any of them does. `chosen` is the last
+    answer that is not about how sure the one before it was.
     """
 
     plan: Plan
@@ -50,6 +51,7 @@ class Session:
     folded: Folded
     position: int = 0
     badly_shown: frozenset[tuple[int, int]] = frozenset()
+    chosen: Answer | None = None
 
     def trial(self, number: int) -> Trial:
         """A trial by its number: one that is known beforehand, or that the answers so far led to."""
@@ -69,7 +71,7 @@ def open_session(
     Parameters
     ----------
     passed
-        Which of `consent`, `form` and `debrief` are behind the participant.
+        What is behind the participant of `consent`, `form`, the forms after studies (`form_event`) and `debrief`.
     frames
         Frames of each stimulus, so that texts say how long the films really take; an estimate unless given.
     """
@@ -84,7 +86,8 @@ def open_session(
     breaks = breaks_of(protocol, plan) - folded.breaks
     steps = steps_left(protocol, folded.trials.values(), before, passed, breaks, films, plan.examples)
     badly_shown = frozenset((answer.trial, answer.attempt) for answer in before if not answer.shown_well)
-    return Session(plan, protocol, steps, _trials_left(steps), folded, badly_shown=badly_shown)
+    chosen = next((answer for answer in reversed(before) if answer.item != CONFIDENCE), None)
+    return Session(plan, protocol, steps, _trials_left(steps), folded, badly_shown=badly_shown, chosen=chosen)
 
 
 def current(session: Session) -> Step:
@@ -120,7 +123,7 @@ def advanced(session: Session) -> Session:
 def _at(session: Session, position: int, badly_shown: frozenset[tuple[int, int]] | None = None) -> Session:
     # Not `replace`, which takes as long as the rest of an answer.
     known = session.plan, session.protocol, session.steps, session.trials_left, session.folded
-    return Session(*known, position, session.badly_shown if badly_shown is None else badly_shown)
+    return Session(*known, position, session.badly_shown if badly_shown is None else badly_shown, session.chosen)
 
 
 def near(session: Session) -> tuple[list[Step], list[Step]]:
@@ -162,13 +165,15 @@ def filled(session: Session, values: Mapping[str, str]) -> tuple[Session, dict[s
     SessionError
         Where no form is shown now, for fields that it does not have, and for values that a field does not take.
     """
-    if current(session).kind != "form":
-        raise SessionError(f"Expected no form now: the session is at {current(session).kind!r}.")
-    fields = {field.name: field for field in session.protocol.form}
+    step = current(session)
+    if step.kind != "form":
+        raise SessionError(f"Expected no form now: the session is at {step.kind!r}.")
+    fields = {field.name: field for field in session.protocol.form_of(step.study)}
     if strays := sorted(set(values) - set(fields)):
         raise SessionError(f"Expected the form's fields {', '.join(fields)}, found {', '.join(map(repr, strays))}.")
     taken = {name: field_value(field, values.get(name, "").strip()) for name, field in fields.items()}
-    return _at(session, session.position + 1), {name: value for name, value in taken.items() if value}
+    prefix = f"{step.study}." if step.study else ""
+    return _at(session, session.position + 1), {prefix + name: value for name, value in taken.items() if value}
 
 
 def answered(session: Session, value: str, response_s: float, *, shown_well: bool = True) -> tuple[Session, Answer]:
@@ -238,18 +243,21 @@ def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     """Move on; after a display failure, add the trial once more to the end of its study. Practice gets feedback."""
     here, showing = current(session), (answer.trial, answer.attempt)
     badly_shown = session.badly_shown if answer.shown_well else session.badly_shown | {showing}
-    session = _at(session, session.position + 1, badly_shown)
+    chosen = session.chosen if answer.item == CONFIDENCE and session.chosen else answer
+    session = replace(_at(session, session.position + 1, badly_shown), chosen=chosen)
+    if answer.missed and current(session).item == CONFIDENCE:  # nobody is sure of what was not said
+        session = _at(session, session.position + 1)
     following = current(session)
     trial_goes_on = following.kind == "answer" and following.trial == answer.trial
     trial = session.trial(answer.trial)
     if trial.role == "practice" and not trial_goes_on:
-        feedback = Step("feedback", here.study, feedback_text(session.protocol, trial, answer), role=trial.role)
+        feedback = Step("feedback", here.study, feedback_text(session.protocol, trial, chosen), role=trial.role)
         session = _with_steps(session, session.position, [feedback])
     if trial_goes_on or trial.role == "practice":
         return session, answer
     if not comes_again(session.protocol, trial, answer.attempt, showing not in badly_shown):
-        return _finished(session, trial, answer), answer
-    end = max(i for i, step in enumerate(session.steps) if step.study == trial.study) + 1
+        return _finished(session, trial, chosen), answer
+    end = max(i for i, step in enumerate(session.steps) if step.study == trial.study and step.trial) + 1
     repeat = trial_steps(session.protocol, trial, answer.attempt + 1, frozenset())
     return _with_steps(session, end, repeat), answer
 

@@ -16,6 +16,7 @@ from study.experiment.observers import knowing, person, respond, shown_well, tru
 from study.experiment.plan import Plan, draw_plan, questions
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import open_session, walk
+from study.experiment.steps import form_event
 from study.experiment.store.answers import has_event, record_answer, record_event, stored_answers
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
@@ -82,7 +83,8 @@ def simulate(
         if has_event(responses, record, "finished"):
             continue
         who = person(settings, plan.participant, seed)
-        state = open_session(protocol, plan, before, passed=("consent", "form"))
+        forms = (form_event(name) for name in ("", *(study.name for study in protocol.studies)))
+        state = open_session(protocol, plan, before, passed=("consent", *forms))
         for trial, answer in walk(state, partial(respond, who), partial(shown_well, who)):
             record_answer(responses, record, trial, answer)
             made += 1

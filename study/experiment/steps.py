@@ -14,8 +14,10 @@ from typing import Literal
 from study.experiment import wording
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol
-from study.tasks.answer import Answer
-from study.tasks.registry import right_answer, task_of
+from study.tasks.answer import CONFIDENCE, Answer
+from study.tasks.registry import kind_of, right_answer, task_of
+from study.tasks.task import Kind as AnswerKind
+from study.tasks.task import scale
 from study.tasks.trial import PLACES, Trial
 
 Kind = Literal[
@@ -44,7 +46,9 @@ class Step:
     attempt: int = 0
     """The trial's number in the plan (0 outside trials), and which showing of it this is, from 1."""
     item: str = ""
-    """The rating item that is asked."""
+    """The rating item that is asked, or `CONFIDENCE`."""
+    answered_by: AnswerKind = "word"
+    """What kind of answer is given."""
     legal: tuple[str, ...] = ()
     """The answers that count."""
     low: str = ""
@@ -144,7 +148,7 @@ def steps_left(
     for trial in trials:
         studies.setdefault(trial.study, []).append(trial)
     for own in studies.values():
-        steps += _study_steps(protocol, own, earlier, breaks, films, examples)
+        steps += _study_steps(protocol, own, earlier, passed, breaks, films, examples)
     if "debrief" not in passed and (text := wording.debrief_text(protocol, films)):
         steps.append(Step("debrief", text=text))
     return (*steps, Step("done"))
@@ -154,6 +158,7 @@ def _study_steps(
     protocol: Protocol,
     trials: Sequence[Trial],
     earlier: Earlier,
+    passed: Collection[str],
     breaks: Collection[int],
     films: wording.Films,
     examples: Mapping[str, str],
@@ -182,7 +187,14 @@ def _study_steps(
     if steps and (text := wording.instructions_text(protocol, study, films)):
         example = examples.get(study.name, trials[0].stimuli[0]) if study.example else ""
         steps.insert(0, Step("instructions", study.name, text, stimulus=example))
+    if study.form and form_event(study.name) not in passed:
+        steps.append(Step("form", study.name, protocol.texts.study_form.strip()))
     return steps
+
+
+def form_event(study: str) -> str:
+    """What records that a form was filled in: the one at the start, where the name is empty, or one after a study."""
+    return f"form/{study}" if study else "form"
 
 
 def break_step(protocol: Protocol, trial: Trial) -> Step:
@@ -204,9 +216,11 @@ def breaks_of(protocol: Protocol, plan: Plan) -> set[int]:
 def showing_due(protocol: Protocol, trial: Trial, earlier: Earlier) -> tuple[int, frozenset[str] | None]:
     """Which showing of a trial is due and which of its items are answered; None for the items where it is finished."""
     answers = [answer for _, answer in earlier.get(trial.trial, ())]
-    items = {""} if trial.role == "check" else {item.name for item in protocol.study(trial.study).items} or {""}
     attempt = max((answer.attempt for answer in answers), default=1)
     latest = [answer for answer in answers if answer.attempt == attempt]
+    items = {step.item for step in _questions(protocol, trial, Step("answer"))}
+    if any(answer.missed and not answer.item for answer in latest):
+        items = {""}
     done = frozenset(answer.item for answer in latest)
     if not items <= done:
         return attempt, done
@@ -217,26 +231,33 @@ def showing_due(protocol: Protocol, trial: Trial, earlier: Earlier) -> tuple[int
 
 def trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset[str]) -> list[Step]:
     """A trial from its first stimulus to its pause; items that are `done` are not asked again."""
-    study, timing = protocol.study(trial.study), protocol.timing
+    timing = protocol.timing
     base = Step("stimulus", trial.study, trial=trial.trial, attempt=attempt, role=trial.role)
     steps: list[Step] = []
     for slot, stimulus in enumerate(trial.stimuli, start=1):
         if slot > 1:
             steps.append(replace(base, kind="gap", duration_s=timing.gap_s))
         steps.append(replace(base, stimulus=stimulus, slot=slot))
-    task, question = task_of(study), wording.question_text(protocol, study)
-    window_s = timing.answer_s if task.timed else None
-    ask = replace(base, kind="answer", text=question, duration_s=window_s, legal=task.legal(study))
-    if trial.role == "check":
-        words = protocol.texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected))
-        steps.append(replace(ask, text=words))
-    elif study.items:
-        steps += [
-            replace(ask, item=item.name, text=item.question, low=item.low, middle=item.middle, high=item.high)
-            for item in study.items
-            if item.name not in done
-        ]
-    else:
-        steps.append(ask)
+    steps += [step for step in _questions(protocol, trial, base) if step.item not in done]
     steps.append(replace(base, kind="pause", duration_s=timing.pause_s))
     return steps
+
+
+def _questions(protocol: Protocol, trial: Trial, base: Step) -> list[Step]:
+    """What is asked after the stimuli of a trial."""
+    study, texts = protocol.study(trial.study), protocol.texts
+    task, question = task_of(study), wording.question_text(protocol, study)
+    ask = replace(base, kind="answer", text=question, legal=task.legal(study), answered_by=kind_of(study))
+    ask = replace(ask, duration_s=protocol.timing.answer_s if task.timed else None)
+    if trial.role == "check":
+        return [replace(ask, text=texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected)))]
+    if study.items:
+        return [
+            replace(ask, item=item.name, text=item.question, low=item.low, middle=item.middle, high=item.high)
+            for item in study.items
+        ]
+    if study.confidence_points is None:
+        return [ask]
+    sure = replace(base, kind="answer", item=CONFIDENCE, text=texts.how_sure, answered_by="point")
+    sure = replace(sure, low=texts.least_sure, high=texts.most_sure, legal=scale(study.confidence_points))
+    return [ask, sure]

@@ -70,8 +70,9 @@ def instructions_text(protocol: Protocol, study: StudySpec, films: Films = NO_FI
 
 
 def _instructions_standard(protocol: Protocol, study: StudySpec) -> str:
-    own = task_of(study).instructions
-    return "\n\n".join(_standard(protocol, each) for each in (own, *(["practice"] if study.practice else [])))
+    besides = {"ties": study.ties, "confidence": study.confidence_points, "practice": study.practice}
+    named = (task_of(study).instructions, *(name for name, there in besides.items() if there))
+    return "\n\n".join(_standard(protocol, name) for name in named)
 
 
 def question_text(protocol: Protocol, study: StudySpec) -> str:
@@ -136,7 +137,8 @@ def duration_s(protocol: Protocol, *, at_most: bool = False, films: Films = NO_F
         counted += protocol.trials_of(study) + study.attention_checks
     if protocol.timing.break_after:
         total += _BREAK_S * ((counted - 1) // protocol.timing.break_after)
-    return total + _FIELD_S * len(protocol.form) + _letters(protocol) / _LETTERS_A_SECOND
+    fields = sum(len(protocol.form_of(name)) for name in ("", *(study.name for study in protocol.studies)))
+    return total + _FIELD_S * fields + _letters(protocol) / _LETTERS_A_SECOND
 
 
 def _estimated(protocol: Protocol, study: StudySpec) -> FilmTimes:
@@ -152,7 +154,8 @@ def _besides_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
     timing = protocol.timing
     answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
     gap_s = timing.gap_s * (task_of(study).slots - 1)
-    return gap_s + (_ITEM_S * len(study.items) or answer_s) + timing.pause_s
+    sure_s = _ANSWER_S if study.confidence_points else 0.0
+    return gap_s + (_ITEM_S * len(study.items) or answer_s) + sure_s + timing.pause_s
 
 
 def _letters(protocol: Protocol) -> int:
@@ -187,6 +190,8 @@ def all_texts(protocol: Protocol, films: Films = NO_FILMS) -> tuple[Read, ...]:
             scale = " ... ".join(filter(None, (item.low, item.middle, item.high)))
             ends = f" [{scale}]" if scale else ""
             found.append(Read(f"{study.name}: item {item.name}", item.question + ends))
+        for field in study.form:
+            found.append(Read(f"{study.name}: form: {field.name}", " | ".join([field.label, *field.choices])))
     found.append(Read("texts.debrief", debrief_text(protocol, films)))
     small = [name for name in type(protocol.texts).model_fields if name not in ("welcome", "debrief")]
     found += [Read(f"texts.{name}", getattr(protocol.texts, name)) for name in small]

@@ -16,13 +16,14 @@ class PreferenceObserver:
     """Choice by utilities: log-odds of choosing a over b are the difference of the methods' utilities.
 
     `order_bias` is the log-odds that the first of two equal stimuli is chosen; `participant_sd` the standard
-    deviation over participants of their preference between methods.
+    deviation over participants of their preference between methods; `ties` Davidson's nu, where neither may be chosen.
     """
 
     utility: Mapping[str, float]
     order_bias: float = 0.1
     lapse: float = 0.01
     participant_sd: float = 0.0
+    ties: float = 0.8
 
 
 def lean(observer: PreferenceObserver, method_a: str, method_b: str) -> float:
@@ -34,6 +35,12 @@ def chance_of_first(observer: PreferenceObserver, towards_first: float) -> float
     """Chance that the first of two is chosen, where the log-odds for it are `towards_first` besides the order's."""
     chance = float(logistic(np.asarray(towards_first + observer.order_bias)))
     return observer.lapse / 2 + (1 - observer.lapse) * chance
+
+
+def chance_of_neither(observer: PreferenceObserver, towards_first: float) -> float:
+    """Chance that two are called equal, where that may be said (Davidson 1970); those who lapse choose."""
+    leaning = towards_first + observer.order_bias
+    return (1 - observer.lapse) * observer.ties / (2 * float(np.cosh(leaning / 2)) + observer.ties)
 
 
 def share_of_more(apart: FloatArray) -> float:

@@ -20,6 +20,11 @@ class RatingObserver:
     participant_sd: float = 0.3
 
 
+def stretch(points: int) -> float:
+    """How many points of a scale one of the observer's is: 1 of a scale with buttons, 25 of a slider of 0 to 100."""
+    return 25.0 if points > 11 else 1.0
+
+
 def mean_score(observer: RatingObserver, apart: float, points: int) -> float:
     """Mean over participants of what is rated, in points from 0.
 

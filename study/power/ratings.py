@@ -15,11 +15,12 @@ from study.arrays import BoolArray, FloatArray
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.choice import PreferenceObserver
-from study.models.ordinal import RatingObserver
+from study.models.ordinal import RatingObserver, stretch
 from study.power.curve import Run
 from study.power.design import Design, Effect, kept_of, motions_of, times
 from study.tasks.observer import ObserverSettings, default_observer
 from study.tasks.registry import task_of
+from study.tasks.task import points_of
 
 
 def rating_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
@@ -62,7 +63,9 @@ def rating_observer(study: StudySpec, difference: float, correlation: float, mis
     """An observer who rates the comparison higher by `difference` points before they are rounded to the scale."""
     typical = RatingObserver()
     spread = typical.noise_sd * np.sqrt(correlation / (1 - correlation))
-    utility: dict[str, float] = {study.comparison or "": difference / typical.utility_weight}
+    utility: dict[str, float] = {
+        study.comparison or "": difference / typical.utility_weight / stretch(points_of(study))
+    }
     return replace(
         default_observer(),
         preference=PreferenceObserver(utility=utility),
@@ -77,16 +80,16 @@ def rating_study(design: Design, alpha: float, difference: float) -> Run:
     Of each participant's own differences of the two methods' ratings; where pairs are rated, of the scores less the
     middle of the scale (whether a trial showed one or the other first changes nothing).
     """
-    rating, points, paired = design.settings.rating, design.study.scale_points, task_of(design.study).slots > 1
+    rating, points, paired = design.settings.rating, points_of(design.study), task_of(design.study).slots > 1
     trials = design.trials()
     raised = np.array([[paired or trial.methods[0] == design.study.comparison for trial in own] for own in trials])
     of_motion = motions_of(trials)
 
     def run(rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
-        people, middle = max(sizes), (points - 1) / 2
-        leniency = rating.participant_sd * rng.standard_normal((studies, people, 1))
+        people, middle, wide = max(sizes), (points - 1) / 2, stretch(points)
+        leniency = wide * rating.participant_sd * rng.standard_normal((studies, people, 1))
         leaning = middle + difference * raised[:people] + leniency
-        given = np.clip(np.round(leaning + rating.noise_sd * rng.standard_normal(leaning.shape)), 0, points - 1)
+        given = np.clip(np.round(leaning + wide * rating.noise_sd * rng.standard_normal(leaning.shape)), 0, points - 1)
         response_s, answered = times(design, rng, np.full(given.shape, 0.5))
         kept = kept_of(design, rng, response_s, answered)
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from study.analysis.analyse import Analysis, Results
+from study.analysis.confidence import HowSure
 from study.analysis.quality import Quality
 from study.counting import counted, noun
 from study.report import tables, words
 from study.report.drawing import BLUE, FAINT, ORANGE, new_figure, quiet_grid, to_svg
+from study.report.sections.section import About
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,6 +90,17 @@ def checks_sentence(checks: pd.DataFrame) -> str:
     people = checks["participant"].nunique()
     asked = counted(len(checks), "attention check")
     return f"{passed} of {asked} by {counted(people, 'participant')} were passed."
+
+
+def sure_table(about: About, rows: Sequence[HowSure]) -> tables.Table:
+    """Return how sure participants were of their choices."""
+    return tables.make(
+        f"{about.name}_how_sure",
+        "How sure participants were of their answers, from 0. Mean over participants of their means, with its standard "
+        "error and 95% interval (Student’s t).",
+        "answer answers participants mean standard_error low high",
+        [vars(row) for row in rows],
+    )
 
 
 def quality_sentence(quality: Quality) -> str:

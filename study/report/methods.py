@@ -106,7 +106,12 @@ def _study(protocol: Protocol, study: StudySpec) -> str:
     chosen = f" Trials were chosen by {by}." if (by := study.procedure.in_words()) else ""
     asked = "; ".join([item.question for item in study.items] or [question_text(protocol, study)])
     tried = f" {counted(study.practice, 'practice trial')} came first." if study.practice else ""
-    return f"In “{title}”, participants {what}. {order}{repeated}.{chosen} They were asked: “{asked}”{tried}"
+    sure = (
+        f" After each answer they said how sure they were, on {points} points."
+        if (points := study.confidence_points)
+        else ""
+    )
+    return f"In “{title}”, participants {what}. {order}{repeated}.{chosen} They were asked: “{asked}”{sure}{tried}"
 
 
 def _blends(protocol: Protocol, study: StudySpec, method: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from study.analysis.analyse import Analysis
 from study.counting import counted
@@ -118,7 +118,7 @@ def _sections(material: Material, analysis: Analysis, mark: str) -> Iterator[Sec
             mark=mark,
             alpha=analysis.alpha,
             confidence=analysis.confidence,
-            points=study.scale_points,
+            points=protocol.scale_points.get(study.name, 0),
             ends={item.name: (item.low, item.high) for item in study.items},
             transitions=tuple(transition.name for transition in protocol.transitions_of(study)),
             lengths={
@@ -130,7 +130,9 @@ def _sections(material: Material, analysis: Analysis, mark: str) -> Iterator[Sec
         )
         result = analysis.studies.get(study.name)
         made = None if result is None else SECTIONS[type(result)].section(result, about)
-        yield made or _without_answers(material, about)
+        made = made or _without_answers(material, about)
+        sure = [row for row in analysis.how_sure if row.study == study.name]
+        yield replace(made, tables=(*made.tables, conduct.sure_table(about, sure))) if sure else made
 
 
 def _without_answers(material: Material, about: About) -> Section:

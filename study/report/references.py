@@ -41,6 +41,10 @@ AS_SAMPLES = (
     "with participants and motions as samples (Clark 1973) and Satterthwaite’s degrees of freedom (1946), made smaller "
     "for few motions"
 )
+DAVIDSON_1970 = (
+    "Davidson, R. R. (1970). On extending the Bradley-Terry model to accommodate ties in paired comparison "
+    "experiments. Journal of the American Statistical Association, 65, 317–328."
+)
 BRADLEY_1952 = (
     "Bradley, R. A., & Terry, M. E. (1952). Rank analysis of incomplete block designs. Biometrika, 39, 324–345."
 )

@@ -38,6 +38,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "side": ("blend is", "text"),
     "difference_frames": ("frames from k", "count"),
     "remark": ("remark", "text"),
+    "answer": ("answer", "text"),
     # Counts.
     "participants": ("participants", "count"),
     "answers": ("answers", "count"),

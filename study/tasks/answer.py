@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+CONFIDENCE = "confidence"
+"""The item under which the question how sure somebody is of a choice is answered."""
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
     """What a participant did at one question.
 
-    `value` is None where the answer window closed first. `item` is empty except for ratings. `response_s` runs from the
-    end of the last stimulus. `shown_well` is False where the presentation was faulty, so that the trial is repeated.
+    `value` is None where the answer window closed first. `item` is empty except for ratings and `CONFIDENCE`.
+    `response_s` runs from the end of the last stimulus. `shown_well` is False where the presentation was faulty; the
+    trial is then repeated.
     """
 
     trial: int

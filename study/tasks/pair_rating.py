@@ -19,6 +19,9 @@ from study.tasks.trial import Trial
 def _problems(asked: Asked) -> Iterator[Problem]:
     yield from two_methods(asked)
     yield from scale_problems(asked)
+    if asked.slider:
+        who = f"the {asked.task} study {asked.name!r}"
+        yield "slider", f"expected points of a scale in {who}, where pairs are rated, found a slider; remove it"
 
 
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
@@ -42,7 +45,7 @@ PAIR_RATING = Task(
     orders=((0, 1), (1, 0)),
     timed=False,
     tested=False,
-    keys=frozenset({"items", "show"}),
+    keys=frozenset({"items", "show", "slider"}),
     instructions="rating_pairs",
     question="",
     welcome="welcome_pairs",

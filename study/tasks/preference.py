@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from study.models.choice import chance_of_first, lean, preference_probability
+from study.models.choice import chance_of_first, chance_of_neither, lean, preference_probability
 from study.tasks.answer import Answer
 from study.tasks.methods import CHOICE, against, any_practice, both_methods, two_methods
 from study.tasks.observer import ObserverSettings, Person
@@ -16,15 +16,17 @@ from study.tasks.trial import Trial
 
 
 def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
-    counted = not answer.missed and trial.role != "check"
+    counted = answer.value in ("first", "second") and trial.role != "check"
     return {"a_first": trial.a_first, "chose_a": (answer.value == "first") == trial.a_first if counted else None}
 
 
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
-    first, second = legal
     leaning = lean(who.settings.preference, *trial.methods) + who.lean
-    chance = chance_of_first(who.settings.preference, leaning if trial.a_first else -leaning)
-    return (first if rng.random() < chance else second), abs(2 * chance - 1)
+    towards_first = leaning if trial.a_first else -leaning
+    chance = chance_of_first(who.settings.preference, towards_first)
+    if "equal" in legal and rng.random() < chance_of_neither(who.settings.preference, towards_first):
+        return "equal", 1 - abs(2 * chance - 1)
+    return ("first" if rng.random() < chance else "second"), abs(2 * chance - 1)
 
 
 def _truth(settings: ObserverSettings, asked: Asked, _level: float) -> dict[str, Any]:
@@ -38,11 +40,13 @@ def _truth(settings: ObserverSettings, asked: Asked, _level: float) -> dict[str,
 
 
 def _in_words(asked: Asked, blends: Callable[[str], str]) -> str:
+    neither = ", or neither" if asked.ties else ""
     if not asked.others:
-        return f"chose the more natural of two transitions, {against(asked, blends)}"
+        return f"chose the more natural of two transitions{neither}, {against(asked, blends)}"
     named = [blends(name) for name in (asked.reference, asked.comparison or "", *asked.others)]
     some = f", each participant one of {asked.sets} balanced sets" if asked.sets else ""
-    return f"chose the more natural of two transitions, of all pairs of {', '.join(named[:-1])} and {named[-1]}{some}"
+    every = f"all pairs of {', '.join(named[:-1])} and {named[-1]}"
+    return f"chose the more natural of two transitions{neither}, of {every}{some}"
 
 
 PREFERENCE = Task(
@@ -54,11 +58,11 @@ PREFERENCE = Task(
     orders=((0, 1), (1, 0)),
     timed=True,
     tested=True,
-    keys=frozenset({"others", "sets"}),
+    keys=frozenset({"others", "sets", "ties", "confidence_points"}),
     instructions="preference",
     question="question_preference",
     welcome="welcome_pairs",
-    legal=lambda _: ("first", "second"),
+    legal=lambda asked: ("first", "equal", "second") if asked.ties else ("first", "second"),
     right=lambda _: None,
     columns=_columns,
     problems=two_methods,

@@ -7,15 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from study.counting import counted
+from study.models.ordinal import stretch
 from study.tasks.methods import against, any_practice
 from study.tasks.observer import Person
-from study.tasks.task import Asked, Condition, Problem, Task
+from study.tasks.task import Asked, Condition, Problem, Task, points_of, scale
 from study.tasks.trial import Trial
 
 
 def points(asked: Asked) -> tuple[str, ...]:
     """The points of the scale, from 0."""
-    return tuple(str(point) for point in range(asked.scale_points))
+    return scale(points_of(asked))
 
 
 def scale_problems(asked: Asked) -> Iterator[Problem]:
@@ -23,7 +24,7 @@ def scale_problems(asked: Asked) -> Iterator[Problem]:
     who = f"the {asked.task} study {asked.name!r}"
     if not asked.items:
         yield "", f"expected at least one [[studies.items]] in {who}, found none; add one"
-    if named := [item.name for item in asked.items if item.middle and asked.scale_points % 2 == 0]:
+    if named := [item.name for item in asked.items if item.middle and points_of(asked) % 2 == 0]:
         yield (
             "scale_points",
             f"expected an odd number of scale_points in {who}, where {named[0]!r} has words for the middle, found "
@@ -33,14 +34,16 @@ def scale_problems(asked: Asked) -> Iterator[Problem]:
 
 def rated_point(who: Person, higher: float, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
     """The point that a person gives to what lies `higher` points above the middle of the scale."""
-    noise = who.settings.rating.noise_sd * float(rng.standard_normal())
-    return legal[int(np.clip(round((len(legal) - 1) / 2 + higher + noise), 0, len(legal) - 1))], 0.5
+    from_middle = higher + who.settings.rating.noise_sd * float(rng.standard_normal())
+    point = round((len(legal) - 1) / 2 + stretch(len(legal)) * from_middle)
+    return legal[int(np.clip(point, 0, len(legal) - 1))], 0.5
 
 
 def scale_in_words(asked: Asked, blends: Callable[[str], str]) -> str:
     """What is rated, on which scale."""
     asked_items = counted(len(asked.items), "question")
-    return f"{against(asked, blends)}, on a scale of 0 to {asked.scale_points - 1} in {asked_items}"
+    drawn = f"slider{' with ticks' if asked.slider == 'ticks' else ''}" if asked.slider else "scale"
+    return f"{against(asked, blends)}, on a {drawn} of 0 to {points_of(asked) - 1} in {asked_items}"
 
 
 def _problems(asked: Asked) -> Iterator[Problem]:
@@ -72,7 +75,7 @@ RATING = Task(
     orders=((0,),),
     timed=False,
     tested=False,
-    keys=frozenset({"items", "show"}),
+    keys=frozenset({"items", "show", "slider"}),
     instructions="rating",
     question="",
     welcome="welcome_films",

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from study.tasks.answer import Answer
+from study.tasks.answer import CONFIDENCE, Answer
 from study.tasks.oddity import ODDITY
 from study.tasks.pair_rating import PAIR_RATING
 from study.tasks.preference import PREFERENCE
 from study.tasks.rating import RATING
 from study.tasks.same_different import SAME_DIFFERENT
-from study.tasks.task import Asked, Problem, Task
+from study.tasks.task import Asked, Kind, Problem, Task
 from study.tasks.trial import Trial
 
 TASKS: Mapping[str, Task] = {task.name: task for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING, ODDITY)}
@@ -34,6 +34,11 @@ def task_of_trial(trial: Trial) -> Task:
     return next(task for task in own if task.slots == len(trial.stimuli))
 
 
+def kind_of(asked: Asked) -> Kind:
+    """What is answered in a study."""
+    return "slider" if asked.slider else task_of(asked).kind
+
+
 def problems_of(asked: Asked) -> Iterator[Problem]:
     """What does not fit between a study's task and its other keys."""
     task = task_of(asked)
@@ -52,7 +57,8 @@ def right_answer(trial: Trial) -> str | None:
 
 def answer_columns(trial: Trial, answer: Answer) -> dict[str, Any]:
     """A row of the table of answers: the trial, what was answered, and what that means to the task."""
-    right = right_answer(trial)
+    sure = answer.item == CONFIDENCE
+    right = None if sure else right_answer(trial)
     return {
         "trial": trial.trial,
         "item": answer.item,
@@ -78,5 +84,5 @@ def answer_columns(trial: Trial, answer: Answer) -> dict[str, Any]:
         "shown_well": answer.shown_well,
         "role": trial.role,
         "expected": trial.expected,
-        **task_of_trial(trial).columns(trial, answer),
+        **({} if sure else task_of_trial(trial).columns(trial, answer)),
     }

@@ -19,12 +19,21 @@ from study.tasks.trial import Pair, Trial
 Layout = Literal["one after another"]
 """How the slots of a trial are shown."""
 
-Kind = Literal["word", "point"]
-"""What is answered: a word, each with a button and a key, or a point of a scale."""
+Kind = Literal["word", "point", "slider"]
+"""What is answered: a word, each with a button and a key, a point of a scale, or a place on a slider."""
+
+SLIDER_POINTS = 101
+"""A slider goes from 0 to 100."""
+
+
+def scale(points: int) -> tuple[str, ...]:
+    """The points of a scale, from 0."""
+    return tuple(map(str, range(points)))
 
 
 Order = Literal["both", "random", "balanced", "by-group"]
 Show = Literal["single", "pair"]
+Slider = Literal["plain", "ticks"]
 
 
 class Item(Protocol):
@@ -48,11 +57,19 @@ class Asked(Protocol):
     order: Order
     repeats: int
     attention_checks: int
+    ties: bool
+    confidence_points: int | None
+    slider: Slider | None
     scale_points: int
 
     @property
     def items(self) -> Sequence[Item]:
         """Questions of a rating."""
+
+
+def points_of(asked: Asked) -> int:
+    """How many points the scale of a rating has."""
+    return SLIDER_POINTS if asked.slider else asked.scale_points
 
 
 Problem = tuple[str, str]
@@ -100,7 +117,7 @@ class Task:
     """What is decided, as a clause: "whether two transitions are the same"."""
     layout: Layout
     kind: Kind
-    """How its slots are shown, and what is answered."""
+    """How its slots are shown, and what is answered; `kind_of` knows a study's sliders."""
     orders: tuple[tuple[int, ...], ...]
     """The orders in which a pair can be shown: for each slot, which of the pair's stimuli it shows."""
     timed: bool

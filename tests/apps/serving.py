@@ -184,7 +184,8 @@ class Person:
 
     def done(self, view: dict[str, Any], **more: Any) -> dict[str, Any]:
         if view["kind"] == "form":
-            more.setdefault("values", {"age": "33"})
+            asked = {field["name"] for field in view["fields"]}
+            more.setdefault("values", {"age": "33"} if "age" in asked else {})
         answer = self.post("/api/done", {"step": view["step"], **more})
         assert answer.status_code == 200, answer.text
         return answer.json()
@@ -226,11 +227,12 @@ class Serving:
 
 def answer_to(view: dict[str, Any], value: str | None = "", **more: Any) -> dict[str, Any]:
     """A message that answers a trial's view; the first legal answer unless given."""
+    first, *_ = [option["value"] for option in view["question"]["options"]] or ["0"]
     return {
         "trial": view["trial"],
         "attempt": view["attempt"],
         "item": view["question"]["item"],
-        "value": view["question"]["options"][0]["value"] if value == "" else value,
+        "value": first if value == "" else value,
         "response_s": 0.5,
         "shown_well": True,
         "shown": [

@@ -67,11 +67,17 @@ catch_every = 4
 
 
 def text_with(procedure: str) -> str:
-    """The served protocol without consent and form: its same-different study with a procedure, and one study more."""
+    """The served protocol without consent and form: its same-different study with a procedure, and one study more.
+
+    The first also asks how sure participants are, which changes nothing of what comes next.
+    """
     head, jnd, liking, *_ = PROTOCOL.split("\n[[studies]]\n")
     head = head.replace('text = "Do you take part?"', 'text = ""')
     head = head[: head.index("[[form]]")] + head[head.index("[stimuli]") :]
-    jnd = jnd.replace('differences_frames = [-2, 0]\norder = "both"\n', "").replace("attention_checks = 1\n", procedure)
+    jnd = jnd.replace('differences_frames = [-2, 0]\norder = "both"\n', "").replace(
+        "attention_checks = 1\n", f"confidence_points = 4\n{procedure}"
+    )
+    jnd = jnd.replace("attention_checks = 1\n", f"confidence_points = 4\n{procedure}")
     return "\n[[studies]]\n".join([head, jnd, liking])
 
 

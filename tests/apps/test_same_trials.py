@@ -42,9 +42,26 @@ from study.motion.library import open_library
 PEOPLE = ("sim-001", "sim-002")
 READ = ("instructions", "feedback", "break", "debrief")
 # What depends on who answers; all else belongs to the trials.
-OF_THE_ANSWER = ("answer", "missed", "correct", "chose_a", "response_s")
+OF_THE_ANSWER = ("answer", "missed", "correct", "chose_a", "confidence", "response_s")
 MARKS = ("simulated", "answered_at")
 AGE = "33"
+
+TEXT = (
+    PROTOCOL.replace('question = "Were they the same?"', 'question = "Were they the same?"\nconfidence_points = 4')
+    .replace('question = "Which was', 'ties = true\nconfidence_points = 7\nquestion = "Which was')
+    .replace('name = "rating"\n', 'name = "rating"\nslider = "ticks"\n')
+    .replace(
+        "attention_checks = 1\n",
+        """attention_checks = 1
+
+[[studies.form]]
+name = "remark"
+label = "What did you look at?"
+kind = "free-text"
+""",
+    )
+)
+"""Every kind of answer."""
 
 Read = list[tuple[str, str]]
 
@@ -56,13 +73,19 @@ def script(protocol: Protocol, plan: Plan) -> Iterator[Act]:
         if step.kind == "consent":
             yield press("1")
         elif step.kind == "form":
-            yield Act((*(Typed(digit, 0.1) for digit in AGE), Key("enter", 0.2)))
-            yield from [Act()] * len(AGE)  # the page is drawn anew with each digit
+            if not step.study:
+                yield Act((*(Typed(digit, 0.1) for digit in AGE), Key("enter", 0.2)))
+                yield from [Act()] * len(AGE)  # the page is drawn anew with each digit
             yield press("enter")
-            state, _ = filled(state, {"age": AGE})
+            state, _ = filled(state, {} if step.study else {"age": AGE})
             continue
         elif step.kind == "answer":
-            yield press(answer_keys(protocol, step.legal)[step.legal[0]], 0.5)
+            key = answer_keys(protocol, step.legal)[step.legal[0]]
+            if step.answered_by == "slider":
+                yield Act((Key(key, 0.4), Key("space", 0.5)))
+                yield Act()  # the page is drawn anew as the slider moves
+            else:
+                yield press(key, 0.5)
             state, _ = answered(state, step.legal[0], 0.5)
             continue
         elif step.kind in READ:
@@ -128,7 +151,7 @@ def table(responses: Responses) -> pd.DataFrame:
 def test_window_browser_and_simulation_have_the_same_trials(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    text = PROTOCOL.replace("seed = 5", f"seed = {seed}")
+    text = TEXT.replace("seed = 5", f"seed = {seed}")
     protocol = protocol_of(text)
     manifest = unfilmed(tmp_path / "served", text)
     with (
@@ -162,8 +185,13 @@ def test_window_browser_and_simulation_have_the_same_trials(
     pd.testing.assert_frame_equal(trials["window"], trials["simulation"])
     assert set(tables["window"].role) == {"trial", "practice", "check"}
     # Both always gave the first legal answer.
-    answers = {where: tables[where][[*OF_THE_ANSWER[:4]]] for where in ("window", "browser")}
+    answers = {where: tables[where][[*OF_THE_ANSWER[:5]]] for where in ("window", "browser")}
     pd.testing.assert_frame_equal(answers["window"], answers["browser"])
+
+    asked = tables["simulation"].dropna(subset=["confidence"])
+    assert set(asked.study) == {"jnd", "liking"}
+    assert not asked.missed.any()
+    assert (asked.confidence <= asked.study.map({"jnd": 3, "liking": 6})).all()
 
     # What was really put on the screen, and what was read between the trials.
     assert stimuli["window"] == stimuli["browser"]

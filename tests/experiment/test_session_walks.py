@@ -28,16 +28,21 @@ from study.experiment.session import (
     progress,
     restarted,
 )
+from study.experiment.steps import form_event
+from study.tasks.answer import CONFIDENCE
 from study.tasks.trial import Trial
 
 WALKS = 40
+PASSED = frozenset({"consent", "form", "form/jnd"})
 SHOW_AGAIN = (0, 1, 3)
 
 
 def full_protocol(show_again: int) -> Any:
-    """Consent, form, practice, checks, breaks, three tasks."""
+    """Consent, forms, practice, checks, breaks, three tasks, in one of them how sure participants are."""
     text = TOY_PROTOCOL + TOY_RATING
-    text = text.replace('order = "both"', 'order = "both"\npractice = 2\nattention_checks = 2')
+    form = 'form = [{ name = "seen", label = "What did you see?" }]'
+    more = f'order = "both"\npractice = 2\nattention_checks = 2\nconfidence_points = 3\n{form}'
+    text = text.replace('order = "both"', more, 1)
     text = text.replace('question = "How was it?"', 'question = "How was it?"\npractice = 1\nattention_checks = 1')
     text = text.replace("[points]", f"[timing]\nbreak_after = 4\nshow_again = {show_again}\n\n[points]")
     text = text.replace("[stimuli]", 'form = [{ name = "age" }]\nconsent = { text = "{standard}" }\n\n[stimuli]', 1)
@@ -63,7 +68,7 @@ class Walker:
             return open_session(session.protocol, session.plan, self.stored, passed=self.passed)
         step = current(session)
         if step.kind == "form":
-            session, _ = filled(session, {"age": "30"})
+            session, _ = filled(session, {} if step.study else {"age": "30"})
         elif step.kind == "answer":
             well = self.rng.random() >= self.stalls
             if self.rng.random() < self.misses:
@@ -77,7 +82,7 @@ class Walker:
         else:
             session = advanced(session)
         if step.kind in ("consent", "form"):
-            self.passed.add(step.kind)
+            self.passed.add(form_event(step.study) if step.kind == "form" else step.kind)
         return session
 
 
@@ -102,7 +107,10 @@ def whole(request: pytest.FixtureRequest, make_stimuli: Callable[[Protocol], Fak
 
 
 def asked_of(protocol: Protocol, trial: Trial) -> set[str]:
-    return {""} if trial.role == "check" else {item.name for item in protocol.study(trial.study).items} or {""}
+    study = protocol.study(trial.study)
+    if trial.role == "check" or not study.items:
+        return {"", CONFIDENCE} if study.confidence_points and trial.role != "check" else {""}
+    return {item.name for item in study.items}
 
 
 def test_every_walk_ends_with_every_question_answered_and_none_twice(whole: int) -> None:
@@ -122,7 +130,9 @@ def test_every_walk_ends_with_every_question_answered_and_none_twice(whole: int)
             assert 1 <= len(attempts) <= most
             for attempt in attempts:
                 of_attempt = [answer for answer in own if answer.attempt == attempt]
-                assert {answer.item for answer in of_attempt} == asked_of(protocol, trial)
+                missed_choice = any(answer.missed and not answer.item for answer in of_attempt)
+                asked = {""} if missed_choice else asked_of(protocol, trial)
+                assert {answer.item for answer in of_attempt} == asked
                 # Shown again only for a reason, and always where there is one and a showing left.
                 badly = any(not answer.shown_well for answer in of_attempt)
                 assert badly or attempt == attempts[-1]
@@ -137,7 +147,7 @@ def test_an_interruption_changes_nothing_of_what_follows(whole: int) -> None:
         plan = draw_plan(protocol, pairs, f"p{number}", group=number)
         stored = walk(protocol, plan, Walker(rng, stalls=0.4, misses=0.1, dies=0.0))
         for count in range(len(stored) + 1):
-            session = open_session(protocol, plan, stored[:count], passed={"consent", "form"})
+            session = open_session(protocol, plan, stored[:count], passed=PASSED)
             for answer in stored[count:]:
                 while current(session).kind != "answer":
                     session = advanced(session)
@@ -175,10 +185,10 @@ def test_the_same_seed_gives_the_same_answers_however_often_it_is_killed(whole: 
 
     def run(kills: Any) -> Any:
         stored: list[Answer] = []
-        session = open_session(protocol, plan, passed={"consent", "form"})
+        session = open_session(protocol, plan, passed=PASSED)
         while current(session).kind != "done":
             if kills.random() < 0.15:
-                session = open_session(protocol, plan, stored, passed={"consent", "form"})
+                session = open_session(protocol, plan, stored, passed=PASSED)
             if current(session).kind == "answer":
                 session, answer = answer_of(session)
                 stored.append(answer)
@@ -208,22 +218,20 @@ def test_an_item_after_a_bad_showing_keeps_the_whole_trial_to_be_shown_again(
         for item in sorted(asked_of(protocol, other))
     ]
     stored.append(Answer(trial.trial, "natural", 1, "2", 1.0, shown_well=False))
-    session = open_session(protocol, plan, stored, passed={"consent", "form"})
+    session = open_session(protocol, plan, stored, passed=PASSED)
     while current(session).kind != "answer":
         session = advanced(session)
     assert (current(session).trial, current(session).item) == (trial.trial, "noticeable")
     session, second = answered(session, "2", 1.0)
     assert any((step.trial, step.attempt) == (trial.trial, 2) for step in session.steps)
-    resumed = open_session(protocol, plan, [*stored, second], passed={"consent", "form"})
+    resumed = open_session(protocol, plan, [*stored, second], passed=PASSED)
     assert any((step.trial, step.attempt) == (trial.trial, 2) for step in resumed.steps)
 
 
 @pytest.mark.parametrize("response_s", [float("nan"), float("inf"), -0.001])
 def test_times_that_are_none_are_refused(make_stimuli: Callable[[Protocol], FakeStimuli], response_s: float) -> None:
     protocol = full_protocol(0)
-    session = open_session(
-        protocol, draw_plan(protocol, make_stimuli(protocol).pairs, "p1"), passed={"consent", "form"}
-    )
+    session = open_session(protocol, draw_plan(protocol, make_stimuli(protocol).pairs, "p1"), passed=PASSED)
     while current(session).kind != "answer":
         session = advanced(session)
     with pytest.raises(SessionError, match="Expected a response time from 0 to 5"):

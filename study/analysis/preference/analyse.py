@@ -163,6 +163,7 @@ def strengths(
         [str(name) for name in second],
         favoured,
         np.ones(len(given)),
+        tied=chosen == 0.5,
         with_order=bool(ordered),
         reference=reference,
         confidence=confidence,

@@ -26,6 +26,9 @@ def preference_answers(answers: pd.DataFrame) -> pd.DataFrame:
 
     estimates.check_columns(answers, NEEDED_COLUMNS, "a preference analysis")
     chosen = answers[answers["task"] == "preference"] if "task" in answers.columns else answers
+    chosen = chosen.astype({"chose_a": object})
+    if "answer" in chosen.columns:
+        chosen.loc[chosen["answer"] == "equal", "chose_a"] = 0.5
     given = chosen[chosen["chose_a"].notna()].copy()
     numbers = pd.to_numeric(given["chose_a"].astype(object).astype(str).str.lower().replace(_TRUTH), errors="coerce")
     strange = ~numbers.isin([0.0, 0.5, 1.0])

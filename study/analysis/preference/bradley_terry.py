@@ -1,13 +1,14 @@
 """Strengths of several methods from answers to pairs of them, with an effect of the order (Bradley & Terry 1952).
 
-    logit P(a is favoured over b) = strength a - strength b + order effect where a comes first
+    P(a) : P(b) : P(neither) = exp(d / 2) : exp(-d / 2) : nu,   d = strength a - strength b + order where a comes first
+
+`nu` is how readily people say that two are equal (Davidson 1970); without ties it is 0, and d the logit of P(a).
 
 Answers come in, strengths with standard errors go out (Davidson & Beaver 1977; Agresti 2013, section 11.6). Where it is
 known who answered, standard errors are those of participants (the sandwich of Liang & Zeger 1986), not of answers. If
 the motions are known too, participants and motions both are samples (Cameron, Gelbach & Miller 2011: the sandwich of
-either, less that of their cells). A tie counts half for each side. Estimates are those of maximum likelihood. Where a
-method never loses, the likelihood has no maximum; linear programs find which differences are finite (Konis 2007), and
-those are estimated.
+either, less that of their cells). Estimates are those of maximum likelihood. Where a method never loses, the likelihood
+has no maximum; linear programs find which differences are finite (Konis 2007), and those are estimated.
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ class BradleyTerry:
     """The reference method."""
     order: Strength | None
     """What coming first (or playing at home) adds, on the logit scale; None where the order is not known."""
+    ties: Strength | None
+    """The logarithm of Davidson's nu; None where nobody called two equal."""
     log_likelihood: float
     deviance: float
     degrees_of_freedom: int
@@ -68,6 +71,7 @@ def fit_bradley_terry(
     first_favoured: ArrayLike,
     shown: ArrayLike,
     *,
+    tied: ArrayLike = 0.0,
     with_order: bool = True,
     reference: str | None = None,
     confidence: float = 0.95,
@@ -81,7 +85,9 @@ def fit_bradley_terry(
     first, second : sequence of str, shape (rows,)
         The methods of each row, in the order of presentation.
     first_favoured, shown : array_like, shape (rows,)
-        How often the first was favoured, of how many answers.
+        How often the first was favoured, half of the ties included, of how many answers.
+    tied : array_like, shape (rows,)
+        How many of them were ties.
     with_order
         Whether coming first may matter.
     reference
@@ -98,9 +104,12 @@ def fit_bradley_terry(
         When the reference is none of the methods.
     """
     yes, total = np.asarray(first_favoured, float), np.asarray(shown, float)
+    tied = np.broadcast_to(np.asarray(tied, float), total.shape)
     methods = sorted({*first, *second})
     if len(methods) < 2 or total.sum() == 0:
         return "fewer than two methods were compared"
+    if tied.sum() == total.sum():
+        return "every answer was a tie: strengths cannot be estimated"
     if reference is not None and reference not in methods:
         raise AnalysisError(f"expected one of the methods {', '.join(methods)} as reference, found {reference!r}")
     design = np.zeros((len(yes), len(methods)))
@@ -112,55 +121,74 @@ def fit_bradley_terry(
     note = ""
     if with_order:
         every = np.column_stack([design, np.ones(len(yes))])
-        note = _why_no_order(every, yes, total)
+        note = _why_no_order(every, yes, total, tied)
         if note == DECIDED:
             return note
         design = design if note else every
-    apart = _differences_finite(design, yes, total, len(methods))
+    signed = _directions(design, yes, total, tied)
+    apart = _differences_finite(signed, len(methods))
     place = int(np.argmax(apart.sum(axis=1))) if reference is None else methods.index(reference)
     groups = [
         np.unique(np.asarray(names), return_inverse=True)[1]
         for names, fewest in ((participants, 1), (motions, FEWEST_MOTIONS))
         if names is not None and len(set(names)) >= fewest
     ]
-    told = np.append(np.delete(apart[place], place), np.ones(design.shape[1] - len(methods), dtype=bool))
+    besides = np.ones(design.shape[1] - len(methods), dtype=bool)
+    told = np.concatenate([np.delete(apart[place], place), besides, _ties_finite(signed, design.shape[1])])
     others = [method for method in methods if method != methods[place]]
     columns = np.delete(design, place, axis=1)
-    return _fitted(columns, yes, total, others, methods[place], groups, confidence, told, note)
+    return _fitted(columns, (yes, total, tied), others, methods[place], groups, confidence, told, note)
 
 
 DECIDED = "every answer went to the same position: this says nothing about the methods"
 
 
-def _why_no_order(design: FloatArray, yes: FloatArray, total: FloatArray) -> str:
+def _why_no_order(design: FloatArray, yes: FloatArray, total: FloatArray, tied: FloatArray) -> str:
     """Why the effect of the order, the last column, can't be estimated beside strengths; empty where it can."""
     if np.linalg.matrix_rank(design[total > 0]) < design.shape[1] - 1:
         return "the orders shown cannot separate an effect of order from the strengths: it is omitted"
     if yes.sum() in (0.0, total.sum()):
         return DECIDED
-    if not _finite(design, yes, total, np.eye(design.shape[1])[-1:])[0]:
+    signed = _directions(design, yes, total, tied)
+    if not _finite(signed, np.eye(signed.shape[1])[[design.shape[1] - 1]])[0]:
         return "these answers cannot separate the effect of order from the strengths: it is omitted"
     return ""
 
 
-def _differences_finite(design: FloatArray, yes: FloatArray, total: FloatArray, methods: int) -> BoolArray:
+def _directions(design: FloatArray, yes: FloatArray, total: FloatArray, tied: FloatArray) -> FloatArray:
+    """Steps of the effects, and of log nu where there are ties, along which no answer that was given becomes rarer.
+
+    They are those with `rows @ step >= 0`: an answer stays as frequent where neither of the others gains on it.
+    """
+    won, lost = design[yes - tied / 2 > 0], design[total - yes - tied / 2 > 0]
+    if not tied.any():
+        return np.unique(np.concatenate([won, -lost]), axis=0)
+    level = design[tied > 0]
+    rows = [(won, 0.0), (won / 2, -1.0), (-lost, 0.0), (-lost / 2, -1.0), (level / 2, 1.0), (-level / 2, 1.0)]
+    return np.unique(np.concatenate([np.insert(part, part.shape[1], nu, axis=1) for part, nu in rows]), axis=0)
+
+
+def _differences_finite(signed: FloatArray, methods: int) -> BoolArray:
     """Which strengths are finitely apart, shape (methods, methods)."""
     pairs = np.array(np.triu_indices(methods, 1)).T
-    contrasts = np.zeros((len(pairs), design.shape[1]))
+    contrasts = np.zeros((len(pairs), signed.shape[1]))
     contrasts[np.arange(len(pairs)), pairs[:, 0]], contrasts[np.arange(len(pairs)), pairs[:, 1]] = 1.0, -1.0
     found = np.eye(methods, dtype=bool)
-    found[pairs[:, 0], pairs[:, 1]] = found[pairs[:, 1], pairs[:, 0]] = _finite(design, yes, total, contrasts)
+    found[pairs[:, 0], pairs[:, 1]] = found[pairs[:, 1], pairs[:, 0]] = _finite(signed, contrasts)
     return found
 
 
-def _finite(design: FloatArray, yes: FloatArray, total: FloatArray, contrasts: FloatArray) -> BoolArray:
+def _ties_finite(signed: FloatArray, effects: int) -> BoolArray:
+    """Whether nu has a finite maximum of likelihood; empty without ties."""
+    return _finite(signed, np.eye(signed.shape[1])[effects:])
+
+
+def _finite(signed: FloatArray, contrasts: FloatArray) -> BoolArray:
     """Which contrasts of the effects have a finite maximum of likelihood.
 
     The likelihood does not fall along a direction that goes with every answer; what changes along one is not finite.
     """
     from scipy.optimize import linprog
-
-    signed = np.unique(np.concatenate([design[yes > 0], -design[yes < total]]), axis=0)
 
     def highest(aim: FloatArray) -> float:
         found = linprog(-aim, A_ub=-signed, b_ub=np.zeros(len(signed)), bounds=(-1, 1)).fun
@@ -169,13 +197,12 @@ def _finite(design: FloatArray, yes: FloatArray, total: FloatArray, contrasts: F
 
     if highest(signed.sum(axis=0)) < 1e-7:
         return np.ones(len(contrasts), dtype=bool)
-    return np.array([max(highest(one), highest(-one)) < 1e-7 for one in contrasts])
+    return np.array([max(highest(one), highest(-one)) < 1e-7 for one in contrasts], dtype=bool)
 
 
 def _fitted(
     design: FloatArray,
-    yes: FloatArray,
-    total: FloatArray,
+    counts: tuple[FloatArray, FloatArray, FloatArray],
     others: Sequence[str],
     held: str,
     groups: Sequence[NDArray[np.intp]],
@@ -185,40 +212,63 @@ def _fitted(
 ) -> BradleyTerry:
     """The strengths by maximum likelihood, with their covariance over participants where there are groups.
 
-    `design` has a row a comparison and a column a method but the one held at 0; `yes` of `total` answers favoured the
-    first. `told` says of each method whether the answers tell its strength.
+    `design` has a row a comparison and a column a method but the one held at 0; `counts` are answers for the first with
+    half of the ties, answers in all, and ties. `told` says of each effect whether the answers tell it.
     """
-    from scipy.special import expit, xlogy
+    from scipy.special import xlogy
 
-    def share(point: FloatArray) -> FloatArray:
-        return np.clip(np.asarray(expit(point @ design.T), dtype=np.float64), 1e-12, 1 - 1e-12)
+    yes, total, tied = counts
+    effects = design.shape[1]
+    with_ties = len(told) > effects
+
+    def parts(point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Half the logit of each row, log nu, and the logarithm of the sum of the three."""
+        half, nu = point[:, :effects] @ design.T / 2, point[:, effects:] if with_ties else np.full((1, 1), -np.inf)
+        return half, nu, np.logaddexp(np.logaddexp(half, -half), nu)
 
     def value(point: FloatArray, _: NDArray[np.intp]) -> FloatArray:
-        p = share(point)
-        return np.asarray((yes * np.log(p) + (total - yes) * np.log1p(-p)).sum(axis=1), dtype=np.float64)
+        half, nu, whole = parts(point)
+        ties = (tied * nu).sum(axis=1) if with_ties else 0.0
+        return np.asarray(((2 * yes - total) * half - total * whole).sum(axis=1) + ties, dtype=np.float64)
+
+    def rows(point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of each row the score `(rows, effects)`; the chance of the first, half a tie's included, and of a tie."""
+        half, nu, whole = (part[0] for part in parts(point[None]))
+        neither = np.exp(nu - whole)
+        first = np.exp(half - whole) + neither / 2
+        score = (yes - total * first)[:, None] * design
+        return (np.column_stack([score, tied - total * neither]) if with_ties else score), first, neither
 
     def scores(point: FloatArray, _: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        p = share(point)
-        return (yes - total * p) @ design, np.einsum("bl,lp,lq->bpq", total * p * (1 - p), design, design)
+        score, first, neither = rows(point[0])
+        information = np.zeros((len(told), len(told)))
+        information[:effects, :effects] = design.T @ (design * (total * (first - neither / 4 - first**2))[:, None])
+        if with_ties:
+            information[effects, :effects] = (total * (neither / 2 - first * neither)) @ design
+            information[:effects, effects] = information[effects, :effects]
+            information[effects, effects] = (total * neither * (1 - neither)).sum()
+        return score.sum(axis=0)[None], information[None]
 
-    size = design.shape[1]
+    size = len(told)
     best = maximise(value, scores, np.zeros((1, size)), np.full(size, -WIDEST), np.full(size, WIDEST))
     point = best.point[0]
     _, information = scores(point[None], np.zeros(1, dtype=np.intp))
     errors = np.full(size, np.nan)
-    scored = (yes - total * share(point[None])[0])[:, None] * design
+    scored = rows(point)[0]
     errors[told] = _errors(information[0][np.ix_(told, told)], scored[:, told], groups)
     sizes = [int(group.max()) + 1 for group in groups]
     times = t_quantile(confidence, max(min(sizes) - 1, 1)) if sizes else normal_quantile(confidence)
     # By place, not by name: a method may well be called "order".
+    names = [*others, *(["order"] if effects > len(others) else []), *(["equal"] if with_ties else [])]
     found = [
         _strength(name, float(at) if finite else None, float(error), times, confidence)
-        for name, at, finite, error in zip([*others, "order"], point, told, errors, strict=False)
+        for name, at, finite, error in zip(names, point, told, errors, strict=True)
     ]
-    order = found.pop() if size > len(others) else None
+    ties = found.pop() if with_ties else None
+    order = found.pop() if effects > len(others) else None
     ranked = [*zip(point, found, strict=False), (0.0, Strength(held, 0.0, None, Interval(0.0, 0.0, confidence)))]
     ranked.sort(key=lambda pair: -pair[0])
-    every = (*found, *([order] if order else []))
+    every = (*found, *([order] if order else []), *([ties] if ties else []))
     endless = [row.method for row in every if row.value is None]
     notes = [note] if note else []
     if endless:
@@ -230,15 +280,15 @@ def _fitted(
         )
     # Rows may hold single answers: the saturated model is one share for every pair and order.
     cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
-    favoured, seen = np.bincount(cells, yes), np.bincount(cells, total)
-    rate = favoured / np.maximum(seen, 1e-12)
-    full = float((xlogy(favoured, rate) + xlogy(seen - favoured, 1 - rate)).sum())
+    seen, *given = (np.bincount(cells, each) for each in (total, yes - tied / 2, total - yes - tied / 2, tied))
+    full = float(sum(xlogy(each, each / np.maximum(seen, 1e-12)).sum() for each in given))
     deviance = max(2 * (full - float(best.value[0])), 0.0)
-    freedom = int((seen > 0).sum()) - size
+    freedom = int((seen > 0).sum()) * (2 if with_ties else 1) - size
     return BradleyTerry(
         strengths=tuple(row for _, row in ranked),
         reference=held,
         order=order,
+        ties=ties,
         log_likelihood=float(best.value[0]),
         deviance=deviance,
         degrees_of_freedom=max(freedom, 0),

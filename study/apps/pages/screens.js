@@ -35,6 +35,7 @@ function field(spec) {
   if (spec.kind === "number") {
     return element("input", { ...shared, type: "number", step: "any", min: spec.least, max: spec.most, inputmode: "numeric" });
   }
+  if (spec.kind === "free-text") return element("textarea", { ...shared, maxlength: "1000" });
   return element("input", { ...shared, type: "text", maxlength: "1000" });
 }
 

@@ -83,17 +83,18 @@ async function showFilms(view, study, { restarts, pauseOver, onFault }) {
   }
 }
 
-// What the buttons of each kind of answer look like.
-const BUTTONS = { word: "answer", point: "answer point" };
+// What is answered, by kind: each part calls `chosen` with the value and the time of the key or click. It gives what
+// stands above the words at the ends of a scale, and what stands below them.
+const ANSWERS = { word: options, point: options, slider };
 
-export function options(question, study, chosen) {
+function options(question, study, chosen) {
   const row = element("div", { class: "buttons centre", role: "group", "aria-label": question.text || question.item });
   for (const option of question.options) {
     const hint = option.key && option.key !== option.label ? study.texts.press.replace("{key}", option.key.toUpperCase()) : "";
     const words = [element("span", {}, option.label), hint ? element("small", {}, hint) : null].filter(Boolean);
     const button = element("button", {
       type: "button",
-      class: BUTTONS[question.kind],
+      class: question.kind === "point" ? "answer point" : "answer",
       "data-value": option.value,
       "aria-keyshortcuts": option.key || null,
       onclick: (event) => secondClick(event) || chosen(option.value, event.timeStamp),
@@ -101,7 +102,27 @@ export function options(question, study, chosen) {
     button.append(...words);
     row.append(button);
   }
-  return row;
+  return [row];
+}
+
+// A slider of 0 to 100, whose knob shows once it was moved: no place is suggested.
+function track(label, ticks, moved) {
+  const input = element("input", { type: "range", min: "0", max: "100", value: "50", class: "untouched", "aria-label": label, "aria-valuetext": "–" });
+  const touched = () => {
+    input.classList.remove("untouched");
+    input.setAttribute("aria-valuetext", input.value);
+    moved();
+  };
+  for (const kind of ["input", "click"]) input.addEventListener(kind, touched);
+  const marks = ticks ? element("div", { class: "ticks", "aria-hidden": "true" }, ...Array.from({ length: 11 }, () => element("i"))) : null;
+  return element("div", { class: "track" }, input, marks);
+}
+
+function slider(question, study, chosen) {
+  const made = track(question.text, question.slider === "ticks", () => (button.disabled = false));
+  const value = () => made.querySelector("input").value;
+  const button = element("button", { type: "button", disabled: true, onclick: (event) => secondClick(event) || chosen(value(), event.timeStamp) }, study.texts.go_on);
+  return [made, element("div", { class: "buttons centre" }, button)];
 }
 
 // Asks; resolves with the value (null where the window closed first) and the time of the key or button. The window is
@@ -115,16 +136,16 @@ function question(asked, study, from) {
       if (controller.signal.aborted) return;
       controller.abort();
       clearTimeout(timer);
-      for (const button of document.querySelectorAll("button.answer")) {
+      for (const button of document.querySelectorAll("main button, main input")) {
         button.disabled = true;
         button.setAttribute("aria-pressed", String(button.dataset.value === value));
       }
       resolve({ value, at, began });
     };
-    const row = options(asked, study, finish);
+    const [scale, below = ""] = ANSWERS[asked.kind](asked, study, finish);
     const named = asked.middle ? [asked.low, asked.middle, asked.high] : [asked.low, asked.high];
     const ends = named.some(Boolean) ? element("div", { class: asked.middle ? "ends thirds" : "ends" }, ...named.map((words) => element("span", {}, words))) : null;
-    show([heading(asked.text, { class: "question" }), element("div", { class: "scale" }, row, ends)], { trial: true });
+    show([heading(asked.text, { class: "question" }), element("div", { class: "scale" }, scale, ends), below], { trial: true });
     const asks = performance.now();
     const began = from ?? asks;
     document.addEventListener(

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Typed
+from renderer.events import CloseAsked, Event, Focus, Key, Resized, Typed
 from study.apps.player import screens
-from study.apps.player.pages import Button, DrawnPage, Look, Page, moved
+from study.apps.player.pages import Button, DrawnPage, Look, Page, changed, chosen
 from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing
 from study.errors import SessionError
@@ -85,7 +85,7 @@ class Desk:
                 if button is not None and in_time:
                     self.notice(events[number + 1 :])  # a second key counts for nothing; a lost focus is logged
                     return button, event.time_s
-                if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:
+                if (turned := changed(drawn, event)) is not None:
                     drawn, _ = self.show_page(turned)
                 elif self.notice((event,)):
                     self.ask_to_stop()
@@ -133,16 +133,18 @@ class Desk:
                     raise Stopped("stopped")
                 if button is not None or (isinstance(event, Key) and event.name == "escape"):
                     return
-                if isinstance(event, Key) and (turned := moved(drawn.page, event.name)) is not None:
+                if (turned := changed(drawn, event)) is not None:
                     drawn, _ = self.show_page(turned)
                 elif isinstance(event, Resized):
                     drawn, _ = self.show_page(drawn.page)
 
-    def field(self, field: FormField, before: str, *, first: bool) -> str | None:
+    def field(self, field: FormField, heading: str, before: str, *, first: bool) -> str | None:
         """Ask one question of the form until what is filled in can be taken.
 
         Parameters
         ----------
+        heading
+            Of the form.
         before
             What was filled in when this question was asked the last time.
         first
@@ -154,12 +156,12 @@ class Desk:
             Empty where it was skipped; None where the participant goes back.
         """
         if field.kind == "choice":
-            name = self.read_until(screens.field_page(self.protocol, field, before, first=first))
+            name = self.read_until(screens.field_page(self.protocol, field, heading, before, first=first))
             if name == "back":
                 return None
             return "" if name == "go-on" else field.choices[int(name.removeprefix("choice-")) - 1]
         entry, complaint = before, False
-        drawn, _ = self.show_page(screens.field_page(self.protocol, field, entry, first=first))
+        drawn, _ = self.show_page(screens.field_page(self.protocol, field, heading, entry, first=first))
         while True:
             for event in self.window.wait(None):
                 button = chosen(drawn, event)
@@ -178,14 +180,5 @@ class Desk:
                     self.ask_to_stop()
                 elif not isinstance(event, Resized):
                     continue
-                page = screens.field_page(self.protocol, field, entry, first=first, complaint=complaint)
+                page = screens.field_page(self.protocol, field, heading, entry, first=first, complaint=complaint)
                 drawn, _ = self.show_page(page)
-
-
-def chosen(drawn: DrawnPage, event: Event) -> Button | None:
-    """The button that a key or a click means."""
-    if isinstance(event, Key):
-        return drawn.pressed(event.name)
-    if isinstance(event, Click):
-        return drawn.clicked(event.x, event.y)
-    return None

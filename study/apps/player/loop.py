@@ -166,18 +166,18 @@ class _Player(Desk):
 
     # The form, one question at a time
 
-    def _form(self, _: Step) -> None:
-        fields, values, number = self.protocol.form, dict[str, str](), 0
+    def _form(self, step: Step) -> None:
+        fields, values, number = self.protocol.form_of(step.study), dict[str, str](), 0
         while number < len(fields):
             name = fields[number].name
-            value = self.field(fields[number], values.get(name, ""), first=number == 0)
+            value = self.field(fields[number], step.text, values.get(name, ""), first=number == 0)
             if value is None:
                 number -= 1
             else:
                 values[name] = value
                 number += 1
         self.session, taken = filled(self.session, values)
-        self.store.form(taken)
+        self.store.form(taken, step.study)
 
     # A trial
 

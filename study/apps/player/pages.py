@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.events import Click, Event, Key
 from study.apps.player.lettering import Fonts
 
 RGB = tuple[int, int, int]
@@ -71,6 +72,12 @@ class Page:
     """What was typed so far into a field; None where there is none."""
     hint: str = ""
     """Small print under the field or the question."""
+    sliders: tuple[int | None, ...] = ()
+    """Where sliders of 0 to 100 stand, None for one that was not moved; with them the buttons count once all were."""
+    slider: int = 0
+    """Which of them the keys move."""
+    ticks: bool = False
+    """Whether they have ticks."""
     chosen: int = -1
     """Which button the arrow keys stand on; -1 for none."""
     back: Button | None = None
@@ -117,6 +124,8 @@ class DrawnPage:
     page: Page
     rgb: NDArray[np.uint8]
     boxes: tuple[Box, ...]
+    tracks: tuple[Box, ...] = ()
+    """Where sliders can be clicked; their ends are 0 and 100."""
 
     def clicked(self, x: float, y: float) -> Button | None:
         """The button at a place."""
@@ -141,11 +150,49 @@ class DrawnPage:
         return named
 
 
-def moved(page: Page, key: str) -> Page | None:
-    """The page after an arrow key; None where the key moves nothing."""
-    count = len(page.choices)
-    if key not in ("left", "right") or not count:
+def chosen(drawn: DrawnPage, event: Event) -> Button | None:
+    """The button that a key or a click means; of sliders that were all moved, one that is called as they stand."""
+    if isinstance(event, Key):
+        button = drawn.pressed(event.name)
+    else:
+        button = drawn.clicked(event.x, event.y) if isinstance(event, Click) else None
+    if button is None or not drawn.page.sliders:
+        return button
+    values = [str(value) for value in drawn.page.sliders if value is not None]
+    return replace(button, name=" ".join(values)) if len(values) == len(drawn.page.sliders) else None
+
+
+def changed(drawn: DrawnPage, event: Event) -> Page | None:
+    """The page after a key or a click that moves something on it; None where nothing moves."""
+    if drawn.page.sliders:
+        return _slid(drawn, event)
+    count, page = len(drawn.page.choices), drawn.page
+    if not isinstance(event, Key) or event.name not in ("left", "right") or not count:
         return None
     if page.chosen < 0:
-        return replace(page, chosen=0 if key == "right" else count - 1)
-    return replace(page, chosen=(page.chosen + (1 if key == "right" else -1)) % count)
+        return replace(page, chosen=0 if event.name == "right" else count - 1)
+    return replace(page, chosen=(page.chosen + (1 if event.name == "right" else -1)) % count)
+
+
+def _slid(drawn: DrawnPage, event: Event) -> Page | None:
+    """A click sets a slider; arrow keys move it by 1, digits set it to that many tens, the tabulator takes the next."""
+    page, at = drawn.page, drawn.page.slider
+    if isinstance(event, Click):
+        for number, (left, top, right, bottom) in enumerate(drawn.tracks):
+            if top <= event.y < bottom and left - (bottom - top) <= event.x <= right + (bottom - top):
+                return _set(page, number, round(100 * (event.x - left) / (right - left)))
+    if not isinstance(event, Key):
+        return None
+    if event.name in ("tab", "down", "up"):
+        return replace(page, slider=(at + (-1 if event.name == "up" else 1)) % len(page.sliders))
+    if event.name.isdigit():
+        return _set(page, at, 10 * int(event.name))
+    if event.name in ("left", "right"):
+        value = page.sliders[at]
+        return _set(page, at, 50 if value is None else value + (1 if event.name == "right" else -1))
+    return None
+
+
+def _set(page: Page, number: int, value: int) -> Page:
+    sliders = [*page.sliders[:number], min(max(value, 0), 100), *page.sliders[number + 1 :]]
+    return replace(page, sliders=tuple(sliders), slider=number)

@@ -9,7 +9,6 @@ from study.apps.player.pages import POINTS, Button, Page
 from study.experiment.protocol.texts import FormField
 from study.experiment.protocol.whole import Protocol
 from study.experiment.steps import Step, answer_keys, answer_words
-from study.tasks.registry import task_of
 from study.tasks.task import Kind
 
 
@@ -40,7 +39,7 @@ def consent_page(protocol: Protocol, step: Step) -> Page:
 
 def answer_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Page:
     """The question after the stimuli, a button for each legal answer."""
-    page = ANSWERS[task_of(protocol.study(step.study)).kind](protocol, step)
+    page = ANSWERS[step.answered_by](protocol, step)
     note = protocol.texts.practice if step.role == "practice" else ""
     return _with_progress(protocol, replace(page, note=note), progress, step.role != "practice")
 
@@ -64,11 +63,20 @@ def _points(protocol: Protocol, step: Step) -> Page:
     return replace(scale, low=step.low, middle=step.middle, high=step.high)
 
 
-ANSWERS: Mapping[Kind, Callable[[Protocol, Step], Page]] = {"word": _words, "point": _points}
+def _slider(protocol: Protocol, step: Step) -> Page:
+    texts, ticks = protocol.texts, protocol.study(step.study).slider == "ticks"
+    button = Button("go-on", texts.go_on, "space", texts.space_key)
+    scale = Page(question=step.text, buttons=(button,), sliders=(None,), ticks=ticks)
+    return replace(scale, low=step.low, middle=step.middle, high=step.high)
+
+
+ANSWERS: Mapping[Kind, Callable[[Protocol, Step], Page]] = {"word": _words, "point": _points, "slider": _slider}
 """What each kind of answer looks like."""
 
 
-def field_page(protocol: Protocol, field: FormField, entry: str, *, first: bool, complaint: bool = False) -> Page:
+def field_page(
+    protocol: Protocol, field: FormField, heading: str, entry: str, *, first: bool, complaint: bool = False
+) -> Page:
     """One question of the form.
 
     Parameters
@@ -90,13 +98,13 @@ def field_page(protocol: Protocol, field: FormField, entry: str, *, first: bool,
         if not field.required:
             buttons.append(Button("go-on", texts.skip, "0", "0"))
         before = field.choices.index(entry) if entry in field.choices else -1
-        return Page("", field.label, tuple(buttons), note=texts.form, chosen=before, back=back)
+        return Page("", field.label, tuple(buttons), note=heading, chosen=before, back=back)
     words = texts.go_on if entry or field.required else texts.skip
     hint = _range(field)
     if complaint:
         hint = f"{texts.not_taken} {hint}".strip()
     button = Button("go-on", words, "enter", texts.enter_key)
-    return Page("", field.label, (button,), note=texts.form, entry=entry, hint=hint, back=back)
+    return Page("", field.label, (button,), note=heading, entry=entry, hint=hint, back=back)
 
 
 def _range(field: FormField) -> str:

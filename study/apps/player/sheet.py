@@ -51,10 +51,12 @@ def draw_page(page: Page, size: tuple[int, int], look: Look, *, must_fit: bool =
         )
     image = Image.new("RGB", size, look.ground)
     boxes = sheet.draw(ImageDraw.Draw(image))
-    return DrawnPage(page, np.asarray(image, dtype=np.uint8), tuple(boxes))
+    return DrawnPage(page, np.asarray(image, dtype=np.uint8), tuple(boxes), tuple(sheet.tracks))
 
 
 _ROW_GAP = 0.5
+_TRACK = 2.0
+"""Height of a slider, in ems."""
 
 
 class _Part(NamedTuple):
@@ -75,12 +77,14 @@ class _Sheet:
         if len(self.text) <= 2:
             self.text = balanced(page.text, self._font(1.0), column)
         self.question = balanced(page.question, self._font(1.3), column)
+        self.entry = wrapped(page.entry or "", self._font(1.1), column)
         self.hint = balanced(page.hint, self._font(0.82), column)
         self.stacked = False
         self.rows = self._button_rows(size[0] * 0.92)
         self.parts = self._parts()
         self.height = sum(part.high for part in self.parts) + em * sum(part.gap for part in self.parts[1:])
         self.boxes: list[Box] = []
+        self.tracks: list[Box] = []
 
     def _font(self, share: float) -> Face:
         return Face(self.look.fonts, max(6, round(self.em * share)))
@@ -98,13 +102,16 @@ class _Sheet:
         if self.question:
             lines(1.4, self.question, 1.3, 1.9, 1.0)
         if page.entry is not None:
-            parts.append(_Part(1.2, 2.4 * em, self._draw_entry))
+            parts.append(_Part(1.2, (1.2 + 1.2 * max(1, len(self.entry))) * em, self._draw_entry))
         if page.hint:
             lines(0.5, self.hint, 0.82, 1.25, 0.62)
+        if page.sliders:
+            parts.append(_Part(2.0, _TRACK * em * len(page.sliders), self._draw_sliders))
+            parts.append(_Part(0.2, 1.2 * em, self._draw_ends))
         if self.rows:
             gap = _ROW_GAP * em
             parts.append(_Part(2.0, (self._button_height() + gap) * len(self.rows) - gap, self._draw_buttons))
-        if page.low or page.middle or page.high:
+        if (page.low or page.middle or page.high) and not page.sliders:
             parts.append(_Part(0.5, 1.2 * em, self._draw_ends))
         return parts
 
@@ -122,10 +129,12 @@ class _Sheet:
         """Numbers and widths of the buttons, row by row: all as wide as the widest in one row, or one below another."""
         widths = [self._button_width(button) for button in self.page.buttons]
         gap, count = self._button_gap, len(widths)
-        if widths and max(widths) * count + gap * (count - 1) <= limit:
+        if not widths:
+            return []
+        if max(widths) * count + gap * (count - 1) <= limit:
             return [list(enumerate([max(widths)] * count))]
         if self.page.style.one_row:
-            return [list(enumerate([(limit - gap * (count - 1)) / count] * count))] if widths else []
+            return [list(enumerate([(limit - gap * (count - 1)) / count] * count))]
         self.stacked = True
         # Beside the words, the key's cap.
         wide = min(limit, max(widths) + 2.2 * self.em)
@@ -210,7 +219,8 @@ class _Sheet:
 
     def _draw_ends(self, pen: ImageDraw, top: float) -> None:
         """Words under the ends and the middle of a scale."""
-        left, right = min(box[0] for box in self.boxes), max(box[2] for box in self.boxes)
+        over = self.tracks or self.boxes
+        left, right = min(box[0] for box in over), max(box[2] for box in over)
         y, font, ink = top + 0.6 * self.em, self._font(0.85), self.look.mix(0.75)
         ends = [font.getlength(words) for words in (self.page.low, self.page.high)]
         wide = sum(ends) + 2 * self.em
@@ -222,16 +232,37 @@ class _Sheet:
         font.draw(pen, (right + spread, y), self.page.high, ink, "r")
         font.draw(pen, ((left + right) / 2, y), self.page.middle, ink, "m")
 
+    def _draw_sliders(self, pen: ImageDraw, top: float) -> None:
+        em, half = self.em, min(14 * self.em, 0.4 * self.size[0])
+        left, right = self.size[0] / 2 - half, self.size[0] / 2 + half
+        for number, value in enumerate(self.page.sliders):
+            self.tracks.append((left, top + number * _TRACK * em, right, top + (number + 1) * _TRACK * em))
+            self._draw_slider(pen, self.tracks[-1], value, stands=number == self.page.slider)
+
+    def _draw_slider(self, pen: ImageDraw, track: Box, value: int | None, *, stands: bool) -> None:
+        """A line with ticks, and a knob where it was moved to."""
+        left, top, right, bottom = track
+        em, y, wide = self.em, (top + bottom) / 2, max(1, round(self.em * 0.12))
+        for tick in range(0, 101, 10) if self.page.ticks else ():
+            x = left + tick / 100 * (right - left)
+            pen.line((x, y - 0.4 * em, x, y + 0.4 * em), fill=self.look.mix(0.38), width=max(1, wide // 2))
+        pen.line((left, y, right, y), fill=self.look.mix(0.6), width=wide)
+        if value is not None:
+            x, size = left + value / 100 * (right - left), (0.62 if stands else 0.5) * em
+            pen.ellipse((x - size, y - size, x + size, y + size), fill=self.look.mix(0.9))
+
     def _draw_entry(self, pen: ImageDraw, top: float) -> None:
         em, middle = self.em, self.size[0] / 2
-        font, words = self._font(1.1), self.page.entry or ""
-        half = max(8 * em, font.getlength(words) / 2 + em)
-        box = (middle - half, top, middle + half, top + 2.4 * em)
+        font, lines = self._font(1.1), self.entry or [""]
+        half = max(8 * em, max(map(font.getlength, lines)) / 2 + em)
+        last = top + (1.2 * len(lines)) * em
         outline, width = self.look.mix(0.6), max(1, round(em * 0.08))
+        box = (middle - half, top, middle + half, last + 1.2 * em)
         pen.rounded_rectangle(box, radius=0.3 * em, fill=self.look.raised, outline=outline, width=width)
-        self._middle(pen, words, top + 1.2 * em, 1.1, 1.0)
-        x = middle + font.getlength(words) / 2 + 0.12 * em
-        pen.line((x, top + 0.6 * em, x, top + 1.8 * em), fill=self.look.mix(0.8), width=width)
+        for number, words in enumerate(lines, start=1):
+            self._middle(pen, words, top + 1.2 * number * em, 1.1, 1.0)
+        x = middle + font.getlength(lines[-1]) / 2 + 0.12 * em
+        pen.line((x, last - 0.6 * em, x, last + 0.6 * em), fill=self.look.mix(0.8), width=width)
 
     def _draw_note(self, pen: ImageDraw) -> None:
         if self.page.note:

@@ -39,13 +39,13 @@ class ResponsesStore:
         self._waiting: list[tuple[str, Mapping[str, Any] | None]] = []
 
     def before(self) -> tuple[tuple[Answer, ...], tuple[str, ...], bool]:
-        """What was stored before: answers, steps passed (`consent`, `form`), and whether it was finished."""
+        """What was stored before: answers, what happened (`consent`, `form`, ...), and whether it was finished."""
         record = find_session(self._responses, self._plan.participant)
         if record is None:
             return (), (), False
         answers = stored_answers(self._responses, record.id)
         happened = event_counts(self._responses, record)
-        return answers, tuple(happened.keys() & {"consent", "form"}), "finished" in happened
+        return answers, tuple(happened), "finished" in happened
 
     def begin(self) -> None:
         """Write the session down, or take up the one that there is, with the events that waited for it."""
@@ -66,10 +66,10 @@ class ResponsesStore:
         record = self._begun()
         patiently(lambda: record_answer(self._responses, record, trial, answer, shown), self._responses.place)
 
-    def form(self, values: Mapping[str, str]) -> None:
-        """Commit the form."""
+    def form(self, values: Mapping[str, str], study: str) -> None:
+        """Commit a form: the one at the start, or one after a study."""
         record = self._begun()
-        patiently(lambda: record_form(self._responses, record, values), self._responses.place)
+        patiently(lambda: record_form(self._responses, record, values, study), self._responses.place)
 
     def event(self, kind: str, detail: Mapping[str, Any] | None = None) -> None:
         """Commit an event, or keep it until the session begins."""

@@ -238,7 +238,7 @@ class Host:
                 return {"kind": "declined"}
             if step.kind == "form":
                 state, values = filled(live.state, message.values)
-                await asyncio.to_thread(record_form, self.responses, live.record, values)
+                await asyncio.to_thread(record_form, self.responses, live.record, values, step.study)
             else:
                 state = advanced(live.state)
                 if step.kind in ("consent", "debrief"):

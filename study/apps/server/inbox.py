@@ -112,7 +112,8 @@ async def begin(host: Host, letter: Letter) -> Reply:
 
 async def done(host: Host, letter: Letter) -> Reply:
     """A page was read."""
-    largest = LARGEST_MESSAGE + LARGEST_FIELD * len(host.protocol.form)
+    forms = [host.protocol.form, *(study.form for study in host.protocol.studies)]
+    largest = LARGEST_MESSAGE + LARGEST_FIELD * max(map(len, forms))
     live, body = await _from_participant(host, letter, largest)
     message: Done = read(Done, body)
     view = await host.done(live, message)

@@ -73,7 +73,7 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
     if step.kind == "consent":
         shown |= {"agree": protocol.consent.agree, "decline": protocol.consent.decline}
     if step.kind == "form":
-        shown["fields"] = [field.model_dump() for field in protocol.form]
+        shown["fields"] = [field.model_dump() for field in protocol.form_of(step.study)]
     if step.kind == "instructions":
         study = protocol.study(step.study) if step.study else None
         shown["fps"] = protocol.fps
@@ -119,8 +119,9 @@ def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
         "middle": step.middle,
         "high": step.high,
         "window_s": step.duration_s,
-        "options": _options(protocol, step.legal),
-        "kind": task_of(protocol.study(step.study)).kind,
+        "options": [] if step.answered_by == "slider" else _options(protocol, step.legal),
+        "slider": protocol.study(step.study).slider,
+        "kind": step.answered_by,
     }
 
 

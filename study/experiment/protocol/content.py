@@ -16,7 +16,8 @@ from study.experiment.protocol.stimuli import Points, Screen, StimulusSettings, 
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Listed, Part, Slug, Texts
 from study.models.tracks import Rule
-from study.tasks.registry import task_of
+from study.tasks.registry import kind_of, task_of
+from study.tasks.task import points_of
 from study.transitions.methods.method import Method
 from study.transitions.methods.registry import METHODS
 
@@ -117,10 +118,14 @@ class Content(Part):
         rules = {study.name: study.procedure.rule_of(study.task) for study in self.studies}
         return {name: rule for name, rule in rules.items() if rule is not None}
 
+    def form_of(self, study: str) -> tuple[FormField, ...]:
+        """The form at the start of the session, where the name is empty, or the one after a study."""
+        return self.study(study).form if study else self.form
+
     @property
     def scale_points(self) -> dict[str, int]:
         """Points of the scale of each rating study, by its name."""
-        return {study.name: study.scale_points for study in self.studies if task_of(study).kind == "point"}
+        return {study.name: points_of(study) for study in self.studies if kind_of(study) != "word"}
 
     def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
         """The transitions that a study's practice alone shows."""

@@ -17,9 +17,9 @@ from study.experiment.procedures.registry import PROCEDURES
 from study.experiment.protocol.errors import KeyMismatchError, refuse_all
 from study.experiment.protocol.settings import member_of, settings_in
 from study.experiment.protocol.stimuli import Points
-from study.experiment.protocol.texts import Listed, Part, Slug, known_slots
+from study.experiment.protocol.texts import FormField, Listed, Part, Slug, known_slots
 from study.tasks.registry import DECIDES, NAMES, problems_of
-from study.tasks.task import Order, Show
+from study.tasks.task import Order, Show, Slider
 from study.transitions.methods.registry import METHODS
 
 if TYPE_CHECKING:
@@ -94,6 +94,20 @@ class StudySpec(Part):
         description="Preference: into how many balanced sets the pairs are divided, of which a participant sees one; "
         "by default everybody sees all.",
     )
+    ties: bool = Field(
+        default=False, description="Preference: whether participants may also answer that neither is better."
+    )
+    confidence_points: int | None = Field(
+        default=None,
+        ge=2,
+        le=11,
+        description="After each choice participants also say how sure they are, on a scale of so many points.",
+    )
+    slider: Slider | None = Field(
+        default=None,
+        description="Rating: a slider from 0 to 100 in place of the points of a scale, `plain` or with `ticks` at "
+        "every tenth.",
+    )
     show: Show | None = Field(
         default=None,
         description="Rating: each transition by itself (`single`, the default), or both methods' "
@@ -148,8 +162,13 @@ class StudySpec(Part):
     attention_checks: int = Field(
         default=0, ge=0, le=100, description="Trials that ask for a stated answer, at random places. [trials]"
     )
-    scale_points: int = Field(default=5, ge=2, le=11, description="Points of the rating scale, counted from 0.")
+    scale_points: int = Field(
+        default=5, ge=2, le=11, description="Points of the rating scale, counted from 0; a slider has its own."
+    )
     items: Listed[Item] = Field(default=(), description="Questions of a rating study.")
+    form: Listed[FormField] = Field(
+        default=(), description="Questions after the study, such as a free text; keys as those of `[[form]]`."
+    )
     points: Points = Field(default=Points(), description="Conditions for this study's transition points.")
 
     @model_validator(mode="before")
@@ -174,6 +193,9 @@ class StudySpec(Part):
     @model_validator(mode="after")
     def _fits_task(self) -> Self:
         _check_task(self)
+        if self.slider and "scale_points" in self.model_fields_set:
+            message = "expected no scale_points with slider, which goes from 0 to 100; remove one"
+            raise KeyMismatchError(message, "scale_points")
         for key in ("question", "instructions"):
             known_slots(getattr(self, key), key)
         return self
@@ -190,7 +212,8 @@ def _check_task(study: StudySpec) -> None:
     for problems in (study.procedure.problems(study), problems_of(study)):
         refuse_all(KeyMismatchError(problem, *filter(None, (key,))) for key, problem in problems)
     check_once(study.differences_frames, "difference", "differences_frames")
-    check_once([item.name for item in study.items], "item's name", "items")
+    for key, part in (("items", "item"), ("form", "question")):
+        check_once([one.name for one in getattr(study, key)], f"{part}'s name", key)
 
 
 def check_once(values: Sequence[object], what: str, *location: int | str) -> None:

@@ -85,7 +85,9 @@ class FormField(Part):
     label: str = Field(
         min_length=1, description="What the participant reads; age, gender, vision and animation have a built-in one."
     )
-    kind: Literal["text", "number", "choice"] = Field(default="text", description="Type of answer.")
+    kind: Literal["text", "number", "choice", "free-text"] = Field(
+        default="text", description="Type of answer; `free-text` is a text of several lines."
+    )
     choices: Listed[str] = Field(default=(), description="The choices; for `choice` only.")
     least: float | None = Field(default=None, description="Smallest valid number; for `number` only.")
     most: float | None = Field(default=None, description="Largest valid number; for `number` only.")
@@ -111,10 +113,18 @@ class Keys(Part):
     first: Key = Field(default="1", description="Key for the answer `first`.")
     second: Key = Field(default="2", description="Key for the answer `second`.")
     third: Key = Field(default="3", description="Answers with the third of three.")
+    equal: Key = Field(default="0", description="Key for the answer `equal`.")
 
     @model_validator(mode="after")
     def _differ(self) -> Self:
-        for one, other in (("same", "different"), ("first", "second"), ("first", "third"), ("second", "third")):
+        for one, other in (
+            ("same", "different"),
+            ("first", "second"),
+            ("first", "third"),
+            ("second", "third"),
+            ("equal", "first"),
+            ("equal", "second"),
+        ):
             if getattr(self, one) == getattr(self, other):
                 raise KeyMismatchError(f"expected two keys for {one} and {other}, found one; change it", other)
         return self
@@ -138,6 +148,10 @@ class Texts(Part):
     first: str = Field(default="First", min_length=1, description="The answer `first`.")
     second: str = Field(default="Second", min_length=1, description="The answer `second`.")
     third: str = Field(default="Third", min_length=1, description="The answer `third`.")
+    equal: str = Field(default="No difference", min_length=1, description="The answer `equal`.")
+    how_sure: str = Field(default="How sure are you of this answer?", min_length=1, description="Asked after a choice.")
+    least_sure: str = Field(default="guessed", description="Words at the lowest point of that scale.")
+    most_sure: str = Field(default="certain", description="Words at its highest point.")
     practice: str = Field(default="Practice", description="Shown above practice trials.")
     practice_right: str = Field(default="That was right.", description="After a right answer in practice.")
     practice_wrong: str = Field(
@@ -158,6 +172,7 @@ class Texts(Part):
         description="The question of an attention check; {answer} is the answer to give.",
     )
     form: str = Field(default="A few questions about you", description="Heading of the form.")
+    study_form: str = Field(default="About this part", description="Heading of the questions after a study.")
     skip: str = Field(default="Skip", min_length=1, description="Button that leaves a question of the form empty.")
     previous: str = Field(default="Back", min_length=1, description="Button that leads to the previous question.")
     not_taken: str = Field(default="Please check this.", description="After an invalid answer in the form.")

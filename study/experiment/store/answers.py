@@ -17,6 +17,7 @@ import sqlalchemy as sa
 from pydantic_core import to_json
 
 from study.errors import SessionError
+from study.experiment.steps import form_event
 from study.experiment.store.databases import alone
 from study.experiment.store.responses import Clock, Responses, rows_of, utc_now
 from study.experiment.store.sessions import SessionRecord, find_session
@@ -152,14 +153,14 @@ def _presentation_values(shown: Presentation) -> dict[str, Any]:
 
 
 def record_form(
-    responses: Responses, record: SessionRecord, values: Mapping[str, str], *, clock: Clock = utc_now
+    responses: Responses, record: SessionRecord, values: Mapping[str, str], study: str = "", *, clock: Clock = utc_now
 ) -> None:
-    """Store what was filled into the form (`session.filled`), once; sent twice it is stored once."""
+    """Store what was filled into a form (`session.filled`), once; sent twice it is stored once."""
     rows = [{"session_id": record.id, "name": name, "value": value, "at": clock()} for name, value in values.items()]
     with alone(responses.engine) as connection:
-        if rows and not stored_form(responses, record.id, connection):
+        if rows and not values.keys() & stored_form(responses, record.id, connection).keys():
             connection.execute(sa.insert(form_values), rows)
-        connection.execute(sa.insert(events).values(session_id=record.id, kind="form", at=clock()))
+        connection.execute(sa.insert(events).values(session_id=record.id, kind=form_event(study), at=clock()))
 
 
 def stored_form(responses: Responses, session_id: int, connection: sa.Connection | None = None) -> dict[str, str]:

@@ -104,6 +104,7 @@ def gather(protocol: Protocol, responses: Responses) -> Shared:
         size = pd.to_numeric(presentations[column.removeprefix("shown_")])
         participants[column] = participants["participant"].map(size.groupby(presentations["participant"]).median())
     labels = {f"form_{field.name}": field.label for field in protocol.form}
+    labels |= {f"form_{study.name}.{field.name}": field.label for study in protocol.studies for field in study.form}
     for column in labels:
         said = {row["session_id"]: row["value"] for row in form if f"form_{row['name']}" == column}
         participants[column] = sessions["id"].map(said)

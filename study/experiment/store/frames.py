@@ -15,6 +15,7 @@ from study.experiment.store.tables import answer_stimuli, answers, sessions
 from study.experiment.store.variables import ANSWERS
 from study.files import write_whole
 from study.spreadsheets import safe_table
+from study.tasks.answer import CONFIDENCE
 from study.tasks.trial import PLACES
 
 if TYPE_CHECKING:
@@ -69,6 +70,12 @@ def answers_frame(
             f"{', '.join(sha256[:12] for sha256 in hashes)}. Say which one by its sha256."
         )
     table = pd.DataFrame([dict(row) for row in rows], columns=[*ANSWER_COLUMNS, "session_id"])
+    # How sure somebody was stands beside the answer that it is about.
+    showing = pd.MultiIndex.from_frame(table[["session_id", "trial", "attempt"]])
+    about = table["item"] == CONFIDENCE
+    sure = pd.Series(pd.to_numeric(table["answer"][about]).to_numpy(), showing[about], dtype="Int64")
+    table["confidence"] = sure.reindex(showing).to_numpy()
+    table = table[~about]
     if not all_attempts:
         table = table.drop_duplicates(["session_id", "trial", "item"], keep="last")
     table["answered_at"] = [at.isoformat() for at in table["answered_at"]]
@@ -77,7 +84,8 @@ def answers_frame(
         table[column] = table[column].astype("boolean")
     for column in ("simulated", "missed", "shown_well"):
         table[column] = table[column].astype(bool)
-    table["difference_frames"] = table["difference_frames"].astype("Int64")
+    for column in ("difference_frames", "confidence"):
+        table[column] = table[column].astype("Int64")
     table["response_s"] = table["response_s"].astype(float)
     return table[list(ANSWER_COLUMNS)].reset_index(drop=True)
 

@@ -105,16 +105,31 @@ KEPT = "Object.keys(localStorage).some((name) => name.startsWith('segue-kept-'))
 LOOK = """(() => {
   const main = document.getElementById('main');
   if (!main) return '';
-  if (document.querySelector('button.answer:not(:disabled)')) return 'question';
-  if (document.getElementById('field-age')) return 'form';
+  if (document.querySelector('button.answer:not(:disabled), .track input:not(:disabled)')) return 'question';
+  if (document.querySelector('main form')) return 'form';
   const texts = [...document.querySelectorAll('main button, main a.button')].map((b) => b.innerText);
   if (main.innerText.includes('That was all')) return 'end';
   return texts.length ? texts.join('|') : 'films';
 })()"""
 
 
+def slide(tab: Any, *values: int) -> None:
+    """Click the sliders of a page where they have these values, and go on."""
+    for number, value in enumerate(values):
+        where = tab.run(
+            f"(() => {{ const r = document.querySelectorAll('.track input')[{number}].getBoundingClientRect();"
+            f" return [r.x + 12 + (r.width - 24) * {value} / 100, r.y + r.height / 2]; }})()"
+        )
+        tab.click_at(*where)
+    tab.click("Continue")
+    tab.wait("!document.querySelector('.track input:not(:disabled)')", every=0.02)
+
+
 def press(tab: Any, keys: bool = True, which: int = 0) -> bool:
     """Answer the question that is asked, by key or by button, and wait until it is gone; False where it was gone."""
+    if sliders := tab.run("document.querySelectorAll('.track input:not(:disabled)').length"):
+        slide(tab, *range(20, 100, 15)[:sliders])
+        return True
     asked = tab.run(
         f"(() => {{ const b = document.querySelectorAll('button.answer:not(:disabled)')[{which}]; if (!b) return null;"
         " b.dataset.mark = 'x'; return [b.innerText.split('\\n')[0], b.getAttribute('aria-keyshortcuts')]; })()"

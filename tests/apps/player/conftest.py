@@ -136,8 +136,8 @@ class ListStore:
         self.log.append(("answer", answer))
         self.log.extend(("shown", one) for one in shown)
 
-    def form(self, values: Mapping[str, str]) -> None:
-        self.log.append(("form", dict(values)))
+    def form(self, values: Mapping[str, str], study: str) -> None:
+        self.log.append((f"form/{study}" if study else "form", dict(values)))
 
     def event(self, kind: str, detail: Mapping[str, Any] | None = None) -> None:
         self.log.append((kind, detail))

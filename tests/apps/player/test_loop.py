@@ -332,9 +332,9 @@ def test_going_back_shows_what_was_chosen_and_typed(texts: Any, make_small: Any)
 
     small = make_small(texts["about_you"])
     age, vision, _ = small.protocol.form
-    assert field_page(small.protocol, age, "30", first=True).entry == "30"
-    assert field_page(small.protocol, age, "30", first=True).back is None
-    chosen = field_page(small.protocol, vision, "with glasses", first=False)
+    assert field_page(small.protocol, age, "", "30", first=True).entry == "30"
+    assert field_page(small.protocol, age, "", "30", first=True).back is None
+    chosen = field_page(small.protocol, vision, "", "with glasses", first=False)
     assert chosen.chosen == 1
     assert chosen.back is not None
 

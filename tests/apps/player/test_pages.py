@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from renderer.events import Click, Key
 from study.apps.player.lettering import default_font
-from study.apps.player.pages import POINTS, Button, Look, Page, moved
+from study.apps.player.pages import POINTS, Button, Look, Page, changed, chosen
 from study.apps.player.sheet import draw_page
 from study.errors import SessionError
 
@@ -49,12 +50,12 @@ def test_keys_mean_their_buttons_and_enter_the_chosen_one() -> None:
 
 def test_arrow_keys_go_round() -> None:
     page = ASK
-    for key, chosen in (("right", 0), ("right", 1), ("right", 0), ("left", 1)):
-        page = moved(page, key) or page
-        assert page.chosen == chosen
-    assert moved(page, "up") is None
-    assert moved(Page("Nothing to choose."), "left") is None
-    last = moved(ASK, "left")
+    for key, at in (("right", 0), ("right", 1), ("right", 0), ("left", 1)):
+        page = changed(draw_page(page, (640, 480), LIGHT), Key(key, 0.0)) or page
+        assert page.chosen == at
+    assert changed(draw_page(page, (640, 480), LIGHT), Key("up", 0.0)) is None
+    assert changed(draw_page(Page("Nothing to choose."), (640, 480), LIGHT), Key("left", 0.0)) is None
+    last = changed(draw_page(ASK, (640, 480), LIGHT), Key("left", 0.0))
     assert last is not None
     assert last.chosen == 1
 
@@ -154,7 +155,7 @@ def test_a_way_back_stands_in_the_corner_and_is_reached_by_key_mouse_and_arrows(
     assert 700 < top < bottom < 800
     assert drawn.boxes[:2] == draw_page(ASK, (1280, 800), LIGHT).boxes  # it moves nothing
     assert drawn.pressed("up") == page.back == drawn.clicked(left + 5, top + 5)
-    last = moved(page, "left")
+    last = changed(draw_page(page, (640, 480), LIGHT), Key("left", 0.0))
     assert last is not None
     assert draw_page(last, (640, 480), LIGHT).pressed("enter") == page.back
 
@@ -183,3 +184,46 @@ def test_questions_have_lines_of_like_length() -> None:
     middle = rows[np.argmax(np.diff(rows))] + 1
     widths = [np.ptp(np.flatnonzero(part.any(axis=0))) for part in (dark[:middle], dark[middle : int(top) - 5])]
     assert min(widths) > 0.75 * max(widths)
+
+
+SCALE = Page(question="How natural?", buttons=(Button("go-on", "Continue", "space", "Space"),), sliders=(None, None))
+
+
+def pressed(page: Page, *keys: str) -> Page:
+    for key in keys:
+        page = changed(draw_page(page, (640, 480), LIGHT), Key(key, 0.0)) or page
+    return page
+
+
+def test_sliders_go_from_0_to_100_by_keys_and_the_button_counts_once_all_were_moved() -> None:
+    page = pressed(SCALE, "7", "right", "right")
+    assert page.sliders == (72, None)
+    assert chosen(draw_page(page, (640, 480), LIGHT), Key("space", 0.0)) is None
+    page = pressed(page, "tab", "0", "left")
+    assert page.sliders == (72, 0)
+    button = chosen(draw_page(page, (640, 480), LIGHT), Key("space", 0.0))
+    assert button is not None
+    assert button.name == "72 0"
+    assert pressed(page, "down", "9", *["right"] * 12).sliders == (100, 0)
+
+
+def test_a_click_on_a_slider_sets_it_where_it_is_clicked() -> None:
+    for size in ((1280, 800), (640, 480)):
+        drawn = draw_page(SCALE, size, LIGHT)
+        (left, _, right, _), (_, top, _, bottom) = drawn.tracks
+        for value in (0, 25, 100):
+            at = left + value / 100 * (right - left)
+            page = changed(drawn, Click(at, (top + bottom) / 2, 0.0))
+            assert page is not None
+            assert page.sliders == (None, value)
+        assert changed(drawn, Click(left, bottom + 40, 0.0)) is None
+
+
+def test_ticks_are_drawn_where_they_are_asked_for() -> None:
+    plain, ticked = (draw_page(replace(SCALE, ticks=ticks), (1280, 800), LIGHT) for ticks in (False, True))
+    left, top, right, bottom = (round(edge) for edge in ticked.tracks[0])
+    at = [left + round(tick / 10 * (right - left)) for tick in range(1, 10)]
+    row = round(top + 0.35 * (bottom - top))
+    for drawn, there in ((plain, False), (ticked, True)):
+        dark = ink(drawn.rgb, LIGHT.ground)[row]
+        assert all((dark[x - 2 : x + 3].max() > 40) == there for x in at)

@@ -23,6 +23,7 @@ from study.report.references import (
     BRADLEY_1952,
     CAMERON_2011,
     CLARK_1973,
+    DAVIDSON_1970,
     HOLM_1979,
     ROUDER_2009,
     SATTERTHWAITE_1946,
@@ -168,7 +169,10 @@ def _notes(comparison: Comparison) -> list[str]:
         f"{people.undecided} towards neither."
     ]
     if comparison.ties:
-        notes.append(f"{counted(comparison.ties, 'answer')} chose neither: excluded from the published test.")
+        notes.append(
+            f"{counted(comparison.ties, 'answer')} chose neither: excluded from the published test, half for each in "
+            "the others."
+        )
     if clusters.design_effect is not None and clusters.intraclass_correlation is not None:
         correlation = words.signed(clusters.intraclass_correlation, 3, plus=False)
         answers = comparison.published.answers
@@ -290,11 +294,12 @@ def strengths_table(name: str, found: BradleyTerry) -> Table:
     """Return Bradley-Terry strengths of more than two methods."""
     rows = [
         vars(row) | {"low": row.interval.low, "high": row.interval.high, "method": words.readable(row.method)}
-        for row in [*found.strengths, *([found.order] if found.order else [])]
+        for row in [*found.strengths, *filter(None, (found.order, found.ties))]
     ]
     return tables.make(
         f"{name}_strengths",
-        "Strengths of the methods (Bradley-Terry, logits beside the reference), and what being shown first adds; "
+        "Strengths of the methods (Bradley-Terry, logits beside the reference), and what being shown first adds; equal "
+        "is the logarithm of Davidson’s ν, how readily two were called equal; "
         f"intervals are over {_whose(found)}.",
         "method value standard_error low high",
         rows,
@@ -354,15 +359,23 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
         test = f"Student’s t of the percentage against 50%, {AS_SAMPLES}"
         if len(tests) > 1:
             test += "; where fewer than three motions were shown, by Student’s t over participants"
+    several = [result.strengths for result in found if isinstance(result.strengths, BradleyTerry)]
     strengths = (
         " Strengths of the methods are those of a Bradley-Terry model with an effect of order, by maximum likelihood; "
         f"their intervals are over {_whose(several[0])}."
-        if (several := [result.strengths for result in found if isinstance(result.strengths, BradleyTerry)])
+        if several
+        else ""
+    )
+    if any(one.ties for one in several):
+        strengths += " Ties are part of the model (Davidson 1970)."
+    neither = (
+        " A response that neither was better counted half for each, and was left out of the tests of all responses."
+        if any(compared.ties for result in found for compared in result.comparisons)
         else ""
     )
     return (
-        f"Preferences were tested by {test}.{family} Chi-square and exact binomial tests of all responses are given as "
-        "published, with Wilson’s intervals. Evidence for no preference is an equivalence test "
+        f"Preferences were tested by {test}.{neither}{family} Chi-square and exact binomial tests of all responses are "
+        "given as published, with Wilson’s intervals. Evidence for no preference is an equivalence test "
         f"(Schuirmann 1987) and a Bayes factor (Rouder et al. 2009).{strengths}"
     )
 
@@ -370,6 +383,7 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
 def _references(found: Collection[Preference]) -> set[str]:
     fitted = [result.strengths for result in found if isinstance(result.strengths, BradleyTerry)]
     several = {BRADLEY_1952} if fitted else set()
+    several |= {DAVIDSON_1970} if any(one.ties for one in fitted) else set()
     several |= {CAMERON_2011} if any(one.motions for one in fitted) else set()
     several |= {CLARK_1973, SATTERTHWAITE_1946}
     return {WILSON_1927, HOLM_1979, SCHUIRMANN_1987, ROUDER_2009} | several

@@ -20,7 +20,7 @@ def ratings_figure(rows: Sequence[MethodRating], name: str, mark: str, points: i
         labels = [readable(": ".join(filter(None, (row.item, row.method)))) for row in rows]
         named_rows(axes, [-place for place in range(len(rows))], labels)
         axes.set_xlim(-0.1, points - 0.9)
-        axes.set_xticks(range(points))
+        axes.set_xticks(range(0, points, 1 if points <= 11 else 10))
         axes.set_xlabel("mean rating")
         spoken = "; ".join(f"{label}: {row.mean:.2f}" for label, row in zip(labels, rows, strict=True))
         return to_svg(figure, name, "Mean ratings", spoken, mark)
