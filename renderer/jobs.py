@@ -13,9 +13,9 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from multiprocessing import get_context
@@ -149,10 +149,52 @@ def render_many(
     return _in_processes(todo, min(count, len(todo)), tell)
 
 
-def _in_processes(jobs: list[RenderJob], workers: int, tell: Callable[[VideoInfo], VideoInfo]) -> list[VideoInfo]:
+class Workers:
+    """Processes that make one video after another, as they are asked to, until they are closed.
+
+    Parameters
+    ----------
+    count
+        Processes; one a core where None.
+    """
+
+    def __init__(self, count: int | None = None) -> None:
+        self.count = default_workers() if count is None else count
+        """How many videos are made at a time."""
+        self._pool = self._begun()
+        self._open = ExitStack()
+        self._folder = self._open.enter_context(scratch_folder("segue-jobs"))
+
+    def make(self, job: RenderJob) -> Future[VideoInfo]:
+        """One video; the future raises `RendererError` where it can't be made."""
+        path = _store(job, self._folder / f"{Path(job.path).stem}.job")
+        try:
+            return self._pool.submit(_run_stored, path)
+        except BrokenProcessPool:  # a process was killed: others take its place
+            self._pool = self._begun()
+            return self._pool.submit(_run_stored, path)
+
+    def _begun(self) -> Executor:
+        try:
+            return _processes(self.count)
+        except OSError:  # as in `_in_processes`
+            self.count = 1
+            return ThreadPoolExecutor(1)
+
+    def close(self) -> None:
+        """End the processes, without waiting for what runs."""
+        _stop(self._pool, finished=False)
+        self._open.close()
+
+
+def _processes(workers: int) -> ProcessPoolExecutor:
     # Spawned, not forked: a GL library that has run in this process does not survive a fork.
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
+
+
+def _in_processes(jobs: list[RenderJob], workers: int, tell: Callable[[VideoInfo], VideoInfo]) -> list[VideoInfo]:
     try:
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
+        pool = _processes(workers)
     except OSError:
         # No semaphores here (/dev/shm is missing or not ours to write, as in some containers): one process does it all.
         return [tell(run_job(job)) for job in jobs]
@@ -199,7 +241,7 @@ def _run_stored(path: str) -> VideoInfo:
     return run_job(job)
 
 
-def _stop(pool: ProcessPoolExecutor, finished: bool) -> None:
+def _stop(pool: Executor, finished: bool) -> None:
     """End the pool; when the work was cut short, without waiting for what runs."""
     processes = list((getattr(pool, "_processes", None) or {}).values())
     pool.shutdown(wait=finished, cancel_futures=True)

@@ -23,6 +23,9 @@ from study.models.tracks import Found, Rule
 
 TINY = 1e-12
 
+DROP = 0.5 * 3.841458820694124
+"""Half of the 95% point of a chi-square with one degree of freedom."""
+
 ROUNDED = 10
 """Digits of the information that count: levels that tell the same, but for rounding, are alike on every machine."""
 
@@ -46,10 +49,14 @@ class QuestPlus:
     def _entropies(self) -> FloatArray:
         return entropy(self.chances)
 
+    def likelihood(self, yes: IntArray, no: IntArray) -> FloatArray:
+        """Return its logarithm at each point, shape (points,), after so many answers at each level, shape (levels,)."""
+        return np.asarray(yes @ self._logs[0] + no @ self._logs[1])
+
     def posterior(self, yes: IntArray, no: IntArray) -> FloatArray:
         """Return the mass at each point, shape (points,), after so many answers at each level, shape (levels,)."""
         with np.errstate(divide="ignore"):
-            log = np.log(self.prior) + yes @ self._logs[0] + no @ self._logs[1]
+            log = np.log(self.prior) + self.likelihood(yes, no)
         mass = np.exp(log - log.max())
         return np.asarray(mass / mass.sum())
 
@@ -71,9 +78,14 @@ class QuestPlus:
 
     def marginal(self, posterior: FloatArray, axis: int) -> FloatArray:
         """Return the mass at each value of one parameter."""
-        shape = tuple(len(values) for values in self.axes)
-        others = tuple(place for place in range(len(shape)) if place != axis)
-        return np.asarray(posterior.reshape(shape).sum(axis=others))
+        return np.asarray(posterior.reshape([*map(len, self.axes)]).sum(axis=self._others(axis)))
+
+    def profile(self, likelihood: FloatArray, axis: int) -> FloatArray:
+        """Return the greatest log-likelihood at each value of one parameter, whatever the others are."""
+        return np.asarray(likelihood.reshape([*map(len, self.axes)]).max(axis=self._others(axis)))
+
+    def _others(self, axis: int) -> tuple[int, ...]:
+        return tuple(place for place in range(len(self.axes)) if place != axis)
 
 
 def entropy(yes: FloatArray) -> FloatArray:
@@ -82,9 +94,26 @@ def entropy(yes: FloatArray) -> FloatArray:
     return -(yes * np.log(yes) + (1 - yes) * np.log1p(-yes))
 
 
-def quantiles(values: FloatArray, mass: FloatArray, shares: FloatArray) -> FloatArray:
-    """Return where a marginal has come to each share, linear between the middles of its steps."""
-    return np.interp(shares, np.cumsum(mass) - mass / 2, values)
+def median(values: FloatArray, mass: FloatArray) -> float:
+    """Return where a marginal has come to one half, linear between the middles of its steps."""
+    return float(np.interp(0.5, np.cumsum(mass) - mass / 2, values))
+
+
+def likelihood_interval(values: FloatArray, profile: FloatArray) -> tuple[float, float]:
+    """Return the ends of the 95% interval by the profile of the log-likelihood, linear between its values.
+
+    It has the values at which the answers are not much less likely than at the best one: twice the difference of the
+    logarithms is at most the 95% point of a chi-square with one degree of freedom (Wilks 1938). An end beyond the grid
+    is that of the grid.
+    """
+    over = profile - profile.max() + DROP
+    first, last = np.flatnonzero(over >= 0)[[0, -1]]
+    ends = (first - 1, first, values[0]), (last + 1, last, values[-1])
+    low, high = (
+        float(np.interp(0.0, over[[out, within]], values[[out, within]])) if 0 <= out < len(values) else float(end)
+        for out, within, end in ends
+    )
+    return low, high
 
 
 @dataclass(frozen=True)
@@ -177,7 +206,7 @@ class QuestRule(Rule):
         return track.trials
 
     def found(self, track: Asked) -> Found:
-        """Median, standard deviation and 95% interval of the posterior of the threshold."""
+        """Median and standard deviation of the posterior of the threshold; 95% interval by its profile likelihood."""
         return _summary(self, track.right, track.wrong)[1]
 
 
@@ -209,9 +238,14 @@ DECIDING = {
 }
 """By the task."""
 
-THRESHOLDS, CRITERIA, LAPSES = 41, 15, 4
-WIDE = 3.0
-ENDS = np.array([0.025, 0.5, 0.975])
+THRESHOLDS, CRITERIA, LAPSES = 41, 19, 5
+WIDE, STRICTEST = 3.0, 5.0
+"""`WIDE`: standard deviations of its prior that the threshold's grid goes on either side; `STRICTEST`: those that the
+criterion's goes up, since strict participants say little of theirs and an interval must not end where the grid does."""
+LOOSE = 4.0
+"""In intervals the prior of the criterion counts as if it were so many times as wide. As it is, it says more than most
+answers do: intervals of participants who are stricter than it says held 99% of the thresholds instead of 95%. Without
+it they would be too short of participants who never lapse."""
 
 
 @lru_cache(maxsize=64)
@@ -219,10 +253,10 @@ def _grid(rule: QuestRule) -> QuestPlus:
     """The grid of a rule: the logarithm of the threshold, the criterion where there is one, the lapse rate."""
     steps = np.linspace(-WIDE, WIDE, THRESHOLDS)
     logs = np.log(rule.threshold_frames) + rule.threshold_spread * steps
-    lapses = rule.most_lapses * (np.arange(LAPSES) + 0.5) / LAPSES
+    lapses = np.linspace(0, rule.most_lapses, LAPSES)
     criteria = np.array([rule.criterion])
     if DECIDING[rule.task].has_criterion:
-        low, high = (rule.criterion + rule.criterion_spread * ends for ends in (-2.5, WIDE))
+        low, high = (rule.criterion + rule.criterion_spread * ends for ends in (-2.5, STRICTEST))
         criteria = np.linspace(max(low, LEAST_CRITERION), high, CRITERIA)
     threshold, criterion, lapse = (part.ravel() for part in np.meshgrid(np.exp(logs), criteria, lapses, indexing="ij"))
     frames = np.array([0, *rule.levels], dtype=np.float64)[:, None]
@@ -236,10 +270,13 @@ def _grid(rule: QuestRule) -> QuestPlus:
 def _summary(rule: QuestRule, right: tuple[int, ...], wrong: tuple[int, ...]) -> tuple[int, Found]:
     """The level to ask next, and the threshold so far: remembered, since a session is folded anew at each answer."""
     quest = _grid(rule)
-    posterior = quest.posterior(np.array(right), np.array(wrong))
+    counts = np.array(right), np.array(wrong)
+    posterior = quest.posterior(*counts)
     told = np.round(quest.information_on(0, posterior)[1:], ROUNDED)
-    mass = quest.marginal(posterior, 0)
-    low, middle, high = np.exp(quantiles(quest.axes[0], mass, ENDS))
-    frames = np.exp(quest.axes[0])
+    mass, frames = quest.marginal(posterior, 0), np.exp(quest.axes[0])
     spread = float(np.sqrt(mass @ frames**2 - (mass @ frames) ** 2))
-    return rule.levels[int(np.argmax(told))], Found(float(middle), spread, float(low), float(high))
+    loose = -0.5 * ((quest.axes[1] - rule.criterion) / (LOOSE * rule.criterion_spread)) ** 2
+    likely = quest.likelihood(*counts) + np.tile(np.repeat(loose, len(quest.axes[2])), len(frames))
+    ends = likelihood_interval(quest.axes[0], quest.profile(likely, 0))
+    middle, low, high = map(float, np.exp([median(quest.axes[0], mass), *ends]))
+    return rule.levels[int(np.argmax(told))], Found(middle, spread, low, high)

@@ -6,8 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import chi2
 
-from study.models.quest_plus import QuestPlus, quantiles
+from study.models.quest_plus import QuestPlus, likelihood_interval, median
 
 DECIBELS = np.arange(-40.0, 1.0)
 # Watson 2017: the answers (1 right, 0 wrong) and the contrasts of two of his examples, and the posterior's modes.
@@ -82,6 +84,23 @@ def test_levels_that_tell_the_same_are_taken_in_their_order() -> None:
     assert quest.next_level(quest.prior) == 0
 
 
-def test_quantiles_are_those_of_the_marginal() -> None:
-    values, mass = np.arange(101.0), np.full(101, 1 / 101)
-    np.testing.assert_allclose(quantiles(values, mass, np.array([0.025, 0.5, 0.975])), [2.025, 50, 97.975])
+def test_the_median_is_that_of_the_marginal() -> None:
+    assert median(np.arange(101.0), np.full(101, 1 / 101)) == pytest.approx(50)
+    assert median(np.array([1.0, 2.0, 4.0]), np.array([0.2, 0.2, 0.6])) == pytest.approx(2 + 2 * 0.2 / 0.4)
+
+
+def test_the_likelihood_interval_is_that_of_a_share_in_closed_form() -> None:
+    """Of 13 in 20, where the ends solve 2 (l(0.65) - l(p)) = 3.8415; and with a second parameter that is free."""
+    shares = np.linspace(0.0005, 0.9995, 1000)
+
+    def log(share: float) -> float:
+        return 13 * np.log(share) + 7 * np.log1p(-share)
+
+    def off(share: float) -> float:
+        return 2 * (log(0.65) - log(share)) - chi2.ppf(0.95, 1)
+
+    known = brentq(off, 0.1, 0.65), brentq(off, 0.65, 0.99)
+    likelihood = np.array([[log(share) - nuisance**2 for nuisance in (-1.0, 0.0, 2.0)] for share in shares])
+    quest = QuestPlus((shares, np.arange(3.0)), np.full((1, 3000), 0.5), np.full(3000, 1 / 3000))
+    np.testing.assert_allclose(likelihood_interval(shares, quest.profile(likelihood.ravel(), 0)), known, atol=1e-3)
+    assert likelihood_interval(shares, np.zeros(1000)) == (shares[0], shares[-1])

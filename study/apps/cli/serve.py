@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import click
@@ -72,12 +73,14 @@ def serve(
 ) -> None:
     """Sessions in the browser. Renders missing stimuli first; Ctrl-C stops it, the same command resumes.
 
+    Levels of adaptive procedures are rendered while sessions run, before they are due (`segue render`: beforehand).
+
     A completely rendered results folder can be served on any machine without --library.
     """
     from study.apps.server.names import own_names
     from study.apps.server.running import run
     from study.apps.server.settings import Settings
-    from study.experiment.stimuli.rendering import rendered_before
+    from study.experiment.stimuli.rendering import RenderAhead, rendered_before
     from study.experiment.store.participants import new_token
 
     checked = load_for_people(protocol)
@@ -95,11 +98,12 @@ def serve(
         completion_url=completion_url,
         parameters=(*Settings.parameters, *parameters),
     )
-    rendered = None if library is not None else rendered_before(checked, folder)
+    rendered, ahead = None if library is not None else rendered_before(checked, folder), None
     if rendered is None:
         stimuli = prepare_stimuli(checked, library)
         check_database(database, stimuli)
-        render_stimuli(stimuli, folder, workers)
+        if render_stimuli(stimuli, folder, workers, all_levels=False)["videos"] < len(stimuli.stimuli):
+            ahead = partial(RenderAhead, stimuli, folder, workers)
     else:
         check_database(database, rendered)
 
@@ -125,5 +129,6 @@ def serve(
         root_path=root_path,
         database=database,
         public_urls=public_urls,
+        ahead=ahead,
         started=started,
     )

@@ -51,13 +51,19 @@ def prepare_stimuli(protocol: Protocol, library: str | None) -> StimulusSet:
         return prepare(protocol, opened, lambda done, total: report(done / total, f"{done} of {total}"))
 
 
-def render_stimuli(stimuli: StimulusSet, folder: Path, workers: int | None) -> dict[str, Any]:
+def render_stimuli(
+    stimuli: StimulusSet, folder: Path, workers: int | None, *, all_levels: bool = True
+) -> dict[str, Any]:
     """Render what is not rendered yet, with progress on standard error; the numbers for `--json`."""
     from study.experiment.stimuli.rendering import render as render_all
 
     with progress("videos") as report:
         summary = render_all(
-            stimuli, folder, workers, lambda state: report(state.videos / max(state.videos_total, 1), str(state))
+            stimuli,
+            folder,
+            workers,
+            lambda state: report(state.videos / max(state.videos_total, 1), str(state)),
+            all_levels=all_levels,
         )
     return {**asdict(summary), "folder": str(folder)}
 

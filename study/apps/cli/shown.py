@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from study.apps.cli.console import columns
@@ -18,7 +19,7 @@ HEADINGS = (
 )
 
 MOST_LEVELS = 12
-"""Of more levels than these, every other one is shown, or fewer."""
+"""Of more levels than these, every other one is shown, or fewer; of lengths in equal steps, their ends."""
 
 
 def table_of(protocol: Protocol, outlook: Outlook) -> Iterator[str]:
@@ -82,11 +83,19 @@ def _cells(row: Row) -> tuple[str, ...]:
         *_point(row.destination),
         str(row.k_frames),
         f"{row.k_s:.2f}",
-        "; ".join(f"{method} {' '.join(map(str, lengths))}" for method, lengths in row.lengths.items() if lengths),
+        "; ".join(f"{method} {_listed(lengths)}" for method, lengths in row.lengths.items() if lengths),
         "practice" if row.trials is None else str(row.trials),
         str(row.films),
         shortest if shortest == longest else f"{shortest}-{longest}",
     )
+
+
+def _listed(lengths: Sequence[int]) -> str:
+    """Lengths, each by itself; many in equal steps as a range: `8 to 38 by 2`."""
+    steps = {after - before for before, after in pairwise(lengths)}
+    if len(lengths) <= MOST_LEVELS or len(steps) > 1:
+        return " ".join(map(str, lengths))
+    return f"{lengths[0]} to {lengths[-1]} by {steps.pop()}"
 
 
 def _point(place: Place) -> tuple[str, str, str, str]:

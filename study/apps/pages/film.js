@@ -89,8 +89,8 @@ async function seek(video, seconds) {
 
 async function prove(film, fps, blob) {
   // Browsers may find a last frame in half a file, and fail only while playing: the file has to be whole, too.
-  if (blob.size !== film.bytes) throw new FilmFault(`${blob.size} of ${film.bytes} bytes`);
-  // All films are sent at one size; what distinguishes them is at the end.
+  if (!blob.size || blob.size % film.bytes) throw new FilmFault(`${blob.size} of ${film.bytes} bytes`);
+  // All films are sent at one size, or a multiple of it; what distinguishes them is at the end.
   film.frames = new DataView(await blob.slice(-4).arrayBuffer()).getUint32(0);
   const video = document.createElement("video");
   Object.assign(video, { muted: true, playsInline: true, preload: "auto", disablePictureInPicture: true });

@@ -28,18 +28,19 @@ PIECE = 512 * 1024
 
 
 def whole_bytes(sizes: Iterable[int]) -> int:
-    """The size at which films of these sizes are sent."""
+    """The size at which films of these sizes are sent; a larger one is sent at a multiple of it."""
     return max(sizes, default=0) + _BOX
 
 
 class Film(Response):
     """A film under a secret name; the file's own marks would tell that two films are the same one.
 
-    The file has `size` bytes, of which `whole` are made.
+    The file has `size` bytes, of which a multiple of `unit` is made.
     """
 
-    def __init__(self, path: Path, name: str, size: int, frames: int, whole: int) -> None:
-        self.path, self.name, self.size, self.frames, self.whole = path, name, size, frames, whole
+    def __init__(self, path: Path, name: str, size: int, frames: int, unit: int) -> None:
+        self.path, self.name, self.size, self.frames = path, name, size, frames
+        self.whole = -(-(size + _BOX) // unit) * unit
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002
         """One request."""

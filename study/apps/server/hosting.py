@@ -26,12 +26,13 @@ from study.apps.server.links import VISIT, filled_in
 from study.apps.server.messages import Answered, Begin, Done, Happened, presented
 from study.apps.server.settings import Settings
 from study.apps.server.writer import Writer
-from study.errors import SessionError
+from study.errors import SessionError, StimulusError
 from study.experiment.plan import draw_plan, groups_of
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Session, advanced, answered, current, filled, missed, open_session
 from study.experiment.steps import Step
 from study.experiment.stimuli.manifest import Manifest
+from study.experiment.stimuli.rendering import RenderAhead, known_beforehand
 from study.experiment.store import participants as people
 from study.experiment.store.answers import answer_rows, event_counts, event_row, record_form, stored_answers
 from study.experiment.store.databases import AWAY, in_words
@@ -83,13 +84,25 @@ class LiveSession:
 class Host:
     """A study that is being run."""
 
-    def __init__(self, protocol: Protocol, manifest: Manifest, responses: Responses, settings: Settings) -> None:
+    def __init__(
+        self,
+        protocol: Protocol,
+        manifest: Manifest,
+        responses: Responses,
+        settings: Settings,
+        ahead: RenderAhead | None = None,
+    ) -> None:
         self.protocol, self.manifest, self.responses, self.settings = protocol, manifest, responses, settings
+        self.ahead = ahead
+        self.videos = manifest.videos if ahead is None else ahead.videos
         self.writer = Writer(responses.engine)
         self.cookie = f"segue-{protocol.sha256[:8]}"
         """Part of its name: browsers share cookies among all ports of a machine, which may serve several studies."""
         self.frames = {record.id: record.frames for record in manifest.records}
-        self.film_bytes = whole_bytes(int(video.get("bytes", 0)) for video in manifest.videos.values())
+        # The same at every start, whatever was rendered since: pages keep films over a restart.
+        known = known_beforehand(protocol, manifest.pairs)
+        room = 1 if known.issuperset(self.frames) else 2
+        self.film_bytes = room * whole_bytes(int(self.videos.get(one, {}).get("bytes", 0)) for one in known)
         groups = settings.groups or groups_of(protocol, manifest.pairs)
         self.places = people.Places(groups, settings.most_participants, settings.dropped_after)
         self.clock = people.steady_clock()
@@ -104,6 +117,8 @@ class Host:
     def close(self) -> None:
         """Finish all writes."""
         self.writer.close()
+        if self.ahead is not None:
+            self.ahead.close()
 
     # Who it is
 
@@ -311,6 +326,8 @@ class Host:
 
     async def _view(self, live: LiveSession) -> dict[str, Any]:
         step = current(live.state)
+        if self.ahead is not None:
+            self.ahead.want(due.stimulus for due in views.films_due(live.state))
         view = views.view(live.state, live.participant, self.film_bytes)
         live.shown_trial = (step.trial, step.attempt) if step.slot == 1 else None
         if step.kind in ("debrief", "done"):
@@ -330,7 +347,12 @@ class Host:
         step = self._film_step(live, name)
         if step is None:
             return None
-        video = self.manifest.videos.get(step.stimulus, {})
+        if self.ahead is not None:
+            try:
+                await self.ahead.ready(step.stimulus)
+            except StimulusError as error:
+                log.warning("%s", error)
+        video = self.videos.get(step.stimulus, {})
         path = self.manifest.folder / str(video.get("file", ""))
         try:
             size = path.stat().st_size if video else None

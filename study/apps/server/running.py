@@ -18,6 +18,7 @@ from study.apps.server.web import make_app
 from study.errors import SessionError
 from study.experiment.protocol.whole import Protocol
 from study.experiment.stimuli.manifest import read_manifest
+from study.experiment.stimuli.rendering import RenderAhead
 from study.experiment.store.databases import try_to_write
 from study.experiment.store.responses import open_responses
 
@@ -36,6 +37,7 @@ def run(
     root_path: str = "",
     database: str | None = None,
     public_urls: Sequence[str] = (),
+    ahead: Callable[[], RenderAhead] | None = None,
     started: Callable[[str, str], object] | None = None,
 ) -> None:
     """Serve a results folder until the process is told to end; answers under way are committed first.
@@ -48,6 +50,8 @@ def run(
         Where answers go, instead of the folder's own `responses.sqlite`.
     public_urls
         The addresses that participants open where they are not this machine's own, as behind a proxy.
+    ahead
+        Begins to render what is not rendered beforehand; None where all is.
     started
         Told the address and the place of the answers, without a password, once participants can come.
 
@@ -62,7 +66,8 @@ def run(
     name = f"[{host}]" if ":" in host else host
     with open_responses(database or folder) as responses:
         try_to_write(responses.engine, responses.place)
-        app = Named(make_app(Host(protocol, manifest, responses, settings)), names, protocol)
+        study = Host(protocol, manifest, responses, settings, ahead and ahead())
+        app = Named(make_app(study), names, protocol)
         if started:
             address = public_urls[0].rstrip("/") if public_urls else f"http://{name}:{listening.getsockname()[1]}"
             started(address, responses.place)

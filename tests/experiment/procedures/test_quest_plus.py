@@ -79,13 +79,8 @@ def tracks(procedure: Interleaved, answers: list[Answer]) -> dict[bool, Asked]:
     return {key.longer: track for key, track in procedure._tracks(answers).items()}
 
 
-TOO_WIDE = pytest.mark.xfail(strict=True, reason="of strict observers the intervals are too wide: they hold 99.4%")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("criterion", "lapse"), [(1.2, 0.02), (2.0, 0.0), (2.0, 0.1), pytest.param(2.8, 0.02, marks=TOO_WIDE)]
-)
+@pytest.mark.parametrize(("criterion", "lapse"), [(1.2, 0.02), (2.0, 0.0), (2.0, 0.1), (2.8, 0.02)])
 def test_thresholds_are_found_and_their_intervals_hold_them(criterion: float, lapse: float) -> None:
     """Over 250 people, two thresholds each, whose criterion and lapses are not the prior's."""
     ratios, held = [], []
@@ -101,7 +96,7 @@ def test_thresholds_are_found_and_their_intervals_hold_them(criterion: float, la
             ratios.append(found.frames / frames[longer])
             held.append(found.low <= frames[longer] <= found.high)
     assert np.median(ratios) == pytest.approx(1, abs=0.1)
-    assert 0.93 <= np.mean(held) <= 0.99
+    assert 0.93 <= np.mean(held) <= 0.97
 
 
 def test_the_same_answers_give_the_same_trials_from_any_place_on() -> None:
