@@ -1,4 +1,4 @@
-"""`segue one-hop` (chain, reach, connect, robustness): variants of Koyama & Goto 2019, section 5, without a table."""
+"""`segue one-hop` (between, chain, reach, connect, robustness): variants of Koyama & Goto 2019, section 5."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.cli.console import FILE, emit, json_option, together
+from study.apps.cli.clips import clips_options
+from study.apps.cli.console import FILE, FOLDER, emit, json_option, together
 from study.apps.cli.one_hop import (
     load_clips,
     memory_of,
@@ -45,6 +46,59 @@ def problem_at(loaded: tuple[Clip, ...], pair: tuple[str, str], options: dict[st
     ((source, destination),) = pairs_of((pair,), loaded)
     switch = Switch(source, destination, Alignment(options["offset"]), trigger, trigger)
     return problem_of(loaded, (switch,), options)
+
+
+@one_hop.command()
+@click.argument("slow")
+@click.argument("fast")
+@clips_options
+@click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frame rate to work at.")
+@click.option("--count", type=click.IntRange(1, 50), default=3, show_default=True, help="How many.")
+@click.option("--out", type=FOLDER, required=True, help="Folder for SLOW_FAST_1.bvh and so on.")
+@json_option
+def between(slow: str, fast: str, library: str | None, fps: float, count: int, out: Path) -> None:
+    """Clips of one gait at speeds between those of SLOW and FAST, to be states or hops like any other.
+
+    Whole gait cycles of both, brought into step and mixed; both have to end in steps that repeat.
+    """
+    import numpy as np
+
+    from study.motion.readers.bvh_writing import write_bvh
+    from study.transitions.flaws import find_flaws
+    from study.transitions.one_hop.between import in_step, mixed
+
+    clips = load_clips((slow, fast), library, fps)
+    pair, names = in_step(*clips), [clip.name for clip in clips]
+    rows: list[dict[str, Any]] = []
+    for number, share in enumerate(pair.shares(count).tolist(), start=1):
+        clip = mixed(pair, share, f"{names[0]}_{names[1]}_{number}")
+        file, flaws = out / f"{clip.name}.bvh", find_flaws(clip, (0, clip.frames), clips)
+        write_bvh(clip, file)
+        way = np.linalg.norm(np.diff(clip.root_positions[:, [0, 2]], axis=0), axis=1).sum()
+        seconds = (clip.frames - 1) / clip.fps
+        rows.append(
+            {
+                "file": str(file),
+                "share": share,
+                "frames": clip.frames,
+                "seconds": seconds,
+                "speed_m_per_s": float(way) / seconds,
+                "unsupported_share": flaws.unsupported_share,
+                "own_unsupported_share": flaws.own_unsupported_share,
+                "told": list(flaws.told()),
+            }
+        )
+    speeds = [fps * way / frames for way, frames in zip(pair.ways_m, pair.frames, strict=True)]
+    lines = [
+        f"{row['file']}: {row['speed_m_per_s']:.2f} m/s, {row['seconds']:.2f} s, {100 * row['share']:.0f}% {names[1]}"
+        + "".join(f"; {words}" for words in row["told"])
+        for row in rows
+    ]
+    lines.append(
+        f"{counted(pair.cycles, 'gait cycle')} of {names[0]} ({speeds[0]:.2f} m/s) and {names[1]} ({speeds[1]:.2f} m/s)"
+    )
+    result = {"clips": rows, "cycles": pair.cycles, "slow_m_per_s": speeds[0], "fast_m_per_s": speeds[1]}
+    emit(result, "\n".join(lines))
 
 
 @one_hop.command()

@@ -142,6 +142,22 @@ def test_more_hops_never_cost_more(capsys: pytest.CaptureFixture[str], tmp_path:
     assert "choose an earlier one" in refusal(capsys, *clips, "--at", 239)
 
 
+def test_walks_at_speeds_between_two_are_written_and_may_be_states(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    found = answer(capsys, "one-hop", "between", "walk_slow", "walk_fast", "--fps", 30, "--count", 2, "--out", tmp_path)
+    files = [row["file"] for row in found["clips"]]
+    assert files == [str(tmp_path / f"walk_slow_walk_fast_{number}.bvh") for number in (1, 2)]
+    speeds = [found["slow_m_per_s"], *(row["speed_m_per_s"] for row in found["clips"]), found["fast_m_per_s"]]
+    assert speeds == pytest.approx([0.8, 1.133, 1.467, 1.8], abs=0.02)
+    assert [row["told"] for row in found["clips"]] == [[], []]
+    pair = ("--pair", "walk_slow", "walk_slow_walk_fast_1")
+    built = answer(capsys, "one-hop", "build", "walk_slow", *files, *SEARCH, *pair, "--out", tmp_path / "t.npz")
+    assert built["found"] > 0
+    assert run(["one-hop", "between", "dance", "walk", "--out", str(tmp_path)]) == 2
+    assert "dance to end in steps that repeat, found none" in capsys.readouterr().err
+
+
 def test_clips_that_do_not_overlap_are_connected(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = tmp_path / "joined.bvh"
     found = answer(capsys, "one-hop", "connect", "walk", "tai_chi", "stand", *SEARCH, "--out", out)
