@@ -7,6 +7,7 @@ Every refusal says what was expected, what was found, where, and what to do. `Se
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 
 class SegueError(Exception):
@@ -45,7 +46,13 @@ class TransitionError(SegueError):
 
 
 class ProtocolError(SegueError):
-    """A protocol that can't be run as written."""
+    """A protocol that can't be run as written.
+
+    `rest` is the protocol with misspelled keys mended, if that holds; `motions` are those that its file names.
+    """
+
+    rest: Any = None
+    motions: tuple[str, ...] = ()
 
 
 class StimulusError(SegueError):

@@ -25,16 +25,20 @@ POINT = (("_frame", "d"), ("_s", ".2f"), ("_file_frame", ".5g"))
 
 
 @click.command()
-@click.argument("motions", nargs=-1, metavar="CLIPS...")
+@click.argument("motions", nargs=-1, metavar="[CLIP]...")
 @clips_options
 @FPS
-@click.option("--out", type=FOLDER, help="Folder for advice.csv, advice.json, and a strip of each transition.")
+@click.option(
+    "--out",
+    type=FOLDER,
+    help="Folder for advice.csv, advice.json, and a strip of each transition (default: none is written).",
+)
 @click.option("--no-strips", is_flag=True, help="Write only the tables.")
 @json_option
 def advise(motions: tuple[str, ...], library: str | None, fps: float, out: Path | None, no_strips: bool) -> None:
-    """Where, how long and how to blend, for each ordered pair of CLIPS, and the difference from ten frames.
+    """Where, how long and how to blend, for each ordered pair of clips, and the difference from ten frames.
 
-    CLIPS are motion files, or names of motions in --library; the whole library if none is named. The method suits
+    The whole library if no clip is named. The method suits
     the motion (Wang & Bodenheimer 2004): geodesic if one of the two is cyclic, else velocity. The make is the one with
     the steadiest feet, the smoothest toes and poses nearest to the clips' own.
     """

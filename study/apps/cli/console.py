@@ -20,8 +20,14 @@ FOLDER, RESULTS = (click.Path(exists=there, file_okay=False, path_type=Path) for
 """Kinds of paths: to be written, and those that have to be there."""
 
 FPS = click.option(
-    "--fps", type=click.FloatRange(min=1), default=30.0, show_default=True, help="Frame rate to work at."
+    "--fps",
+    type=click.FloatRange(min=1),
+    default=30.0,
+    show_default=True,
+    help="Frames per second to work at; frames are counted at this rate.",
 )
+
+WEIGHTS = "Weights of joints: wang2003, fitted to judgements of people; lee2002, one for each major joint."
 
 
 def kept_flag(name: str, words: str) -> Callable[[Command], Command]:
@@ -45,7 +51,8 @@ json_option = kept_flag("--json", "Print one JSON object on standard output.")
 library_option = click.option(
     "--library",
     metavar="NAME|FOLDER",
-    help="Where motions come from: 'synthetic' (default), or a folder of .bvh, .asf/.amc (CMU's), .glb or .gltf files.",
+    help="Where motions come from: 'synthetic' (default), or a folder of .bvh, .asf/.amc (CMU's), .glb or .gltf files,"
+    " with or without a library.toml.",
 )
 database_option = click.option(
     "--database",

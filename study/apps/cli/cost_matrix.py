@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.clips import clip_pair, clips_options
-from study.apps.cli.console import FILE, FPS, emit, json_option
+from study.apps.cli.console import FILE, FPS, WEIGHTS, emit, json_option
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
 
@@ -24,18 +24,30 @@ LABELS = {"joint": "cost, squared half angles and metres", "pointcloud": "mean s
 @click.argument("destination", metavar="DST")
 @clips_options
 @FPS
-@click.option("--metric", type=click.Choice(list(LABELS)), default="joint", show_default=True)
-@click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)
-@click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of velocities.")
+@click.option("--metric", type=click.Choice(list(LABELS)), default="joint", show_default=True,
+              help="joint: rotations and velocities of joints; pointcloud: distances of body points.")  # fmt: skip
+@click.option(
+    "--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True, help=WEIGHTS
+)
+@click.option(
+    "--nu",
+    type=click.FloatRange(min=0),
+    default=1.0,
+    show_default=True,
+    help="Weight of velocities beside rotations, a factor.",
+)
 @click.option(
     "--root",
     type=click.Choice(["matched", "world", "none"]),
     default="matched",
     show_default=True,
-    help="Which part of the root counts: its height, since a transition aligns position and facing; all of it; none.",
+    help="What counts of the root: matched, its height, since a transition aligns position and facing; world, all of "
+    "it; none, nothing.",
 )
-@click.option("--window", type=click.IntRange(min=1), help="Frames of a point cloud (default: a third of a second).")
-@click.option("--out", type=FILE, help="X.npy, or X.png (darker is a lower cost).")
+@click.option("--window", type=click.IntRange(min=1), help="Length of a point cloud, frames (default: 0.33 s).")
+@click.option(
+    "--out", type=FILE, help="File for the matrix: X.npy, or X.png, darker where it costs less (default: none)."
+)
 @json_option
 def cost_matrix(
     source: str,

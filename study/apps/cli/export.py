@@ -18,7 +18,7 @@ from study.counting import counted
     type=click.Choice(["csv", "psych-ds", "bids"]),
     default="csv",
     show_default=True,
-    help="One table, or a folder in the format of Psych-DS or BIDS, with a description of each column.",
+    help="csv, one table; psych-ds or bids, a folder in that format. Each describes every column.",
 )
 @click.option(
     "--out",

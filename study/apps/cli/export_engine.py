@@ -23,8 +23,7 @@ from study.counting import counted
 def export_engine(found: Path, clips: tuple[str, ...], library: str | None, out: Path, native: bool) -> None:
     """Write clips and their transitions for game engines: glTF, a state machine in seconds, importers.
 
-    ADVICE is the advice.json of `segue advise --out`, TABLE a one-hop table. CLIPs are those that it names, in its
-    order (default: found by these names, in --library).
+    The clips are those that the file names, in its order (default: found by these names, in --library).
     """
     import json
 

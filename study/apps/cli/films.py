@@ -12,21 +12,21 @@ film_options = together(
         type=click.Choice(["mannequin", "stick", "points"]),
         default="mannequin",
         show_default=True,
-        help="How the figure is drawn.",
+        help="How the figure is drawn: mannequin, a body; stick, its bones; points, a dot at each joint.",
     ),
     click.option(
         "--view",
         type=click.Choice(["front", "side", "three-quarter"]),
         default="three-quarter",
         show_default=True,
-        help="From where, relative to the way the figure goes.",
+        help="Seen from the front, from the side, or from between them (three-quarter), as the figure goes.",
     ),
     click.option(
         "--camera",
         type=click.Choice(["track", "pan", "fixed"]),
         default="track",
         show_default=True,
-        help="Follows the figure; stands still and turns; does nothing.",
+        help="track follows the figure; pan stands still and turns after it; fixed does not move.",
     ),
     click.option(
         "--size",
@@ -34,7 +34,7 @@ film_options = together(
         show_default=True,
         metavar="WxH",
         callback=lambda _context, _parameter, text: film_size(text),
-        help="Of the film, in pixels.",
+        help="Width and height of the film, pixels.",
     ),
 )
 """What `drawing.draw_clip` takes: style, view, camera and size."""

@@ -197,40 +197,73 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 
 @click.command()
 @click.argument("data", type=READABLE)
-@click.option("--task", type=click.Choice(list(FITS)), help="Not needed for what segue export wrote.")
+@click.option(
+    "--task",
+    type=click.Choice(list(FITS)),
+    help="What was decided: 2afc, which is right; yes-no; same-different; preference; rating (default: as a file of "
+    "segue export says).",
+)
 @click.option("--answer", help="Column of the response: right or wrong, yes or no, same or different, "
               "first or second (or the method chosen), a rating.")  # fmt: skip
 @click.option("--level", help="Column of the stimulus level (same-different: the signed difference).")
-@click.option("--participant", help="Column of the participant (default: one participant).")
-@click.option("--shown", help="Column with the number of responses that a row stands for; --answer then counts them.")
+@click.option("--participant", help="Column of the participant (default: one participant gave all).")
+@click.option(
+    "--shown",
+    help="Column with the number of responses that a row stands for; --answer then counts them (default: each is one).",
+)
 @click.option("--yes", multiple=True, help="What counts as right, yes, different or first; may be repeated.")
 @click.option("--tie", multiple=True, help="Preference: what counts as neither; may be repeated.")
 @click.option("--where", multiple=True, help="COLUMN=VALUE: use only these rows; may be repeated.")
-@click.option("--order", help="Same-different: column that says which of a pair came first.")
-@click.option("--reference-first", help="Same-different: its value if the reference came first.")
+@click.option("--order", help="Same-different: column that says which of a pair came first (default: not considered).")
+@click.option(
+    "--reference-first", help="Same-different: the value of --order if the reference came first (default: none)."
+)
 @click.option("--first", help="Preference: column of the method shown first.")
 @click.option("--second", help="Preference: column of the method shown second.")
 @click.option("--method", help="Rating: column of the method.")
-@click.option("--motion", help="Column of the motion (or other item) that was shown.")
-@click.option("--item", help="Rating: column of the question.")
+@click.option("--motion", help="Column of the motion (or other item) that was shown (default: not considered).")
+@click.option("--item", help="Rating: column of the question (default: one question).")
 @click.option("--scale", multiple=True, help="Rating: WORD=POINT, if the scale has words; once for each word.")
-@click.option("--ends", type=(float, float), help="Rating: lowest and highest point of the scale.")
-@click.option("--sigmoid", type=click.Choice(["normal", "logistic", "gumbel", "weibull"]), help="[default: normal]")
-@click.option("--choices", type=click.IntRange(min=2), help="2afc: number of alternatives.  [default: 2]")
-@click.option("--guess", type=click.FloatRange(0, 1, max_open=True), help="Fix the guess rate (yes-no).")
-@click.option("--lapse", type=click.FloatRange(0, 1, max_open=True), help="Fix the lapse rate.")
-@click.option("--threshold", type=click.FloatRange(0.5, 1, True, True), help="Same-different.  [default: 0.75]")
-@click.option("--alpha", type=click.FloatRange(0, 1, True, True), help="Preference, rating.  [default: 0.05]")
-@click.option("--confidence", type=click.FloatRange(0.5, 1, True, True), default=0.95, show_default=True)
 @click.option(
-    "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "pipe", "space"]), help="Detected by default."
+    "--ends", type=(float, float), help="Rating: lowest and highest point of the scale (default: those that occur)."
 )
-@click.option("--decimal", type=click.Choice(["point", "comma"]), help="Detected by default.")
+@click.option(
+    "--sigmoid",
+    type=click.Choice(["normal", "logistic", "gumbel", "weibull"]),
+    help="2afc, yes-no: curve of normal, logistic, gumbel, or weibull (levels in logarithms) (default: normal).",
+)
+@click.option("--choices", type=click.IntRange(min=2), help="2afc: number of alternatives (default: 2).")
+@click.option(
+    "--guess",
+    type=click.FloatRange(0, 1, max_open=True),
+    help="Yes-no: fix the guess rate, a share (default: estimated).",
+)
+@click.option(
+    "--lapse", type=click.FloatRange(0, 1, max_open=True), help="Fix the lapse rate, a share (default: estimated)."
+)
+@click.option(
+    "--threshold",
+    type=click.FloatRange(0.5, 1, True, True),
+    help='Same-different: share of "different" at the threshold (default: 0.75).',
+)
+@click.option(
+    "--alpha",
+    type=click.FloatRange(0, 1, True, True),
+    help="Preference, rating: level of significance, a probability (default: 0.05).",
+)
+@click.option("--confidence", type=click.FloatRange(0.5, 1, True, True), default=0.95, show_default=True,
+              help="Confidence of the intervals, a probability.")  # fmt: skip
+@click.option(
+    "--delimiter",
+    type=click.Choice(["comma", "semicolon", "tab", "pipe", "space"]),
+    help="What stands between columns: comma, semicolon, tab, pipe or space (default: detected).",
+)
+@click.option(
+    "--decimal", type=click.Choice(["point", "comma"]), help="Sign before decimals: point or comma (default: detected)."
+)
 @json_option
 def fit(data: Path, task: str | None, **options: Any) -> None:
     """Analyse data from another program (PsychoPy, jsPsych, Gorilla): CSV or JSON, with its columns named here.
-
-    Example: segue fit data.csv --task 2afc --level contrast --answer key_resp.corr --participant participant
 
     The columns of what segue export writes are known: segue fit answers.csv
     """

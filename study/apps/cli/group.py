@@ -21,6 +21,7 @@ from renderer.errors import RendererError
 from renderer.files import REASONS
 from study import __version__
 from study.apps.cli.console import say
+from study.apps.cli.examples import explain
 from study.apps.cli.streams import hush, print_in_any_encoding
 from study.errors import SegueError
 from study.files import refused
@@ -66,6 +67,7 @@ class Verbs(click.Group):
             return None
         module, _, name = VERBS[cmd_name].partition(":")
         command: click.Command = getattr(importlib.import_module(f"study.apps.cli.{module}"), name)
+        explain(command, cmd_name)
         return command
 
     def resolve_command(

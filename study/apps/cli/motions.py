@@ -88,9 +88,15 @@ def first_tables(library: FolderLibrary, names: Iterable[str]) -> list[tuple[str
 @motions.command()
 @click.argument("file")
 @click.option(
-    "--metres-per-unit", type=click.FloatRange(min=0, min_open=True), help="The file's length unit, in metres."
+    "--metres-per-unit",
+    type=click.FloatRange(min=0, min_open=True),
+    help="The file's length unit, metres (default: that of library.toml, else guessed from the figure's size).",
 )
-@click.option("--fps", type=click.FloatRange(min=0, min_open=True), help="Frame rate, if the file does not say it.")
+@click.option(
+    "--fps",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Frames per second (default: as the file or library.toml says).",
+)
 @json_option
 def inspect(file: str, metres_per_unit: float | None, fps: float | None) -> None:
     """The content of a motion file, and its defects.
@@ -163,10 +169,12 @@ def download(trials: tuple[str, ...], out: Path) -> None:
 @click.command()
 @click.argument("clip", metavar="FILE|NAME")
 @clips_options
-@click.option("--out", type=FILE, required=True, help="X.mp4, or X.png: a strip.")
-@click.option("--fps", type=click.FloatRange(min=1), help="Frame rate of the video (default: that of the clip).")
+@click.option("--out", type=FILE, required=True, help="File to write: X.mp4, or X.png, a strip of poses.")
+@click.option(
+    "--fps", type=click.FloatRange(min=1), help="Frames per second of the video (default: those of the clip)."
+)
 @film_options
-@click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Of the strip.")
+@click.option("--poses", type=click.IntRange(min=1), default=9, show_default=True, help="Number of poses of the strip.")
 @click.option("--floor", is_flag=True, help="Draw the ground, with contact shadows.")
 @json_option
 def preview(clip: str, library: str | None, out: Path, fps: float | None, **look: Any) -> None:

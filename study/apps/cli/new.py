@@ -19,10 +19,19 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("clips", nargs=-1, metavar="[CLIP]...")
-@click.option("--study", metavar="TASK", help="preference, same-different, oddity or rating: what participants decide.")
-@click.option("--from", "published", metavar="PROTOCOL", help="Copy a protocol that comes with Segue, to edit it.")
+@click.option(
+    "--study",
+    metavar="TASK",
+    help="What participants decide: preference, same-different, oddity or rating (default: asks).",
+)
+@click.option(
+    "--from",
+    "published",
+    metavar="PROTOCOL",
+    help="Copy a protocol that comes with Segue, such as wang2004_session, to edit it (default: none).",
+)
 @library_option
-@click.option("--name", help="Of the protocol, its file and its results (default: my_study, or that of --from).")
+@click.option("--name", help="Name of the protocol, its file and its results (default: my_study, or that of --from).")
 @click.option("--out", type=FOLDER, default=Path(), help="Folder to write into (default: here).")
 @click.option("--overwrite", is_flag=True, help="Replace a protocol of that name that is there.")
 @json_option
@@ -35,13 +44,9 @@ def new(
     out: Path,
     overwrite: bool,
 ) -> None:
-    r"""Write a first protocol that can be shown at once, for you to edit; in a terminal, asks for what is not given.
+    """Write a first protocol that can be shown at once, for you to edit; in a terminal, asks for what is not given.
 
-    CLIPs are two or more motion files of one folder, or motions of --library.
-
-    \b
-    segue new walk.bvh run.bvh --study preference
-    segue new --from wang2004_session
+    Two or more clips are needed, as files of one folder or motions of --library.
     """
     from study.experiment.protocol.whole import find_protocol, load_protocol
     from study.experiment.starting import start_protocol

@@ -52,15 +52,47 @@ def pairs_of(pairs: tuple[tuple[str, str], ...], clips: tuple[Clip, ...]) -> lis
 
 search_options = together(
     clips_options,
-    click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frame rate to work at."),
-    click.option("--blend", type=click.IntRange(min=1), help="Frames of each blend (default: 0.5 s)."),
-    click.option("--stay", type=click.IntRange(min=0), help="Longest stay in source and hop, frames (default: 1 s)."),
-    click.option("--weight", type=click.FloatRange(min=0), help="Cost of a frame of stay (default: Eq. 5)."),
-    click.option("--times", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Multiply that weight."),
-    click.option("--seed", type=int, default=0, show_default=True, help="For the weight of Eq. 5."),
-    click.option("--distance", type=click.Choice(["pointcloud", "joint"]), default="pointcloud", show_default=True),
-    click.option("--part", type=click.Choice(["lower", "upper"]), help="The distance of one part of the body alone."),
-    click.option("--memory-gb", type=click.FloatRange(min=0.05), default=2.0, show_default=True, help="Memory limit."),
+    click.option(
+        "--fps",
+        type=click.FloatRange(min=1),
+        default=60.0,
+        show_default=True,
+        help="Frames per second to work at; frames are counted at this rate.",
+    ),
+    click.option("--blend", type=click.IntRange(min=1), help="Length of each blend, frames (default: 0.5 s)."),
+    click.option(
+        "--stay", type=click.IntRange(min=0), help="Longest stay in source and in hop, frames (default: 1 s)."
+    ),
+    click.option(
+        "--weight",
+        type=click.FloatRange(min=0),
+        help="Cost of a frame of stay, in units of the distance (default: that of Eq. 5).",
+    ),
+    click.option(
+        "--times", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Factor of that weight."
+    ),
+    click.option(
+        "--seed", type=int, default=0, show_default=True, help="Seed of the pairs that Eq. 5 draws, a whole number."
+    ),
+    click.option(
+        "--distance",
+        type=click.Choice(["pointcloud", "joint"]),
+        default="pointcloud",
+        show_default=True,
+        help="pointcloud: distances of points on the body; joint: rotations and velocities of joints.",
+    ),
+    click.option(
+        "--part",
+        type=click.Choice(["lower", "upper"]),
+        help="The distance of one part of the body: lower, or upper, the spine and above (default: all).",
+    ),
+    click.option(
+        "--memory-gb",
+        type=click.FloatRange(min=0.05),
+        default=2.0,
+        show_default=True,
+        help="Memory to work in, gigabytes.",
+    ),
 )
 """Clips, frame rate and what all searches share."""
 
@@ -68,43 +100,52 @@ search_options = together(
 @one_hop.command()
 @click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
 @search_options
-@click.option("--out", type=FILE, required=True, help="X.npz, or X.bin and X.json.")
+@click.option("--out", type=FILE, required=True, help="File to write: X.npz, or X.bin with X.json, for engines.")
 @click.option(
     "--pair", "pairs", type=(str, str), multiple=True, metavar="SRC DST", help="A transition to build (default: all)."
 )
 @click.option(
     "--offset",
     type=int,
-    help="Frame of SRC with which DST's frame 0 always aligns, as in dancing to music (default: 0).",
+    help="Frame of SRC with which frame 0 of DST always aligns, as in dancing to music (default: 0).",
 )
 @click.option(
     "--start",
     type=click.IntRange(min=0),
-    help="Instead: the frame at which DST enters whenever triggered, as in a jump.",
+    help="Instead of --offset: the frame at which DST is entered whenever triggered, as in a jump (default: none).",
 )
-@click.option("--longest", type=click.IntRange(min=1), help="Longest transition, frames, both blends included.")
+@click.option(
+    "--longest",
+    type=click.IntRange(min=1),
+    help="Longest transition, frames, both blends included (default: as the stays allow).",
+)
 @click.option(
     "--genre",
     type=(str, click.FloatRange(min=0)),
     metavar="GENRE COST",
-    help="Prefer hops of a genre, a category of the library: any other costs so much more (Eq. 6).",
+    help="Prefer hops of a genre, a category of the library: any other costs so much more (Eq. 6; default: none).",
 )
 @click.option("--adaptive", is_flag=True, help="Each blend has a length of its own, up to 1 s.")
 @click.option("--on-beat", is_flag=True, help="Align beats with beats, estimated from the motions or given by --beats.")
 @click.option(
-    "--beats", type=(str, READABLE), multiple=True, metavar="CLIP FILE", help="Times of a clip's beats, seconds."
+    "--beats",
+    type=(str, READABLE),
+    multiple=True,
+    metavar="CLIP FILE",
+    help="File of the times of a clip's beats, seconds; may be repeated.",
 )
 @click.option(
-    "--near-direct", type=click.IntRange(min=0), help="The hop is DST itself, shifted by at most this many frames."
+    "--near-direct",
+    type=click.IntRange(min=0),
+    help="The hop is DST itself, shifted by at most this many frames (default: any hop).",
 )
 @click.option("--runs", is_flag=True, help="X.bin holds neighbouring entries together, without loss.")
-@click.option("--workers", type=click.IntRange(min=1), help="Threads (default: one a core).")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of threads (default: one a core).")
 @json_option
 def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **options: Any) -> None:
-    """Find the best transition between CLIPs for every triggered frame, and write a table of them.
+    """Find the best transition between clips for every triggered frame, and write a table of them.
 
-    Clips are motion files, or names of motions in --library. All of them may be hops. The same command
-    resumes an interrupted build.
+    Every clip may be a hop. The same command resumes an interrupted build.
     """
     import numpy as np
 
@@ -263,7 +304,14 @@ def beat_offsets(
 
 @one_hop.command()
 @click.argument("table", type=READABLE)
-@click.option("--at", "places", type=(str, str, int), multiple=True, metavar="SRC DST FRAME", help="Show this entry.")
+@click.option(
+    "--at",
+    "places",
+    type=(str, str, int),
+    multiple=True,
+    metavar="SRC DST FRAME",
+    help="Show the entry of this triggered frame; may be repeated.",
+)
 @json_option
 def show(table: Path, places: tuple[tuple[str, str, int], ...]) -> None:
     """The content of a table, and single entries of it."""
@@ -304,13 +352,24 @@ def show(table: Path, places: tuple[tuple[str, str, int], ...]) -> None:
 @click.argument("table", type=READABLE)
 @click.argument("clips", metavar="[CLIP...]", nargs=-1)
 @clips_options
-@click.option("--first", metavar="CLIP", help="The state to start in (default: the first clip).")
+@click.option("--first", metavar="CLIP", help="Clip to start in (default: the first).")
 @click.option(
-    "--trigger", "triggers", type=(int, str), multiple=True, metavar="FRAME DST", help="At this frame, change to DST."
+    "--trigger",
+    "triggers",
+    type=(int, str),
+    multiple=True,
+    metavar="FRAME DST",
+    help="Change to DST at this frame; may be repeated.",
 )
-@click.option("--method", type=click.Choice(["one-hop", "direct"]), default="one-hop", show_default=True)
-@click.option("--upper", type=READABLE, metavar="TABLE", help="A table of the same clips for trunk, arms and head.")
-@click.option("--out", type=FILE, required=True, help="X.bvh, X.mp4 or X.png.")
+@click.option("--method", type=click.Choice(["one-hop", "direct"]), default="one-hop", show_default=True,
+              help="one-hop, through the table's hop; direct, without.")  # fmt: skip
+@click.option(
+    "--upper",
+    type=READABLE,
+    metavar="TABLE",
+    help="A table of the same clips for trunk, arms and head (default: none).",
+)
+@click.option("--out", type=FILE, required=True, help="File to write: X.bvh, X.mp4, or X.png, a strip of poses.")
 @json_option
 def play(
     table: Path,
@@ -324,7 +383,7 @@ def play(
 ) -> None:
     """Play clips as the states of a state machine, with transitions from a table, and write the motion.
 
-    CLIPs are those of the table, in its order (default: the motions of --library with the table's names).
+    The clips are those of the table, in its order (default: the motions of --library with the table's names).
     """
     from dataclasses import replace
 

@@ -26,14 +26,20 @@ if TYPE_CHECKING:
 
 __all__ = ["one_hop"]
 
-out_option = click.option("--out", type=FILE, help="X.bvh, X.mp4 or X.png.")
+out_option = click.option(
+    "--out", type=FILE, help="File to write: X.bvh, X.mp4, or X.png, a strip of poses (default: none)."
+)
 
 moment_options = together(
     click.argument("clips", metavar="CLIP...", nargs=-1, required=True),
     search_options,
-    click.option("--pair", type=(str, str), metavar="SRC DST", required=True, help="The transition."),
+    click.option(
+        "--pair", type=(str, str), metavar="SRC DST", required=True, help="The transition: its source and destination."
+    ),
     click.option("--at", "trigger", type=click.IntRange(min=0), required=True, help="Triggered frame of SRC."),
-    click.option("--offset", type=int, default=0, show_default=True, help="Frame of SRC where DST has its frame 0."),
+    click.option(
+        "--offset", type=int, default=0, show_default=True, help="Frame of SRC with which frame 0 of DST aligns."
+    ),
 )
 """One transition at one triggered frame."""
 
@@ -103,7 +109,7 @@ def between(slow: str, fast: str, library: str | None, fps: float, count: int, o
 
 @one_hop.command()
 @moment_options
-@click.option("--hops", type=click.IntRange(1, 8), default=2, show_default=True, help="The most hops.")
+@click.option("--hops", type=click.IntRange(1, 8), default=2, show_default=True, help="Most hops on the way.")
 @out_option
 @json_option
 def chain(
@@ -117,7 +123,7 @@ def chain(
 ) -> None:
     """The best transition through several hops, for one triggered frame.
 
-    Exact, by dynamic programming; each further hop takes as long as the first. All CLIPs may be hops.
+    Exact, by dynamic programming; each further hop takes as long as the first. Every clip may be a hop.
     """
     from study.transitions.one_hop.chains import find_chains
     from study.transitions.one_hop.play import play_steps
@@ -146,12 +152,16 @@ def chain(
 
 @one_hop.command()
 @moment_options
-@click.option("--forward", type=float, help="Metres ahead of the figure at the triggered frame.")
-@click.option("--left", type=float, help="Metres to its left; below 0 to its right.")
-@click.option("--within", type=click.FloatRange(min=0), default=0.1, show_default=True, help="Tolerance, metres.")
-@click.option("--turn", type=click.FloatRange(-180, 180), help="Degrees that it is to face further to the left.")
+@click.option(
+    "--forward", type=float, help="Where to end, metres ahead of the figure at the triggered frame (default: anywhere)."
+)
+@click.option("--left", type=float, help="Metres to its left, below 0 to its right (default: anywhere).")
+@click.option(
+    "--within", type=click.FloatRange(min=0), default=0.1, show_default=True, help="Tolerance of the place, metres."
+)
+@click.option("--turn", type=click.FloatRange(-180, 180), help="Turn to the left, degrees (default: any).")
 @click.option("--within-turn", type=click.FloatRange(0, 180), default=10.0, show_default=True,
-              help="Tolerance, degrees.")  # fmt: skip
+              help="Tolerance of the turn, degrees.")  # fmt: skip
 @out_option
 @json_option
 def reach(
@@ -169,7 +179,7 @@ def reach(
 ) -> None:
     """The best transition that ends at a wanted place and heading, for one triggered frame.
 
-    Exact: every hop, frame and stay is looked at. The end is the last blended frame. All CLIPs may be hops.
+    Exact: every hop, frame and stay is looked at. The end is the last blended frame. Every clip may be a hop.
     """
     from math import degrees, radians
 
@@ -251,15 +261,15 @@ def connect(
 @one_hop.command()
 @click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
 @search_options
-@click.option("--count", type=click.IntRange(1, 200), default=15, show_default=True, help="How many transitions.")
-@click.option("--out", type=FILE, help="X.png: what each costs (Figure 10).")
+@click.option("--count", type=click.IntRange(1, 200), default=15, show_default=True, help="Number of transitions.")
+@click.option("--out", type=FILE, help="Figure of what each costs: X.png, as Figure 10 (default: none).")
 @json_option
 def robustness(
     clips: tuple[str, ...], library: str | None, fps: float, count: int, out: Path | None, **options: Any
 ) -> None:
     """Transitions chosen by rule, direct and by the best hop, and what each part of them costs (section 4.2).
 
-    Triggers lie at equal distances over the usable frames of all CLIPs, each to the next clip.
+    Triggers lie at equal distances over the usable frames of all clips, each to the next clip.
     """
     from dataclasses import asdict, replace
 

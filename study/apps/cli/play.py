@@ -32,20 +32,37 @@ CENTIMETRES = click.FloatRange(1, 1000)
 
 @click.command()
 @click.argument("protocol")
-@click.option("--participant", required=True, metavar="ID", help="Participant, such as p01; the same ID resumes.")
+@click.option(
+    "--participant",
+    required=True,
+    metavar="ID",
+    help="Identifier of the participant, such as p01; the same one resumes.",
+)
 @click.option("--group", type=click.IntRange(min=0),
-              help="Group, for orders by group and for sets of pairs (default: the smallest so far).")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), help="Seed of the order of trials (default: the protocol's).")
+              help="Number of the group, for orders by group and sets of pairs (default: the smallest).")  # fmt: skip
+@click.option(
+    "--seed", type=click.IntRange(min=0), help="Seed of the order of trials, a whole number (default: the protocol's)."
+)
 @library_option
 @OUT
 @database_option
-@click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Monitor to use.")
+@click.option("--monitor", type=click.IntRange(min=0), default=0, show_default=True, help="Number of the monitor.")
 @click.option("--windowed", is_flag=True, help="Use a window instead of the full screen.")
-@click.option("--size", default="1280x800", show_default=True, metavar="WIDTHxHEIGHT", help="Of the window.")
+@click.option(
+    "--size",
+    default="1280x800",
+    show_default=True,
+    metavar="WIDTHxHEIGHT",
+    help="Width and height of the window, pixels.",
+)
 @click.option("--actual-size", is_flag=True, help="Show stimuli in their own pixels instead of as `[screen]` states.")
-@click.option("--screen-cm", type=CENTIMETRES, help="Width of the screen in cm, measured (default: as it reports).")
-@click.option("--distance-cm", type=CENTIMETRES, help="Viewing distance in cm (default: the protocol's).")
-@click.option("--font", type=READABLE, help="Font for other scripts.")
+@click.option(
+    "--screen-cm", type=CENTIMETRES, help="Width of the screen, centimetres, measured (default: as it reports)."
+)
+@click.option("--distance-cm", type=CENTIMETRES, help="Viewing distance, centimetres (default: the protocol's).")
+@click.option(
+    "--font", type=READABLE, help="Font file for other scripts (default: DejaVu Sans, then the system's fonts)."
+)
 @json_option
 def play(
     protocol: str,

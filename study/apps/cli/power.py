@@ -62,17 +62,34 @@ def _sizes(text: str, option: str = "--participants", example: str = "10,20,40")
 
 @click.command()
 @click.argument("protocol")
-@click.option("--study", "name", help="Name of the study (not needed if there is only one).")
-@click.option("--participants", default="8,12,16,24,35,50", show_default=True, help="Numbers of participants to try.")
-@click.option("--target", type=click.FloatRange(0, 1, True, True), default=0.8, show_default=True, help="Power.")
+@click.option("--study", "name", help="Name of the study (default: the only one).")
+@click.option(
+    "--participants",
+    default="8,12,16,24,35,50",
+    show_default=True,
+    help="Numbers of participants to try, with commas between.",
+)
+@click.option(
+    "--target",
+    type=click.FloatRange(0, 1, True, True),
+    default=0.8,
+    show_default=True,
+    help="Power that is wanted: the share of studies that find the effect.",
+)
 @click.option("--share", type=click.FloatRange(0, 1, True, True), default=0.65, show_default=True,
-              help="Preference: true share for the first method.")  # fmt: skip
+              help="Preference: true share of answers for the first method, from 0 to 1.")  # fmt: skip
 @click.option("--correlation", type=click.FloatRange(0, 0.9), default=0.1, show_default=True,
               help="Preference, rating: intraclass correlation of a participant's responses.")  # fmt: skip
-@click.option("--order-bias", type=float, default=0.1, show_default=True, help="Preference: logits for the first.")
+@click.option(
+    "--order-bias",
+    type=float,
+    default=0.1,
+    show_default=True,
+    help="Preference: how much likelier the film shown first is chosen, log-odds.",
+)
 @click.option("--motion-sd", type=click.FloatRange(0, 3), default=0.0, show_default=True,
-              help="Preference: how motions differ, standard deviation in logits.")  # fmt: skip
-@click.option("--motions", help="Preference: other numbers of motions to try as well, as 4,8,16.")
+              help="Preference: how motions differ, standard deviation in log-odds.")  # fmt: skip
+@click.option("--motions", help="Preference: other numbers of motions to try as well, such as 4,8,16 (default: none).")
 @click.option("--difference", type=float, default=0.7, show_default=True,
               help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
 @click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=8.0, show_default=True,
@@ -80,18 +97,20 @@ def _sizes(text: str, option: str = "--participants", example: str = "10,20,40")
 @click.option("--longer", type=click.FloatRange(min=0, min_open=True), default=7.0, show_default=True,
               help="Same-different, oddity: true threshold, frames longer.")  # fmt: skip
 @click.option("--spread", type=click.FloatRange(0, 1), default=0.15, show_default=True,
-              help="Same-different, oddity: how participants differ.")  # fmt: skip
+              help="Same-different, oddity: how participants differ, SD of the logarithm of sensitivity.")  # fmt: skip
 @click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
               help="Same-different, oddity: required half-width of the intervals (1 - alpha), frames.")  # fmt: skip
 @click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=0.005, show_default=True,
-              help="Share of trials without a response because of inattention, besides late responses.")  # fmt: skip
-@click.option("--studies", type=click.IntRange(min=10), help="Simulated studies.  [default: 1000; thresholds 200]")
+              help="Share of trials without a response, from 0 to 1, besides late responses.")  # fmt: skip
+@click.option(
+    "--studies", type=click.IntRange(min=10), help="Number of simulated studies (default: 1000; for thresholds 200)."
+)
 @click.option(
     "--sessions", is_flag=True, help="Simulate whole sessions and the whole analysis: slow, with the same result."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed, a whole number.")
 @click.option("--out", type=FOLDER,
-              help="Results folder for power_STUDY.json and .csv, which its report shows.")  # fmt: skip
+              help="Results folder for power_STUDY.json and .csv, which its report shows (default: none).")  # fmt: skip
 @library_option
 @json_option
 def power(

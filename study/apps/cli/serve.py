@@ -26,21 +26,44 @@ from study.apps.cli.shared import (
 @OUT
 @WORKERS
 @database_option
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0 for all.")
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="Address to listen at: 127.0.0.1 for this computer alone, 0.0.0.0 for others on the network too.",
+)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=8000, show_default=True, help="Port; 0 for any free one."
 )
 @click.option(
-    "--participants", type=click.IntRange(min=1), help="Most participants; places of drop-outs become available again."
+    "--participants",
+    type=click.IntRange(min=1),
+    help="Most participants (default: no limit); places of drop-outs become available again.",
 )
-@click.option("--groups", type=click.IntRange(min=1), help="Groups to fill evenly (default: what the protocol needs).")
-@click.option("--parameter", "parameters", multiple=True, metavar="NAME", help="Also store this parameter of the link.")
-@click.option("--completion-code", default="", help="Shown at the end.")
-@click.option("--completion-url", default="", metavar="URL", help="Address behind the last button.")
+@click.option(
+    "--groups", type=click.IntRange(min=1), help="Number of groups to fill evenly (default: what the protocol needs)."
+)
+@click.option(
+    "--parameter",
+    "parameters",
+    multiple=True,
+    metavar="NAME",
+    help="Also store this parameter of the link, such as LAB; may be repeated.",
+)
+@click.option(
+    "--completion-code", default="", help="Code shown at the end, as a recruiting service gives it (default: none)."
+)
+@click.option(
+    "--completion-url",
+    default="",
+    metavar="URL",
+    help="Where the last button leads, such as https://app.prolific.com/submissions/complete?cc=CODE "
+    "(default: nowhere).",
+)
 @click.option(
     "--researcher-token",
     envvar="SEGUE_RESEARCHER_TOKEN",
-    help="At least 16 characters (default: a new one at each start).",
+    help="What the researcher's page asks for, at least 16 characters (default: a new one at each start).",
 )
 @click.option("--behind-proxy", is_flag=True, help="Trust X-Forwarded-* headers from a local reverse proxy.")
 @click.option(
@@ -48,10 +71,13 @@ from study.apps.cli.shared import (
     "public_urls",
     multiple=True,
     metavar="URL",
-    help="Address that participants open, if it is not this machine's own name, as behind a proxy.",
+    help="Address that participants open (default: this computer's own); needed behind a proxy, may be repeated.",
 )
 @click.option(
-    "--root-path", default="", metavar="PATH", help="Path under which the proxy shows this study, such as /study."
+    "--root-path",
+    default="",
+    metavar="PATH",
+    help="Path under which the proxy shows this study, such as /study (default: none).",
 )
 def serve(
     protocol: str,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from study.experiment.stimuli.stimulus import StimulusSet
 
 OUT = click.option("--out", type=FOLDER, default=None, help="Results folder (default: results/<name of the protocol>).")
-WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Processes (default: one a core).")
+WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Number of processes (default: one a core).")
 
 
 def load(protocol: str) -> Protocol:

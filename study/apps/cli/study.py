@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +13,12 @@ from study.apps.cli.console import FOLDER, RESULTS, database_option, emit, json_
 from study.apps.cli.shared import OUT, WORKERS, check_database, load, prepare_stimuli, render_stimuli, results_folder
 from study.apps.cli.shown import shortcut_lines, table_of, trials_between
 from study.counting import counted
+from study.errors import MotionError, ProtocolError
 
 if TYPE_CHECKING:
     from study.analysis.analyse import Analysis
     from study.experiment.protocol.whole import Protocol
+    from study.motion.library import Library
 
 SHARE = click.FloatRange(0.0, 1.0)
 
@@ -67,6 +70,15 @@ def analyse_results(folder: Path, database: str | None = None) -> Analysis:
     return analyse_folder(protocol, answers, checks)
 
 
+def _missing(motions: Iterable[str], library: Library) -> Iterator[str]:
+    """For each motion that a library does not have, what it says."""
+    for motion in motions:
+        try:
+            library.entry(motion)
+        except MotionError as refusal:
+            yield f"motion {motion!r}: {refusal}"
+
+
 @click.command()
 @click.argument("protocol")
 @library_option
@@ -82,7 +94,13 @@ def check(protocol: str, library: str | None, texts: bool) -> None:
     from study.experiment.wording import all_texts
     from study.motion.library import open_library
 
-    checked, opened = load(protocol), open_library(library or "synthetic")
+    opened = open_library(library or "synthetic")
+    try:
+        checked = load(protocol)
+    except ProtocolError as refusal:
+        # What is misspelled hides nothing: what else can't be shown is said in the same run.
+        more = look_ahead(refusal.rest, opened).problems if refusal.rest else _missing(refusal.motions, opened)
+        raise ProtocolError("\n".join([str(refusal), *more])) from None
     found, notes = look_ahead(checked, opened), to_do(checked)
     read = [asdict(one) for one in all_texts(checked, found.film_times)] if texts else []
     lines = [f"{one['where']}\n    {one['text']}\n" for one in read]
@@ -136,7 +154,7 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
 @click.command()
 @click.argument("protocol")
 @click.option(
-    "--participants", type=click.IntRange(min=1), help="Total number of participants (default: the protocol's)."
+    "--participants", type=click.IntRange(min=1), help="Number of participants in all (default: the protocol's)."
 )
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the observers (default: the protocol's).")
 @click.option(
@@ -144,10 +162,18 @@ def render(protocol: str, library: str | None, out: Path | None, workers: int | 
     type=SHARE,
     default=0.005,
     show_default=True,
-    help="Share of trials without a response, besides late responses.",
+    help="Share of trials without a response, from 0 to 1, besides late responses.",
 )
-@click.option("--badly-shown", type=SHARE, default=0.0, show_default=True, help="Share of presentations that stall.")
-@click.option("--careless", type=SHARE, default=0.0, show_default=True, help="Share of participants who do not watch.")
+@click.option(
+    "--badly-shown", type=SHARE, default=0.0, show_default=True, help="Share of presentations that stall, from 0 to 1."
+)
+@click.option(
+    "--careless",
+    type=SHARE,
+    default=0.0,
+    show_default=True,
+    help="Share of participants who do not watch, from 0 to 1.",
+)
 @library_option
 @OUT
 @database_option
@@ -211,7 +237,13 @@ def report(results: Path, out: Path | None, database: str | None) -> None:
 @click.command()
 @OUT
 @WORKERS
-@click.option("--participants", type=click.IntRange(min=1), default=12, show_default=True, help="Simulated.")
+@click.option(
+    "--participants",
+    type=click.IntRange(min=1),
+    default=12,
+    show_default=True,
+    help="Number of simulated participants.",
+)
 @json_option
 def demo(out: Path | None, workers: int | None, participants: int) -> None:
     """A small study from end to end, without screen or network: stimuli, simulated observers, analysis, report."""

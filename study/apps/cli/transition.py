@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from study.apps.cli.clips import clip_pair, clips_options
-from study.apps.cli.console import FILE, FPS, emit, json_option, together
+from study.apps.cli.console import FILE, FPS, WEIGHTS, emit, json_option, together
 from study.apps.cli.films import film_options
 from study.apps.cli.moments import in_words, moment
 from study.counting import counted
@@ -33,13 +33,17 @@ LENGTHS = {
 SWITCHES = {name: make for name, make in DIRECT.items() if issubclass(make, Switching)}
 """Makes that switch to the destination at the start frame."""
 
+METHOD = (
+    "How the length is chosen: fixed, the same for all; velocity, by the speed of the joint that differs most; "
+    "geodesic, of least cost; timewarp, a length for each clip, of least cost."
+)
 
 clip_options = together(
     click.argument("source", metavar="SRC"),
     click.argument("destination", metavar="DST"),
     clips_options,
-    click.option("--start", type=click.IntRange(min=0), required=True, help="First blended frame, in SRC."),
-    click.option("--end", type=click.IntRange(min=0), required=True, help="Last blended frame, in DST."),
+    click.option("--start", type=click.IntRange(min=0), required=True, help="First blended frame, a frame of SRC."),
+    click.option("--end", type=click.IntRange(min=0), required=True, help="Last blended frame, a frame of DST."),
     FPS,
 )
 """The two clips, the frames that a transition joins, and the frame rate."""
@@ -49,18 +53,25 @@ specification_option = click.option(
     type=click.Choice(["start-end", "centre", "left"]),
     default="start-end",
     show_default=True,
-    help="--start and --end are the blend's first and last frame, both its middle, or both its first.",
+    help="What --start and --end are: start-end, the blend's first and last frame; centre, both its middle; left, both "
+    "its first.",
 )
 
 
 @click.command("blend-length")
 @clip_options
-@click.option("--method", type=click.Choice(list(LENGTHS)), default="geodesic", show_default=True)
-@click.option("--fixed-frames", type=click.IntRange(min=1), help="For --method fixed (default: 0.33 s).")
-@click.option("--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True)
+@click.option("--method", type=click.Choice(list(LENGTHS)), default="geodesic", show_default=True, help=METHOD)
+@click.option(
+    "--fixed-frames", type=click.IntRange(min=1), help="Blend length for --method fixed, frames (default: 0.33 s)."
+)
+@click.option(
+    "--weights", type=click.Choice(["wang2003", "lee2002"]), default="wang2003", show_default=True, help=WEIGHTS
+)
 @specification_option
 @click.option("--printed-sum", is_flag=True, help="With timewarp: the undivided sum as printed in Eqs. 5 and 6.")
-@click.option("--out", type=FILE, help="X.png: the costs as an image; X.csv: as numbers.")
+@click.option(
+    "--out", type=FILE, help="File for the costs of all lengths: X.png, a figure; X.csv, numbers (default: none)."
+)
 @json_option
 def blend_length(
     source: str,
@@ -76,10 +87,7 @@ def blend_length(
     printed_sum: bool,
     out: Path | None,
 ) -> None:
-    """How long to blend from frame --start of SRC to frame --end of DST (Wang & Bodenheimer 2004).
-
-    SRC and DST are motion files, or names of motions in --library.
-    """
+    """How long to blend from frame --start of SRC to frame --end of DST (Wang & Bodenheimer 2004)."""
     from study.apps.cli.lengths import show_lengths, show_warped
     from study.transitions.blend_length import BlendLength, major_joint_differences
     from study.transitions.timewarp import warp_length
@@ -125,25 +133,32 @@ def _check_two_windows(method: str, specification: str) -> None:
 
 @click.command()
 @clip_options
-@click.option("--method", type=click.Choice(list(LENGTHS)), help="Choose the blend length by this method.")
-@click.option("--frames", type=click.IntRange(min=1), help="Blend this many frames.")
+@click.option("--method", type=click.Choice(list(LENGTHS)), help=METHOD + " (default: --frames)")
+@click.option("--frames", type=click.IntRange(min=1), help="Blend length, frames (default: --method's).")
 @click.option("--make", type=click.Choice(list(DIRECT)), default=Slerp.name,
               show_default=True,
-              help="How frames are made: a blend, a blend in step, or a switch as game engines make it.")  # fmt: skip
+              help="How the frames are made: slerp, a blend by interpolation; registration-curve, a blend in step; "
+              "inertialize, inertialize-quintic, dead-blend: a switch, as game engines make it.")  # fmt: skip
 @click.option("--halflife", type=click.FloatRange(0.01, 2.0),
-              help="With --make inertialize: seconds; by default it matches the blend length.")  # fmt: skip
-@click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True)
+              help="Half-life for --make inertialize, seconds (default: it matches the blend length).")  # fmt: skip
+@click.option("--weight", type=click.Choice(["linear", "sigmoid"]), default="linear", show_default=True,
+              help="How the weight grows over the blend: linear, evenly; sigmoid, slowly at both ends.")  # fmt: skip
 @specification_option
 @click.option(
-    "--joint", "joints", multiple=True, metavar="ROLE=FRAMES", help="Blend one joint shorter; can be repeated."
+    "--joint",
+    "joints",
+    multiple=True,
+    metavar="ROLE=FRAMES",
+    help="Blend one joint over fewer frames, such as shoulder.L=6; may be repeated.",
 )
 @click.option("--keep-slide", is_flag=True, help="Do not remove the sliding of feet.")
 @click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "in"]),
-    help="Length unit of X.bvh (default: that of SRC). Its frame rate is that of SRC unless --fps is given.",
+    help="Length unit of X.bvh: m, cm, mm or in(ches) (default: that of SRC). Its frame rate is that of SRC unless "
+    "--fps is given.",
 )
-@click.option("--out", type=FILE, required=True, help="X.bvh, X.mp4 or X.png (a strip).")
+@click.option("--out", type=FILE, required=True, help="File to write: X.bvh, X.mp4, or X.png, a strip of poses.")
 @film_options
 @json_option
 def transition(

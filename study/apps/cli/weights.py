@@ -24,10 +24,16 @@ ANSWERS = {"g": "good", "b": "bad", "s": "skip", "q": "quit"}
 @click.argument("motions", nargs=-1, required=True, metavar="SRC DST [SRC DST]...")
 @clips_options
 @FPS
-@click.option("--best", type=click.IntRange(min=0), default=2, show_default=True, help="Best cuts by each metric.")
-@click.option("--worst", type=click.IntRange(min=0), default=1, show_default=True, help="Worst cuts by each metric.")
-@click.option("--random", "at_random", type=click.IntRange(min=0), default=2, show_default=True, help="Random cuts.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--best", type=click.IntRange(min=0), default=2, show_default=True, help="Number of the best cuts by each metric."
+)
+@click.option(
+    "--worst", type=click.IntRange(min=0), default=1, show_default=True, help="Number of the worst cuts by each metric."
+)
+@click.option(
+    "--random", "at_random", type=click.IntRange(min=0), default=2, show_default=True, help="Number of random cuts."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed, a whole number.")
 @click.option("--strips", is_flag=True, help="Draw strips of poses (.png) instead of videos (.mp4).")
 @click.option("--show", is_flag=True, help="Open each cut in the system's own viewer.")
 @click.option(
@@ -123,8 +129,16 @@ def _drawn(source: Clip, destination: Clip, candidate: Candidate, folder: Path, 
 @click.argument("table", metavar="TRANSITIONS.csv", type=READABLE)
 @click.option("--library", metavar="NAME|FOLDER", help="Library of the motions (default: that of the table).")
 @as_is_option
-@click.option("--nu", type=click.FloatRange(min=0), default=1.0, show_default=True, help="Weight of velocities.")
-@click.option("--transfer", nargs=2, metavar="SRC DST", help="A pair of motions without labels, to test with.")
+@click.option(
+    "--nu",
+    type=click.FloatRange(min=0),
+    default=1.0,
+    show_default=True,
+    help="Weight of velocities beside rotations, a factor.",
+)
+@click.option(
+    "--transfer", nargs=2, metavar="SRC DST", help="A pair of motions without labels, to test with (default: none)."
+)
 @click.option("--no-cross-validation", is_flag=True, help="Fit only, without cross-validation.")
 @json_option
 def fit_weights(

@@ -12,6 +12,7 @@ import ipaddress
 import logging
 import socket
 from collections.abc import Collection
+from contextlib import suppress
 from functools import lru_cache
 from urllib.parse import urlsplit
 
@@ -38,6 +39,17 @@ def own_names(listened_at: str, public_urls: Collection[str] = ()) -> frozenset[
     machine = socket.gethostname()
     names = {listened_at, machine, machine.partition(".")[0], f"{machine.partition('.')[0]}.local"}
     return frozenset(name.lower() for name in (*names, *map(_public_name, public_urls)))
+
+
+def reachable(host: str) -> str:
+    """An address that others can open: of "all addresses" the one by which this machine reaches the network."""
+    if host not in ("", "0.0.0.0", "::"):
+        return host
+    family, elsewhere = (socket.AF_INET6, "2001:db8::1") if ":" in host else (socket.AF_INET, "192.0.2.1")
+    with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asking:
+        asking.connect((elsewhere, 9))  # sends nothing: it only chooses the way out
+        return str(asking.getsockname()[0])
+    return socket.gethostname()
 
 
 def _public_name(url: str) -> str:

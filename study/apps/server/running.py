@@ -12,7 +12,7 @@ from starlette.types import ASGIApp
 from study.apps.server import memory
 from study.apps.server.connections import Connection
 from study.apps.server.hosting import Host
-from study.apps.server.names import Named, own_names
+from study.apps.server.names import Named, own_names, reachable
 from study.apps.server.settings import Settings
 from study.apps.server.web import make_app
 from study.errors import SessionError
@@ -63,7 +63,7 @@ def run(
     names = own_names(host, public_urls)
     manifest = read_manifest(folder)
     listening = listen(host, port)
-    name = f"[{host}]" if ":" in host else host
+    name = f"[{at}]" if ":" in (at := reachable(host)) else at
     with open_responses(database or folder) as responses:
         try_to_write(responses.engine, responses.place)
         study = Host(protocol, manifest, responses, settings, ahead and ahead())

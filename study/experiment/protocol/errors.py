@@ -6,6 +6,7 @@ where and what to do goes out.
 
 from __future__ import annotations
 
+import copy
 import re
 import types
 import typing
@@ -67,6 +68,20 @@ def telling(model: type[BaseModel], details: Sequence[ErrorDetails]) -> list[Err
         if not (detail["type"] == "missing" and detail["loc"] in meant)
         and not (detail["type"] == "too_short" and any(_within(other, detail["loc"]) for other in faulty))
     ]
+
+
+def respelled(model: type[BaseModel], data: Mapping[str, Any], found: Iterable[ErrorDetails]) -> dict[str, Any] | None:
+    """The data of a protocol with unknown keys named as they were meant; None where anything else is wrong with it."""
+    mended = copy.deepcopy(dict(data))
+    for detail in found:
+        near = _near_key(model, detail["loc"]) if detail["type"] == "extra_forbidden" else None
+        table: Any = mended
+        for part in detail["loc"][:-1]:
+            table = table[part] if near and part in (table if isinstance(table, dict) else range(len(table))) else {}
+        if near is None or near in table or detail["loc"][-1] not in table:
+            return None
+        table[near] = table.pop(detail["loc"][-1])
+    return mended
 
 
 def _apart(detail: ErrorDetails) -> list[ErrorDetails]:

@@ -10,9 +10,8 @@ The meaning of a key is its `description`; `docs/protocols.md` is written from t
 from __future__ import annotations
 
 import hashlib
-from difflib import get_close_matches
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from pydantic import PrivateAttr, ValidationError, model_validator
 
@@ -20,8 +19,9 @@ from study.counting import counted
 from study.errors import FileError, ProtocolError
 from study.experiment.protocol.checks import check_whole
 from study.experiment.protocol.content import Content
-from study.experiment.protocol.errors import explain, full_location, key_lines, line_of, telling
+from study.experiment.protocol.errors import explain, full_location, key_lines, line_of, respelled, telling
 from study.experiment.protocol.languages import with_words
+from study.experiment.protocol.published import find_protocol, protocols_folder
 from study.experiment.protocol.studies import StudySpec
 from study.files import read_text
 from study.toml_text import LARGEST_TEXT, parse_toml
@@ -96,44 +96,29 @@ def parse_protocol(text: str, path: Path | None = None) -> Protocol:
     try:
         protocol = Protocol.model_validate(with_words(data))
     except ValidationError as error:
-        found, lines = list(telling(Protocol, error.errors())), dict(key_lines(text))
-        sentences = []
-        for detail in found[:MOST_PROBLEMS]:
-            line = line_of(lines, full_location(detail))
-            sentences.append(f"{where}{f':{line}' if line else ''}: {explain(Protocol, detail)}")
-        if more := len(found[MOST_PROBLEMS:]):
-            sentences.append(f"{where}: {counted(more, 'more problem')}; mend these first.")
-        raise ProtocolError("\n".join(sentences)) from None
+        raise _refusal(data, text, where, error) from None
     protocol._text, protocol._path = text, path
     return protocol
 
 
-def protocols_folder() -> Path:
-    """The folder of published protocols: the repository's, or the one that the installed package carries."""
-    import study
-
-    package = Path(str(study.__file__)).resolve().parent
-    for folder in (package / "protocols", package.parent / "protocols"):
-        if any(folder.glob("*.toml")):
-            return folder
-    raise ProtocolError(
-        f"Expected the protocols that come with Segue in {package / 'protocols'} or {package.parent / 'protocols'}, "
-        "found neither; install the package again, or name a protocol file."
-    )
-
-
-def find_protocol(name_or_path: str | Path) -> Path:
-    """The file of a protocol, named by path or by the name of one that comes with Segue."""
-    path = Path(name_or_path)
-    if path.is_file():
-        return path
-    folder = protocols_folder()
-    known = sorted(p.stem for p in folder.glob("*.toml"))
-    if path.parent == Path() and path.stem in known and path.suffix in ("", ".toml"):
-        return folder / f"{path.stem}.toml"
-    near = get_close_matches(path.stem, known, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else "write a path, or one of these names."
-    raise ProtocolError(
-        f"Expected a protocol file or the name of one that comes with Segue ({', '.join(known)}), "
-        f"found {str(name_or_path)!r}; {hint}"
-    )
+def _refusal(data: dict[str, Any], text: str, where: str, error: ValidationError) -> ProtocolError:
+    """All that is wrong with a protocol, each in a sentence, and what can be said of the rest."""
+    found, rest = list(telling(Protocol, error.errors())), None
+    if (spelled := respelled(Protocol, data, found)) is not None:
+        try:
+            rest = Protocol.model_validate(with_words(spelled))
+        except ValidationError as other:  # what a misspelled key hid
+            found += telling(Protocol, other.errors())
+    lines = dict(key_lines(text))
+    sentences = []
+    for detail in found[:MOST_PROBLEMS]:
+        line = line_of(lines, full_location(detail))
+        sentences.append(f"{where}{f':{line}' if line else ''}: {explain(Protocol, detail)}")
+    if more := len(found[MOST_PROBLEMS:]):
+        sentences.append(f"{where}: {counted(more, 'more problem')}; mend these first.")
+    refusal = ProtocolError("\n".join(sentences))
+    named = data.get("transitions", ())
+    tables = [table for table in named if isinstance(table, dict)] if isinstance(named, list) else []
+    motions = (table.get(end) for table in tables for end in ("source", "destination"))
+    refusal.rest, refusal.motions = rest, tuple(dict.fromkeys(name for name in motions if isinstance(name, str)))
+    return refusal

@@ -16,6 +16,7 @@ import pytest
 from serving import PROTOCOL, TOKEN, unfilmed
 
 from study.apps.cli import run
+from study.apps.server.names import reachable
 from study.apps.server.running import listen
 from study.errors import SessionError
 from study.experiment.store.responses import open_responses
@@ -106,3 +107,16 @@ def test_it_ends_when_told_to_and_has_stored_who_came(tmp_path: Path, end: Any) 
     assert TOKEN not in said
     with open_responses(tmp_path) as responses:
         assert find_session(responses, "p1") is not None
+
+
+def test_all_addresses_are_told_as_one_that_can_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = reachable("0.0.0.0")
+    assert told not in ("0.0.0.0", "")
+    with socket.create_server(("0.0.0.0", 0)) as server, socket.create_connection((told, server.getsockname()[1]), 5):
+        assert (reachable("127.0.0.1"), reachable("lab.example.org")) == ("127.0.0.1", "lab.example.org")
+
+    def no_network(*_: object) -> None:
+        raise OSError("Network is unreachable")
+
+    monkeypatch.setattr(socket.socket, "connect", no_network)
+    assert reachable("0.0.0.0") == socket.gethostname()
