@@ -1,32 +1,44 @@
 """How far tests of groups can be trusted: simulated studies, with and without an effect, through the real analysis.
 
-Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of preference, motions,
-crossed, strengths, thresholds, ratings, mixed, power, or all; 2,000 studies a cell unless said. Observers are drawn
-here, by code that the analysis does not use. The 35 people and 8 answers are 2004's, the 26 people and two ratings
-2003's.
+Run it from the repository: `python benchmarks/group_tests.py [part] [studies] [seed]`, part one of those in `PARTS` at
+the end, or all; 2,000 studies a cell unless said. Observers are drawn here, percept by percept, by code that the
+analysis does not use. `preferences`, `ratings` and `thresholds` write CSV and read the headline of `segue fit`;
+`folders` writes sessions into results folders and reads that of `segue analyse`. The 35 people and 8 answers are
+2004's, the 26 people and two ratings 2003's.
 """
 
 from __future__ import annotations
 
+import json
 import sys
+import tempfile
 import time
-from itertools import combinations
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations, product
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from click.testing import CliRunner
 from scipy.special import expit, ndtr
 
 from study.analysis.crossed import crossed
 from study.analysis.preference.bradley_terry import fit_bradley_terry
-from study.analysis.preference.motions import motions_as_sample
 from study.analysis.preference.no_effect import no_preference
-from study.analysis.preference.participants import participant_tests
+from study.analysis.preference.participants import default_p_values, participant_tests
 from study.analysis.preference.published import published_test
 from study.analysis.psychometric.mixed import psychometric_mixed
 from study.analysis.ratings.comparisons import rating_anova
-from study.analysis.same_different.counts import Counts
-from study.analysis.same_different.mixed import fit_mixed_thresholds
+from study.apps.cli import segue
+from study.experiment.plan import draw_plan
+from study.experiment.protocol.whole import load_protocol
+from study.experiment.session import open_session, walk
 from study.experiment.sets import own_set
+from study.experiment.store.answers import record_answer
+from study.experiment.store.responses import open_responses
+from study.experiment.store.sessions import begin_session
+from study.tasks.registry import task_of
 from study.tasks.trial import Pair
 
 CORRELATIONS = (0.0, 0.1, 0.2, 0.3)
@@ -64,57 +76,229 @@ def preference(studies, seed):
         print(f"{correlation:11} " + "{:8.3f} {:8.3f} {:9.3f}".format(*rates) + f" {rate(edge):11.3f}", flush=True)
 
 
-def answers_of(chosen, first=None):
-    """A table of answers from an array (people, motions)."""
-    people, motions = chosen.shape
-    table = pd.DataFrame(
-        {
-            "participant": np.repeat(np.arange(people), motions),
-            "motion": np.tile(np.arange(motions), people),
-            "chose_a": chosen.ravel().astype(float),
-        }
-    )
-    return table if first is None else table.assign(a_first=first.ravel())
+def fitted(rows, *options):
+    """The headlines of `segue fit` for a table of rows, written as CSV."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "answers.csv"
+        pd.DataFrame(rows).to_csv(path, index=False)
+        return printed("fit", path, *options, "--participant", "who", "--motion", "clip")
 
 
-def motions(studies, seed):
-    """Type I error where motions differ too: over participants, and over both. 3% of answers are missed."""
-    print("motions: type I error at .05 where participants and motions differ (standard deviations in logits)")
-    print(f"{'people':>6} {'motions':>7} {'sd people':>9} {'sd motions':>10} {'people':>7} {'both':>6}")
-    for people, count, own, other in (
-        (35, 8, 0.0, 0.0), (35, 8, 0.7, 0.0), (35, 8, 0.0, 0.5), (35, 8, 0.7, 0.5), (35, 8, 1.2, 1.0), (12, 4, 0.7, 0.5)
-    ):  # fmt: skip
-        rng, rows = np.random.default_rng([seed, 2, people, int(10 * own), int(10 * other)]), []
-        for _ in range(studies):
-            lean = own * rng.normal(size=(people, 1)) + other * rng.normal(size=(1, count))
-            part = answers_of(rng.random((people, count)) < expit(lean))
-            part = part[rng.random(len(part)) > 0.03]
-            by = part.groupby("participant")["chose_a"].agg(["sum", "count"]).to_numpy(dtype=float).T
-            found = motions_as_sample(part)
-            both = found.both.p_value if found.both else None
-            rows.append((participant_tests(*by).p_value, both))
-        rates = [rate(column) for column in zip(*rows, strict=True)]
-        print(f"{people:6} {count:7} {own:9} {other:10} " + "{:7.3f} {:6.3f}".format(*rates), flush=True)
+def printed(*command):
+    """What a verb of `segue` prints as JSON; its headlines."""
+    found = CliRunner().invoke(segue, [*map(str, command), "--json"])
+    if found.exit_code:
+        raise found.exception or SystemExit(found.output)
+    return json.loads(found.stdout)["headline"]
+
+
+def drawn_preferences(rng, people, clips, people_sd, clips_sd, effect=0.6):
+    """Two films each way of each clip: the more natural percept wins, with logistic noise."""
+    own, of_clip = people_sd * rng.normal(size=people), clips_sd * rng.normal(size=clips)
+    return [
+        {"who": f"p{who}", "clip": f"c{clip}", "left": films[0], "right": films[1],
+         "chosen": "first" if (better > 0) == (films[0] == "a") else "second"}
+        for who in range(people) for clip in range(clips) for films in (("a", "b"), ("b", "a"))
+        for better in [effect + own[who] + of_clip[clip] + rng.logistic()]
+    ]  # fmt: skip
+
+
+def drawn_ratings(rng, people, clips, people_sd, clips_sd, effect=0.5):
+    """Films by a and by b on a slider of 100 points; people and clips differ in how much better b is."""
+    own, of_clip = people_sd * rng.normal(size=people), clips_sd * rng.normal(size=clips)
+    lenient, easy = rng.normal(size=people), rng.normal(size=clips)
+    return [
+        {"who": f"p{who}", "clip": f"c{clip}", "film": film,
+         "points": round(50 + 6 * (lenient[who] + easy[clip] + rng.normal()
+                                   + (film == "b") * (effect + own[who] + of_clip[clip])), 2)}
+        for who in range(people) for clip in range(clips) for film in "ab"
+    ]  # fmt: skip
+
+
+def drawn_pairs(rng, people, clips, people_sd, clips_sd, threshold=7.0):
+    """Same-different: two percepts of unit variance, "different" where they lie further apart than a criterion."""
+    own, of_clip = people_sd * rng.normal(size=people), clips_sd * rng.normal(size=clips)
+    criterion = 1.9 * np.exp(people_sd * rng.normal(size=people))
+    return [
+        {"who": f"p{who}", "clip": f"c{clip}", "frames": frames,
+         "said": "different" if abs(rng.normal() - rng.normal(apart)) > criterion[who] else "same"}
+        for who in range(people) for clip in range(clips) for frames in (-20, -12, -8, -4, 0, 4, 8, 12, 20)
+        for _ in range(2)
+        for apart in [apart_at_threshold() / threshold * abs(frames) * np.exp(own[who] + of_clip[clip])]
+    ]  # fmt: skip
+
+
+@cache
+def apart_at_threshold():
+    """How far percepts lie apart where three quarters of the responses are "different"."""
+    low, high = 0.0, 10.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        share = ndtr((middle - 1.9) / 2**0.5) + ndtr((-middle - 1.9) / 2**0.5)
+        low, high = (middle, high) if share < 0.75 else (low, middle)
+    return low
+
+
+PREFERENCES = ("--task", "preference", "--first", "left", "--second", "right", "--answer", "chosen")
+RATINGS = ("--task", "rating", "--method", "film", "--answer", "points")
+PAIRS = ("--task", "same-different", "--level", "frames", "--answer", "said")
+
+
+def headlines(name, drawn, options, truth, spreads, studies, seed, tested=True):
+    """Errors of a headline at .05, by motions and how they differ; `truth` follows from how far all differ.
+
+    Each row is the mean over 12 and 35 people and three ways in which these differ, with the lowest and the highest.
+    """
+    print(f"{name}: false results and intervals that miss at .05; mean, lowest and highest over people and their sd")
+    print("motions sd_motions  false       range misses       range MC_error  open")
+    for clips in (3, 5, 8):
+        for clips_sd in spreads[1]:
+            false, missed, opened = [], [], []
+            for people, people_sd in product((12, 35), spreads[0]):
+                rng = np.random.default_rng([seed, clips, people, int(100 * clips_sd), int(100 * people_sd)])
+                size, true = (people, clips, people_sd, clips_sd), truth(np.hypot(people_sd, clips_sd))
+                if tested:
+                    found = [fitted(drawn(rng, *size, 0.0), *options)[0]["p"] for _ in range(studies)]
+                    false.append(rate(found))
+                found = [one["interval"] for _ in range(studies) for one in fitted(drawn(rng, *size), *options)]
+                ends = [(-np.inf if i["low"] is None else i["low"], i["high"] or np.inf) for i in found]
+                missed.append(np.mean([not low <= true <= high for low, high in ends]))
+                opened.append(np.mean([not np.isfinite(high) for _, high in ends]))
+            cells = [f"{np.mean(own):6.3f} {min(own):.3f}-{max(own):.3f}" for own in (false, missed) if own]
+            error = np.sqrt(0.05 * 0.95 / (studies * 6))
+            print(f"{clips:7} {clips_sd:10} {' '.join(cells)} {error:8.3f} {np.mean(opened):5.2f}", flush=True)
+
+
+def preferences(studies, seed):
+    """Preferences through `segue fit`."""
+    scores = np.random.default_rng(0).normal(size=400_000)
+
+    def truth(spread):
+        return 100 * expit(0.6 + spread * scores).mean()
+
+    headlines("preferences", drawn_preferences, PREFERENCES, truth, ((0.0, 0.6, 1.2), (0.0, 0.5, 1.0)), studies, seed)
+
+
+def slider_ratings(studies, seed):
+    """Ratings through `segue fit`."""
+    headlines("ratings", drawn_ratings, RATINGS, lambda _: 3.0, ((0.0, 0.6, 1.2), (0.0, 0.5, 1.0)), studies, seed)
+
+
+def thresholds(studies, seed):
+    """Thresholds of the median observer through `segue fit`; people and motions differ in log units."""
+    spreads = (0.0, 0.3, 0.6), (0.0, 0.25, 0.5)
+    headlines("thresholds", drawn_pairs, PAIRS, lambda _: 7.0, spreads, studies, seed, tested=False)
+
+
+FOLDER = """
+name = "drawn"
+title = "Drawn"
+fps = 30
+seed = 1
+
+[analysis]
+alpha = 0.05
+
+{transitions}
+[[studies]]
+name = "liking"
+task = "preference"
+reference = "geodesic"
+comparison = "fixed"
+order = "both"
+
+[[studies]]
+name = "jnd"
+task = "same-different"
+reference = "geodesic"
+differences_frames = [-20, -12, -8, -4, 0, 4, 8, 12, 20]
+order = "both"
+"""
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Somebody who compares percepts: how much they lean to method a, how well they see, and their criterion."""
+
+    rng: np.random.Generator
+    lean: np.ndarray
+    seen: np.ndarray
+    criterion: float
+
+    def answer(self, trial, _step):
+        """The response to a trial, from percepts drawn for it; and how long it took."""
+        clip = int(trial.motion[1:])
+        if trial.task == "preference":
+            better = self.lean[clip] + self.rng.logistic()
+            return ("first" if (better > 0) == trial.a_first else "second"), 1.0
+        apart = apart_at_threshold() / 7.0 * abs(trial.difference_frames) * self.seen[clip]
+        far = abs(self.rng.normal() - self.rng.normal(apart)) > self.criterion
+        return ("different" if far else "same"), 1.0
+
+
+def session_folder(folder, rng, people, clips, spread):
+    """A results folder with the sessions of so many people, who differ as motions do."""
+    shown = [
+        f'[[transitions]]\nname = "c{n}"\ncategory = "c"\nsource = "a{n}"\ndestination = "b"\n' for n in range(clips)
+    ]
+    (folder / "protocol.toml").write_text(FOLDER.format(transitions="\n".join(shown)))
+    protocol = load_protocol(folder / "protocol.toml")
+    pairs = tuple(
+        Pair(f"{study.name}/{clip.name}/{one.name}", study.name, study.task, clip.name, "c", ("s", f"s{one.name}"),
+             one.methods, one.difference_frames)
+        for study in protocol.studies for clip in protocol.transitions
+        for one in task_of(study).conditions(study, False)
+    )  # fmt: skip
+    likes, sees = spread * rng.normal(size=(2, clips))
+    with open_responses(folder) as responses:
+        for who in range(people):
+            lean, eye, strict = spread * rng.normal(size=3)
+            judge = Judge(rng, 0.6 + lean + likes, np.exp(eye + sees), 1.9 * np.exp(strict))
+            plan = draw_plan(protocol, pairs, f"p{who:02}")
+            record = begin_session(responses, protocol, plan, library="drawn")
+            for trial, given in walk(open_session(protocol, plan, passed=("consent", "form")), judge.answer):
+                record_answer(responses, record, trial, given)
+
+
+def folders(studies, seed):
+    """Coverage of headlines from results folders, whose databases sessions wrote; and that exports give the same."""
+    rng, inside, spread = np.random.default_rng([seed, 9]), {}, 0.3
+    share = 100 * expit(0.6 + spread * 2**0.5 * rng.normal(size=400_000)).mean()
+    for _ in range(studies):
+        with tempfile.TemporaryDirectory() as place:
+            session_folder(Path(place), rng, 20, 4, spread)
+            found = printed("analyse", place)
+            CliRunner().invoke(segue, ["export", place])
+            again = printed("fit", Path(place) / "answers.csv")
+        for one, other in zip(found, again, strict=True):
+            assert (one["estimate"], one["interval"]) == (other["estimate"], other["interval"]), "the export differs"
+            true, (low, high) = (7.0 if one["p"] is None else share), list(one["interval"].values())[:2]
+            inside.setdefault(one["unit"], []).append((low is None or low <= true) and (high is None or true <= high))
+    for unit, covers in inside.items():
+        print(f"folders, {unit}: {np.mean(covers):.3f} of {len(covers)} 95% intervals hold the true value", flush=True)
 
 
 def crossed_test(studies, seed):
-    """Errors at .05 of the test over participants and motions, with no effect and with one of 0.6 logits."""
+    """Errors at .05 of the test over participants and motions, with no effect and with one of 0.6 logits.
+
+    Beside it are those of the test over participants alone.
+    """
     print("crossed: errors at .05 over participants and motions; mean and range over people, effects and sd of people")
-    print(f"{'motions':>7} {'sd motions':>10} {'mean':>6} {'lowest':>7} {'highest':>8}")
+    print(f"{'motions':>7} {'sd motions':>10} {'mean':>6} {'lowest':>7} {'highest':>8} {'participants alone':>19}")
     rng = np.random.default_rng([seed, 6])
-    for count in (3, 4, 6, 8):
-        for other in (0.0, 0.25, 0.5, 1.0):
-            found = []
-            for people in (12, 20, 35):
-                for own in (0.0, 0.6, 1.2):
-                    for effect in (0.0, 0.6):
-                        size = (studies, people, count)
-                        lean = own * rng.normal(size=(*size[:2], 1)) + other * rng.normal(size=(studies, 1, count))
-                        shown = rng.binomial(2, 0.97, size=size)
-                        chosen = rng.binomial(shown, expit(effect + lean))
-                        mean = expit(effect + np.hypot(own, other) * rng.normal(size=400_000)).mean()
-                        found.append(float((crossed(chosen, shown).p_values(mean if effect else 0.5) < 0.05).mean()))
-            print(f"{count:7} {other:10} {np.mean(found):6.3f} {min(found):7.3f} {max(found):8.3f}", flush=True)
+    for count, other in product((3, 4, 5, 6, 8), (0.0, 0.25, 0.5, 1.0)):
+        found, alone = [], []
+        for people, own, effect in product((12, 20, 35), (0.0, 0.6, 1.2), (0.0, 0.6)):
+            size = (studies, people, count)
+            lean = own * rng.normal(size=(*size[:2], 1)) + other * rng.normal(size=(studies, 1, count))
+            shown = rng.binomial(2, 0.97, size=size)
+            chosen = rng.binomial(shown, expit(effect + lean))
+            mean = expit(effect + np.hypot(own, other) * rng.normal(size=400_000)).mean()
+            found.append(float((crossed(chosen, shown).p_values(mean if effect else 0.5) < 0.05).mean()))
+            if not effect:
+                alone.append(rate(default_p_values(chosen.sum(axis=2), shown.sum(axis=2))))
+        cells = f"{np.mean(found):6.3f} {min(found):7.3f} {max(found):8.3f} {np.mean(alone):19.3f}"
+        print(f"{count:7} {other:10} {cells}", flush=True)
 
 
 def strengths(studies, seed):
@@ -152,37 +336,6 @@ def strengths(studies, seed):
         print(f"strengths, {people} people, motions {apart:g} logits apart: {told}", flush=True)
 
 
-def thresholds(studies, seed):
-    """Coverage of the median observer's threshold over participants and motions, whose log sensitivities differ."""
-    print("thresholds: coverage of 95% intervals of the median observer's, over both and for these motions alone")
-    print("people motions answers sd_people sd_motions   both  these   mean  true")
-    levels, crossing = np.array([-15.0, -10, -5, 0, 5, 10, 20]), 7.0
-    for people, count, repeats, own, other in (
-        (12, 3, 2, 0.6, 0.5), (20, 3, 2, 0.3, 0.0), (35, 3, 2, 0.3, 0.25), (20, 4, 2, 0.3, 0.5), (12, 6, 1, 0.0, 0.25),
-        (20, 8, 1, 0.3, 0.5), (35, 8, 1, 0.3, 0.25),
-    ):  # fmt: skip
-        rng, rows, values = np.random.default_rng([seed, 7, people, count, int(100 * other)]), [], []
-        for _ in range(studies):
-            criterion = 1.9 * np.exp(own * rng.normal(size=(people, 1, 1)))
-            lean = own * rng.normal(size=(people, 1, 1)) + other * rng.normal(size=(1, count, 1))
-            delta = 2.85214 / crossing * np.exp(lean) * np.abs(levels)
-            share = ndtr((delta - criterion) / 2**0.5) + ndtr((-delta - criterion) / 2**0.5)
-            different = rng.binomial(repeats, share).reshape(people, -1).astype(float)
-            shown, names = np.full(different.shape, float(repeats)), np.repeat([f"m{n}" for n in range(count)], 7)
-            found = fit_mixed_thresholds(
-                Counts(tuple(map(str, range(people))), np.tile(levels, count), different, shown, tuple(names))
-            )
-            if isinstance(found, str):
-                continue
-            for side in ("shorter", "longer"):
-                pair = (found.typical[side].interval, found.these_motions[side].interval)
-                rows.append([(one.low or 0.0) <= crossing <= (one.high or np.inf) for one in pair])
-                values.append(found.typical[side].frames or np.nan)
-        both, these = np.mean(rows, axis=0)
-        print(f"{people:6} {count:7} {repeats:7} {own:9} {other:10} {both:6.3f} {these:6.3f} {np.nanmean(values):6.2f} "
-              f"{crossing:5.1f}", flush=True)  # fmt: skip
-
-
 def rating_answers(rng, people, better, own, place):
     """2003's study, one question of five points: two groups by order, two films each."""
     lenient = own * rng.normal(size=people)
@@ -195,9 +348,9 @@ def rating_answers(rng, people, better, own, place):
     return pd.DataFrame(rows, columns=["participant", "task", "trial", "method_a", "answer"])
 
 
-def ratings(studies, seed):
+def variance(studies, seed):
     """Type I error and power of every test of the methods, by how alike one person's ratings are."""
-    print("ratings: how often the methods are found to differ at .05 (26 people, two ratings each)")
+    print("variance: how often the methods are found to differ at .05 (26 people, two ratings each)")
     names = ("published F", "t", "mixed design", "Wilcoxon")
     print(f"{'people sd':>9} {'effect':>6}  " + "  ".join(names))
     for own, better in ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.7)):
@@ -266,11 +419,13 @@ def power(studies, seed):
 
 PARTS = {
     "preference": preference,
-    "motions": motions,
+    "preferences": preferences,
+    "ratings": slider_ratings,
+    "thresholds": thresholds,
+    "folders": folders,
     "crossed": crossed_test,
     "strengths": strengths,
-    "thresholds": thresholds,
-    "ratings": ratings,
+    "variance": variance,
     "mixed": mixed,
     "power": power,
 }

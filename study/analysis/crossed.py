@@ -4,10 +4,11 @@ Participants and motions are both samples (Clark 1973): the variance of the mean
 that between motions less what both contain of the rest, and Student's t takes the degrees of freedom of Satterthwaite
 1946. With three to eight motions the share of variance between them is hardly known, which two rules allow for:
 
-- A variance component that is smaller than chance gives in half of all samples (F below its median) is taken as none,
-  and its sum of squares joins the rest. Otherwise the interval is far too wide where motions do not differ.
+- A variance component that chance alone gives often is taken as none, and its sum of squares joins the rest: often is
+  in half of all samples where there are three groups, in a quarter where there are six or more, whose F tells more.
+  Otherwise the interval is far too wide where motions do not differ.
 - A variance from few groups is small by chance just where it also makes the t value large, so Satterthwaite's
-  degrees of freedom are too many; here they are counted as if that variance were `1 + 0.6 / (groups - 1) / root F`
+  degrees of freedom are too many; here they are counted as if that variance were `1 + 0.9 / (groups - 1) / root F`
   times itself. Where motions decide all (F is large), what is left is Student's t of their means.
 
 Both were settled by simulation (`benchmarks/group_tests.py crossed`), which gives the error rates.
@@ -35,10 +36,10 @@ FEWEST_MOTIONS = 3
 OVER_BOTH, STUDENT = "Student's t over participants and motions", "Student's t over participants"
 BOTH = "participants and motions"
 
-KEPT_BELOW = 0.5
-"""The p-value of its F test below which a variance component is kept."""
+KEPT_BELOW, KEPT_OF_FEW, GROUPS_OF_FEW = 0.25, 0.5, 3
+"""The p-value of its F test below which a variance component is kept: of few groups, and of twice as many or more."""
 
-FEW_GROUPS = 0.6
+FEW_GROUPS = 0.9
 
 _ROUNDS = 60
 """Rounds in which the means of participants and motions are found where answers are missing; far more than needed."""
@@ -127,6 +128,11 @@ def crossed(sums: ArrayLike, counts: ArrayLike) -> Crossed:
     return Crossed(mean, np.where(known, error, np.nan), np.where(known, freedom, np.nan))
 
 
+def _kept_below(groups: IntArray | int) -> FloatArray:
+    """The p-value below which a variance between so many groups is kept."""
+    return np.asarray(np.clip(KEPT_OF_FEW * GROUPS_OF_FEW / groups, KEPT_BELOW, KEPT_OF_FEW))
+
+
 def _satterthwaite(own: FloatArray, freedom: IntArray, rest: FloatArray) -> FloatArray:
     """Squared variance over degrees of freedom of a variance between groups, with the allowance for few of them."""
     inverse_f = np.minimum(rest / np.where(own > 0, own, 1.0), 1.0)
@@ -162,7 +168,7 @@ def between_motions(values: FloatArray, covariance: FloatArray) -> BetweenMotion
         return BetweenMotions(0.0, 0.0, 0.0)
     own = values.var(ddof=1) / count
     rest = np.maximum((np.trace(covariance) / count - covariance.mean()) / freedom, 1e-12)
-    if chdtrc(freedom, freedom * own / rest) >= KEPT_BELOW:
+    if chdtrc(freedom, freedom * own / rest) >= _kept_below(count):
         return BetweenMotions(0.0, 0.0, 0.0)
     added, part = max(own - rest, 0.0), _satterthwaite(own, np.asarray(freedom), rest)
     return BetweenMotions(float(added), float(part), float(np.sqrt(added * count)))
@@ -213,7 +219,7 @@ def _combined(
     for variance, freedom in zip(sums, freedoms, strict=True):
         ratio = variance / np.where(rest > 0, rest, 1.0)
         chance = np.where(rest > 0, fdtrc(freedom, np.maximum(rest_freedom, 1), ratio), 0.0)
-        kept.append(~has_rest | ((chance < KEPT_BELOW) & (variance > 0)))
+        kept.append(~has_rest | ((chance < _kept_below(freedom + 1)) & (variance > 0)))
     pooled, count = rest * rest_freedom, rest_freedom.astype(np.float64)
     for variance, freedom, keep in zip(sums, freedoms, kept, strict=True):
         pooled = pooled + np.where(keep, 0.0, variance * freedom)

@@ -13,7 +13,7 @@ from study.analysis.confidence import HowSure
 from study.analysis.quality import Quality
 from study.counting import counted, noun
 from study.report import tables, words
-from study.report.drawing import BLUE, FAINT, ORANGE, new_figure, quiet_grid, to_svg
+from study.report.drawing import BLUE, FAINT, ORANGE, Picture, new_figure, picture_of, quiet_grid
 from study.report.sections.section import About
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def presentation_table(presentations: pd.DataFrame) -> tables.Table:
     )
 
 
-def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> str | None:
+def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> Picture | None:
     """Draw the longest gap of every presentation; None where none was measured."""
     gaps = presentations["longest_gap_frames"].dropna().to_numpy(dtype=np.float64)
     if not len(gaps):
@@ -79,7 +79,7 @@ def presentation_figure(presentations: pd.DataFrame, name: str, mark: str) -> st
             f"{counted(len(gaps), 'presentation')}, median {np.median(gaps):.2f} frames, longest {gaps.max():.2f}; "
             f"{over} over {LONGEST_GAP_FRAMES:g} frames"
         )
-        return to_svg(figure, name, "Longest gap between frames of each presentation", spoken, mark)
+        return picture_of(figure, name, "Longest gap between frames of each presentation", spoken, mark)
 
 
 def checks_sentence(checks: pd.DataFrame) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.analysis.analyse import Results
 from study.report import tables, words
-from study.report.drawing import BLUE, FAINT, RULE, new_figure, quiet_grid, to_svg
+from study.report.drawing import BLUE, FAINT, RULE, Picture, new_figure, picture_of, quiet_grid
 from study.report.sections.registry import SECTIONS
 from study.report.sections.section import Course
 
@@ -59,7 +59,7 @@ def _by_sixths(study: str, course: Course, part: pd.DataFrame) -> list[dict[str,
     return rows
 
 
-def learning_figure(table: tables.Table, name: str, mark: str) -> str | None:
+def learning_figure(table: tables.Table, name: str, mark: str) -> Picture | None:
     """Draw the table, one panel a study; None where there is nothing to draw."""
     if not table.rows:
         return None
@@ -84,10 +84,10 @@ def learning_figure(table: tables.Table, name: str, mark: str) -> str | None:
             axes.set_axis_off()
         for axes in grid[-1]:
             axes.set_xlabel("sixth of the study")
-        return to_svg(figure, name, "Answers over the course of each study", "; ".join(spoken), mark)
+        return picture_of(figure, name, "Answers over the course of each study", "; ".join(spoken), mark)
 
 
-def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
+def response_figure(answers: pd.DataFrame, name: str, mark: str) -> Picture | None:
     """Response times: how they are distributed, and how they change over the session; None without times."""
     timed = answers[answers["response_s"].notna()] if "response_s" in answers else answers.iloc[:0]
     if timed.empty:
@@ -114,4 +114,4 @@ def response_figure(answers: pd.DataFrame, name: str, mark: str) -> str | None:
         else:
             right.set_axis_off()
         spoken = f"median {middle:.2f} s, from {times.min():.2f} to {times.max():.2f} s"
-        return to_svg(figure, name, "Response times", spoken, mark)
+        return picture_of(figure, name, "Response times", spoken, mark)

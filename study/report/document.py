@@ -31,7 +31,7 @@ def write_report(
     resamples: int = 1000,
     analysis: Analysis | None = None,
 ) -> Path:
-    """Write `report.html`, `tables/` and `figures/` of a results folder.
+    """Write `report.html`, `manuscript.md`, `tables/` and `figures/` of a results folder.
 
     Parameters
     ----------
@@ -60,6 +60,7 @@ def write_report(
         When a part of the folder is missing or can't be read.
     """
     from study.analysis.analyse import analyse_folder
+    from study.report.manuscript import as_markdown
     from study.report.media import embedding
     from study.report.page import compose
 
@@ -70,13 +71,14 @@ def write_report(
         page = replace(compose(material, analysis), pictures=pictures())
     target = folder if out is None else Path(out)
     _write_files(target, page, analysis)
+    write_whole(target / "manuscript.md", as_markdown(page))
     path = target / "report.html"
     write_whole(path, to_html(page))
     return path
 
 
 def _write_files(folder: Path, page: Page, analysis: Analysis) -> None:
-    """Write every table as CSV and JSON, every figure as SVG, and the whole analysis as JSON."""
+    """Write every table as CSV and JSON, every figure as SVG, PNG and PDF, and the whole analysis as JSON."""
     from study.analysis.analyse import analysis_json
     from study.report.drawing import as_file
 
@@ -84,7 +86,10 @@ def _write_files(folder: Path, page: Page, analysis: Analysis) -> None:
         write_whole(folder / "tables" / f"{table.name}.csv", tables.as_csv(table))
         write_whole(folder / "tables" / f"{table.name}.json", tables.as_json(table))
     for drawing in page.drawings:
-        write_whole(folder / "figures" / f"{drawing.name}.svg", as_file(drawing.svg))
+        stem, picture = folder / "figures" / drawing.name, drawing.picture
+        write_whole(stem.with_suffix(".svg"), as_file(picture.svg))
+        write_whole(stem.with_suffix(".png"), picture.png)
+        write_whole(stem.with_suffix(".pdf"), picture.pdf)
     whole = json.dumps(analysis_json(analysis), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_whole(folder / "tables" / "analysis.json", whole)
 

@@ -1,6 +1,6 @@
-"""Matplotlib figures to inline SVG: the same bytes every time, names for screen readers, the page's own typeface.
+"""Matplotlib figures to inline SVG, PNG and PDF: the same bytes every time, names for screen readers.
 
-`new_figure` gives an empty figure in the report's quiet style, `to_svg` the text for the page.
+`new_figure` gives an empty figure in the report's quiet style, `picture_of` what page and files need of it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import io
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 INK, SOFT, FAINT, RULE = "#1d2328", "#5b666e", "#9aa5ac", "#dfe4e7"
 BLUE, ORANGE, TEAL = "#0b5fa5", "#b8520a", "#1b7f79"
+PRINTED_DPI = 300
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -82,8 +84,17 @@ def named_rows(axes: Axes, places: Sequence[float], labels: Sequence[str]) -> No
     quiet_grid(axes, "x")
 
 
-def to_svg(figure: Figure, name: str, title: str, description: str, mark: str) -> str:
-    """Return a figure as an SVG element.
+@dataclass(frozen=True)
+class Picture:
+    """A figure as markup for the page, and for print: 300 dots an inch, and as vectors."""
+
+    svg: str
+    png: bytes
+    pdf: bytes
+
+
+def picture_of(figure: Figure, name: str, title: str, description: str, mark: str) -> Picture:
+    """Return a finished figure.
 
     Parameters
     ----------
@@ -94,16 +105,26 @@ def to_svg(figure: Figure, name: str, title: str, description: str, mark: str) -
     mark
         What its data are (simulated, synthetic), written at its foot; nothing where they need no mark.
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     if mark:
         figure.supxlabel(mark, x=0.995, ha="right", fontsize=8.5, color=ORANGE, fontstyle="italic")
-
-    buffer = io.StringIO()
+    text, png, pdf = io.StringIO(), io.BytesIO(), io.BytesIO()
     # `savefig` would draw everything twice, once without leaving a mark, to place the axes.
     nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
-    FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)  # type: ignore[no-untyped-call]
-    text = buffer.getvalue()
+    FigureCanvasSVG(figure).print_svg(text, metadata=nothing)  # type: ignore[no-untyped-call]
+    figure.set_layout_engine("none")  # axes stay where they are
+    figure.set_facecolor("white")
+    FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})  # type: ignore[no-untyped-call]
+    figure.set_dpi(PRINTED_DPI)
+    FigureCanvasAgg(figure).print_png(png, metadata={"Software": None})  # type: ignore[no-untyped-call]
+    return Picture(_inline(text.getvalue(), name, title, description), png.getvalue(), pdf.getvalue())
+
+
+def _inline(text: str, name: str, title: str, description: str) -> str:
+    """An SVG file as an element of the page, named for screen readers."""
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,6 +33,8 @@ class Material:
     """One row a session, those without answers too."""
     presentations: pd.DataFrame
     """One row a stimulus that was shown."""
+    form: Mapping[str, tuple[str, ...]]
+    """What participants with analysed answers filled in, by question of the form."""
     withdrawn: int
     """How many participants had their answers deleted."""
     power: tuple[FoundPower, ...]
@@ -58,13 +61,15 @@ def gather(folder: Path, database: str | None = None) -> Material:
 
     protocol, manifest = load_protocol(folder / PROTOCOL), read_manifest(folder)
     with open_answers(folder, database) as responses:
+        answers = answers_frame(responses)
         material = Material(
             protocol=protocol,
             manifest=manifest,
-            answers=answers_frame(responses),
+            answers=answers,
             checks=answers_frame(responses, roles=("check",)),
             sessions=session_table(responses),
             presentations=_table(responses, presentations),
+            form=_form(responses, {str(name) for name in answers["participant"]}),
             withdrawn=len(_table(responses, withdrawals)),
             power=tuple(read_power(folder)),
         )
@@ -74,6 +79,21 @@ def gather(folder: Path, database: str | None = None) -> Material:
             f"{responses.place}: expected answers, found none{gone}; collect or simulate sessions first"
         )
     return material
+
+
+def _form(responses: Responses, participants: Collection[str]) -> dict[str, tuple[str, ...]]:
+    """What these participants filled in, by question."""
+    import sqlalchemy as sa
+
+    from study.experiment.store.responses import rows_of
+    from study.experiment.store.tables import form_values, sessions
+
+    query = sa.select(sessions.c.participant, form_values.c.name, form_values.c.value)
+    found: dict[str, tuple[str, ...]] = {}
+    for row in rows_of(responses, query.join(form_values, form_values.c.session_id == sessions.c.id)):
+        if str(row["participant"]) in participants:
+            found[row["name"]] = (*found.get(row["name"], ()), str(row["value"]))
+    return found
 
 
 def _table(responses: Responses, table: sa.Table) -> pd.DataFrame:

@@ -5,8 +5,8 @@ Each sentence follows from what was run; methods that were not used are neither 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import study
 from study.analysis.analyse import Analysis
@@ -15,6 +15,7 @@ from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.manifest import Manifest
 from study.experiment.wording import question_text
 from study.report import words
+from study.report.demographics import demographics_sentence
 from study.report.sections.registry import SECTIONS
 from study.tasks.registry import task_of
 from study.transitions.methods.makes.blends import Blending
@@ -46,7 +47,12 @@ SINGLE_ORDERS = {
 
 
 def methods_paragraphs(
-    protocol: Protocol, manifest: Manifest, analysis: Analysis, presentations: pd.DataFrame, who: str
+    protocol: Protocol,
+    manifest: Manifest,
+    analysis: Analysis,
+    presentations: pd.DataFrame,
+    who: str,
+    people: Sequence[Mapping[str, Any]] = (),
 ) -> list[tuple[str, str]]:
     """Return the methods as headed paragraphs: participants and design, stimuli, apparatus, analysis, software.
 
@@ -60,9 +66,11 @@ def methods_paragraphs(
         How stimuli were shown: `method`, `shown_well`.
     who
         Who answered, in words.
+    people
+        What they filled in, from `demographics_rows`.
     """
     return [
-        ("Participants and design", _design(protocol, analysis, who)),
+        ("Participants and design", _design(protocol, analysis, who, people)),
         ("Stimuli", _stimuli(protocol, manifest)),
         ("Apparatus and procedure", _procedure(protocol, analysis, presentations)),
         ("Analysis", _analysis(analysis)),
@@ -86,12 +94,12 @@ def _methods(protocol: Protocol) -> dict[str, Method]:
     return {name: method for study in protocol.studies for name, method in protocol.methods_of(study).items()}
 
 
-def _design(protocol: Protocol, analysis: Analysis, who: str) -> str:
+def _design(protocol: Protocol, analysis: Analysis, who: str, people: Sequence[Mapping[str, Any]]) -> str:
     studies = counted(len(protocol.studies), "study", "studies")
     each = analysis.quality.trials / max(analysis.quality.participants, 1)
     within = " and repetition" if any(study.repeats > 1 for study in protocol.studies) else ""
     return (
-        f"{words.sentence(who)} took part in one session of {studies}. "
+        f"{words.sentence(who)} took part in one session of {studies}. {demographics_sentence(people)}"
         f"{' '.join(_study(protocol, study) for study in protocol.studies)} The order of trials was drawn separately "
         f"for every participant{within} (seed {protocol.seed}); a participant was asked "
         f"{counted(round(each), 'question')} on average."

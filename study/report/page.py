@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 from study.analysis.analyse import Analysis
 from study.counting import counted
 from study.experiment.stimuli.flawed import flaw_notes
-from study.report import conduct, course, facts, methods, power, shortcuts, stimuli, words
+from study.report import conduct, course, demographics, facts, methods, power, shortcuts, stimuli, words
 from study.report.material import Material
 from study.report.media import Pictures
 from study.report.sections.preference.section import confirmatory_table
@@ -54,7 +56,7 @@ class Page:
 
     @property
     def _parts(self) -> tuple[Part | Section, ...]:
-        return (self.comparison, *self.sections, self.power, self.conduct, self.stimuli)
+        return (self.comparison, *self.sections, self.power, self.stimuli, self.conduct)
 
     @property
     def tables(self) -> tuple[Table, ...]:
@@ -66,6 +68,15 @@ class Page:
         """Every figure of the page."""
         return tuple(drawing for part in self._parts for drawing in part.drawings)
 
+    def number(self, content: Table | Drawing) -> int:
+        """Return the number of a table or a figure."""
+        return self._numbers[content.name, type(content)]
+
+    @cached_property
+    def _numbers(self) -> dict[tuple[str, type], int]:
+        kinds: tuple[Sequence[Table | Drawing], ...] = (self.tables, self.drawings)
+        return {(one.name, type(one)): place for kind in kinds for place, one in enumerate(kind, start=1)}
+
 
 def compose(material: Material, analysis: Analysis) -> Page:
     """Turn material and analysis into what the page shows; pictures come later."""
@@ -73,6 +84,7 @@ def compose(material: Material, analysis: Analysis) -> Page:
     mark = words.mark_of(analysis.data, manifest.synthetic)
     sections = tuple(_sections(material, analysis, mark))
     asked = quality.simulated_participants, quality.participants
+    people = demographics.demographics_rows(protocol.form, material.form)
     return Page(
         title=protocol.title,
         source=words.sentence(protocol.source),
@@ -81,15 +93,15 @@ def compose(material: Material, analysis: Analysis) -> Page:
         comparison=_comparison(sections, analysis),
         sections=sections,
         power=_power(material, quality.participants),
-        conduct=_conduct(material, analysis, mark),
+        conduct=_conduct(material, analysis, mark, people),
         stimuli=Part(
             sentences=(
                 facts.shown_sentence(material),
                 *shortcuts.shortcut_sentences(material),
                 *flaw_notes(manifest.records),
             ),
-            tables=shortcuts.shortcut_tables(material),
             folded=(
+                *shortcuts.shortcut_tables(material),
                 stimuli.stimulus_table(manifest),
                 *stimuli.flaw_tables(manifest),
                 stimuli.motion_table(manifest),
@@ -98,7 +110,7 @@ def compose(material: Material, analysis: Analysis) -> Page:
         ),
         pictures=Pictures((), ()),
         methods=tuple(
-            methods.methods_paragraphs(protocol, manifest, analysis, material.presentations, facts.who(quality))
+            methods.methods_paragraphs(protocol, manifest, analysis, material.presentations, facts.who(quality), people)
         ),
         references=tuple(methods.references(protocol, analysis)),
         versions=facts.versions(material),
@@ -112,7 +124,7 @@ def _sections(material: Material, analysis: Analysis, mark: str) -> Iterator[Sec
     for study in protocol.studies:
         about = About(
             name=study.name,
-            title=study.title or words.sentence(words.readable(study.name)),
+            title=study.title or words.sentence(words.readable(study.name)).replace("Jnd", "JND"),
             fps=protocol.fps,
             data=analysis.data,
             mark=mark,
@@ -165,7 +177,7 @@ def _power(material: Material, asked: int) -> Part:
     return Part(sentences, tuple(drawings), (power.power_table(material.power),))
 
 
-def _conduct(material: Material, analysis: Analysis, mark: str) -> Part:
+def _conduct(material: Material, analysis: Analysis, mark: str, people: Sequence[Mapping[str, Any]]) -> Part:
     answers, presented = material.answers, material.presentations
     learned = course.learning_table(answers, analysis.without_exclusions or analysis)
     drawings = [
@@ -179,8 +191,9 @@ def _conduct(material: Material, analysis: Analysis, mark: str) -> Part:
                  conduct.checks_sentence(material.checks), conduct.exclusion_sentence(analysis))  # fmt: skip
     return Part(
         sentences=tuple(sentence for sentence in sentences if sentence),
-        drawings=tuple(Drawing(name, svg, caption) for name, svg, caption in drawings if svg),
+        drawings=tuple(Drawing(name, picture, caption) for name, picture, caption in drawings if picture),
         tables=(
+            *([demographics.demographics_table(people)] if people else []),
             *([conduct.presentation_table(presented)] if len(presented) else []),
             *conduct.exclusion_tables(analysis),
         ),

@@ -11,7 +11,7 @@ from typing import Any
 from study.counting import counted
 from study.errors import AnalysisError
 from study.report import tables, words
-from study.report.drawing import BLUE, INK, SOFT, new_figure, quiet_grid, to_svg
+from study.report.drawing import BLUE, INK, SOFT, new_figure, picture_of, quiet_grid
 from study.report.sections.section import Drawing
 
 
@@ -135,7 +135,7 @@ def power_drawing(found: FoundPower, name: str, asked: int) -> Drawing:
         axes.set_title("power")
         quiet_grid(axes)
         spoken = "; ".join(f"{counted(point.participants, 'participant')}: {point.power:.2f}" for point in points)
-        svg = to_svg(
+        svg = picture_of(
             figure, f"power-{found.study}", f"Power of {words.readable(found.study)}", spoken, "simulated studies"
         )
     return Drawing(name, svg, f"Power to {found.aim}, by simulation, with Wilson’s 95% intervals.")

@@ -130,7 +130,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "destination": ("to", "text"),
     "notes": ("notes", "text"),
     "id": ("hash", "text"),
-    "role": ("", "text"),
+    "role": ("place", "text"),
     "file": ("file", "text"),
     "frame": ("at", "count"),
     "added_before": ("added before", "count"),

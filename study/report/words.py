@@ -32,7 +32,8 @@ def joined(parts: Sequence[str]) -> str:
 
 
 def unbroken(text: str) -> str:
-    """Return a text in which no line ends within "p < .001", "N = 280", "t(34) = 5.01" or "k + 7.1"."""
+    """Return a text in which no line ends within "p < .001", "N = 280", "t(34) = 5.01", "k + 7.1" or "0.20 s"."""
+    text = re.sub(r"(?<=\d) (?=s\b)", "\u00a0", text)
     text = re.sub(r"(?<=\S) ([=<+−±]) (?=[\d.−(])", "\u00a0\\1\u00a0", text)
     return re.sub(r"\((\d+), (?=\d|N\b)", "(\\1,\u00a0", text)
 

@@ -12,6 +12,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from scipy import stats
 
 from study.errors import AnalysisError, SegueError
@@ -65,7 +66,7 @@ def test_the_page_needs_nothing_but_itself(written: Path) -> None:
     assert written.name == "report.html"
     page = Page.of(written)
     for link in page.links:
-        assert link.startswith(("#", "data:")), link
+        assert link.startswith(("#", "data:")) or (written.parent / link).is_file(), link
     text = written.read_text(encoding="utf-8")
     assert not re.search(r"https?://(?!www\.w3\.org/)", text), "an address outside of SVG's namespaces"
     assert "@import" not in text
@@ -143,6 +144,36 @@ def test_tables_are_written_as_csv_and_json(written: Path) -> None:
     content = json.loads((folder / "jnd_percent_different.json").read_text(encoding="utf-8"))
     assert float(rows[0]["percent"]) == content["rows"][0]["percent"]
     assert set(json.loads((folder / "analysis.json").read_text(encoding="utf-8"))) >= {"jnd", "preference", "ratings"}
+
+
+def test_figures_are_numbered_and_stand_beside_the_page_for_print(written: Path) -> None:
+    text = written.read_text(encoding="utf-8")
+    for word in ("Figure", "Table"):
+        pattern = rf"<b>{word} (\d+)\.</b>" if word == "Figure" else r'id="caption-[^"]+">Table (\d+)\. '
+        found = [int(number) for number in re.findall(pattern, text)]
+        assert sorted(found) == list(range(1, len(found) + 1))
+        assert len(found) >= 6
+    pictures = sorted((written.parent / "figures").glob("*.png"))
+    assert {path.stem for path in pictures} == {path.stem for path in (written.parent / "figures").glob("*.svg")}
+    for path in pictures:
+        with Image.open(path) as picture:
+            assert picture.info["dpi"] == pytest.approx((300, 300), abs=0.1)
+            assert picture.convert("RGB").getpixel((1, 1)) == (255, 255, 255)
+        assert path.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_manuscript_has_the_pages_text_tables_and_figures(written: Path) -> None:
+    text = (written.parent / "manuscript.md").read_text(encoding="utf-8")
+    assert text.startswith("# A small study\n\n> These answers are simulated.")
+    for heading in ("## Methods", "### Participants and design", "## Results", "### Naturalness", "## References"):
+        assert f"\n{heading}\n" in text
+    for path in re.findall(r"!\[Figure \d+\. [^\]]*\]\(([^)]+)\)", text):
+        assert (written.parent / path).is_file()
+    tables = [block for block in text.split("\n\n") if block.startswith("| ")]
+    assert len(tables) == text.count("**Table ") >= 5
+    for table in tables:
+        widths = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
+        assert len(widths) == 1, table
 
 
 def test_the_same_folder_gives_the_same_bytes(results_folder: MakeFolder) -> None:

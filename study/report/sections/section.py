@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from study.analysis.analyse import Analysis, Data
 from study.report import tables
+from study.report.drawing import Picture
 from study.report.tables import Table
 
 if TYPE_CHECKING:
@@ -16,10 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure with its caption; `svg` is markup of our own making, `name` that of its file."""
+    """A figure with its caption; `name` is that of its files."""
 
     name: str
-    svg: str
+    picture: Picture
     caption: str
 
 

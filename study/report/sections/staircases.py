@@ -9,7 +9,7 @@ from study.analysis.same_different.counts import SIGNS
 from study.analysis.same_different.staircases import StaircaseRun, Staircases
 from study.counting import counted
 from study.report import words
-from study.report.drawing import BLUE, FAINT, INK, ORANGE, new_figure, quiet_grid, to_svg
+from study.report.drawing import BLUE, FAINT, INK, ORANGE, new_figure, picture_of, quiet_grid
 from study.report.sections.section import Drawing
 from study.report.tables import Table, make
 
@@ -55,7 +55,9 @@ def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
         for axes in grid.flat[max(len(drawn) - columns, 0) : len(drawn)]:
             axes.tick_params(labelbottom=True)
             axes.set_xlabel("trial")
-        svg = to_svg(figure, f"study-{name}-tracks", f"The course of every {found.title}", _spoken(drawn, found), mark)
+        svg = picture_of(
+            figure, f"study-{name}-tracks", f"The course of every {found.title}", _spoken(drawn, found), mark
+        )
     return Drawing(f"{name}_tracks", svg, caption)
 
 

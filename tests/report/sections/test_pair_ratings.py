@@ -90,10 +90,10 @@ def test_what_can_not_be_told_is_said() -> None:
 
 def test_the_figure_says_its_numbers_and_its_mark() -> None:
     (drawing,) = section_of(TWO, "simulated answers, no people").drawings
-    ET.fromstring(drawing.svg)
-    assert "better: 0 at 0, 0 at 1, 1 at 2, 4 at 3, 3 at 4; mean 3.25" in drawing.svg
+    ET.fromstring(drawing.picture.svg)
+    assert "better: 0 at 0, 0 at 1, 1 at 2, 4 at 3, 3 at 4; mean 3.25" in drawing.picture.svg
     for words in ("simulated answers, no people", "much worse – much better", "new cut →", "points of the scale"):
-        assert words in drawing.svg
+        assert words in drawing.picture.svg
 
 
 @pytest.mark.parametrize("points", [2, 4, 5, 11])
@@ -101,7 +101,7 @@ def test_every_point_has_a_colour_of_its_own(points: int) -> None:
     found = shades(points)
     assert len(set(found)) == points
     few = pair_ratings(answers({"better": [0, 0, 0]}).assign(answer=[0, points - 1, 0]), points)
-    assert "mean 0.00" in likert_figure(few, "place", "", {})  # all at one end
+    assert "mean 0.00" in likert_figure(few, "place", "", {}).svg  # all at one end
 
 
 @pytest.mark.parametrize(("people", "left_out"), [(4, False), (1, True)])

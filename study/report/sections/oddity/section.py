@@ -12,7 +12,7 @@ from study.analysis.same_different.counts import SIGNS
 from study.counting import counted
 from study.models.oddity import CHANCE, HALFWAY
 from study.report import tables, words
-from study.report.drawing import BLUE, INK, SOFT, new_figure, percent_axis, to_svg
+from study.report.drawing import BLUE, INK, SOFT, Picture, new_figure, percent_axis, picture_of
 from study.report.references import MACMILLAN_2005
 from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
@@ -51,7 +51,7 @@ def oddity_section(result: Oddity, about: About) -> Section | None:
     )
 
 
-def oddity_figure(result: Oddity, name: str, mark: str) -> str:
+def oddity_figure(result: Oddity, name: str, mark: str) -> Picture:
     """Draw right answers by difference, with the function of each side and its threshold."""
     levels = result.levels
     with new_figure(7.2, 3.7) as (figure, axes):
@@ -71,7 +71,7 @@ def oddity_figure(result: Oddity, name: str, mark: str) -> str:
         axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
         axes.set_ylabel("right answers")
         spoken = "; ".join(f"{one.difference_frames:+d} frames: {one.percent:.0f}%" for one in levels)
-        return to_svg(figure, name, "Percent of right answers by difference in blend length", spoken, mark)
+        return picture_of(figure, name, "Percent of right answers by difference in blend length", spoken, mark)
 
 
 def _frames(found: BelievedThreshold, fps: float) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from study.analysis.ratings.pairs import PairQuestion, ScoreTest
-from study.report.drawing import BLUE, INK, ORANGE, RULE, SOFT, new_figure, quiet_grid, to_svg
+from study.report.drawing import BLUE, INK, ORANGE, RULE, SOFT, Picture, new_figure, picture_of, quiet_grid
 from study.report.words import readable
 
 if TYPE_CHECKING:
@@ -20,7 +20,9 @@ LEAST_LABELLED = 5.0
 """A part of a bar that is narrower has no room for its count. [percent]"""
 
 
-def likert_figure(questions: Sequence[PairQuestion], name: str, mark: str, ends: Mapping[str, tuple[str, str]]) -> str:
+def likert_figure(
+    questions: Sequence[PairQuestion], name: str, mark: str, ends: Mapping[str, tuple[str, str]]
+) -> Picture:
     """Return the figure.
 
     Parameters
@@ -56,7 +58,7 @@ def likert_figure(questions: Sequence[PairQuestion], name: str, mark: str, ends:
             axes.spines["left"].set_visible(False)
         figure.legend(loc="outside upper center", ncols=points, fontsize=8.5, labelcolor=SOFT, handlelength=1.0,
                       handles=_keys(points), title="points of the scale", title_fontsize=8.5)  # fmt: skip
-        return to_svg(figure, name, "Answers at each point of the scale, and mean scores", _spoken(questions), mark)
+        return picture_of(figure, name, "Answers at each point of the scale, and mean scores", _spoken(questions), mark)
 
 
 def shades(points: int) -> list[str]:

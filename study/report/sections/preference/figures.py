@@ -15,9 +15,10 @@ from study.report.drawing import (
     INK,
     RULE,
     SOFT,
+    Picture,
     named_rows,
     new_figure,
-    to_svg,
+    picture_of,
 )
 from study.report.words import readable
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
+def preference_figure(comparison: Comparison, name: str, mark: str) -> Picture:
     """Percent favouring the first method: every motion with Wilson's interval, and all together by the default test."""
     motions, found, pooled = comparison.motions, comparison.default, comparison.published
     labels = [readable(row.motion) for row in motions]
@@ -57,10 +58,10 @@ def preference_figure(comparison: Comparison, name: str, mark: str) -> str:
         axes.set_xlabel(f"responses that favoured {a} over {b}")
         known = [row for row in motions if row.percent is not None]
         spoken = "; ".join(f"{readable(row.motion)}: {row.percent:.0f}%" for row in known)
-        return to_svg(figure, name, f"Percent favouring {a} over {b}", spoken, mark)
+        return picture_of(figure, name, f"Percent favouring {a} over {b}", spoken, mark)
 
 
-def strengths_figure(found: BradleyTerry, name: str, mark: str) -> str:
+def strengths_figure(found: BradleyTerry, name: str, mark: str) -> Picture:
     """Strengths of methods with their intervals, the strongest at the top."""
     rows = [row for row in found.strengths if row.value is not None]
     with new_figure(7.2, 0.34 * len(rows) + 1.1) as (figure, axes):
@@ -73,7 +74,7 @@ def strengths_figure(found: BradleyTerry, name: str, mark: str) -> str:
         named_rows(axes, [-place for place in range(len(rows))], [readable(row.method) for row in rows])
         axes.set_xlabel(f"strength in logits beside {readable(found.reference)}")
         spoken = "; ".join(f"{readable(row.method)}: {row.value:+.2f}" for row in rows)
-        return to_svg(figure, name, "Strengths of the methods", spoken, mark)
+        return picture_of(figure, name, "Strengths of the methods", spoken, mark)
 
 
 def _at_the_right(axes: Axes, height: float, text: str, colour: str = INK) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from study.analysis.ratings.table import MethodRating
-from study.report.drawing import BLUE, named_rows, new_figure, to_svg
+from study.report.drawing import BLUE, Picture, named_rows, new_figure, picture_of
 from study.report.words import readable
 
 
-def ratings_figure(rows: Sequence[MethodRating], name: str, mark: str, points: int) -> str:
+def ratings_figure(rows: Sequence[MethodRating], name: str, mark: str, points: int) -> Picture:
     """Mean ratings with intervals over participants, for every question and method."""
     with new_figure(7.2, 0.36 * len(rows) + 1.0) as (figure, axes):
         axes.set_ylim(0.5 - len(rows), 0.5)
@@ -23,4 +23,4 @@ def ratings_figure(rows: Sequence[MethodRating], name: str, mark: str, points: i
         axes.set_xticks(range(0, points, 1 if points <= 11 else 10))
         axes.set_xlabel("mean rating")
         spoken = "; ".join(f"{label}: {row.mean:.2f}" for label, row in zip(labels, rows, strict=True))
-        return to_svg(figure, name, "Mean ratings", spoken, mark)
+        return picture_of(figure, name, "Mean ratings", spoken, mark)

@@ -17,10 +17,11 @@ from study.report.drawing import (
     ORANGE,
     RULE,
     SOFT,
+    Picture,
     named_rows,
     new_figure,
     percent_axis,
-    to_svg,
+    picture_of,
 )
 from study.report.words import readable
 
@@ -74,7 +75,7 @@ def _model_threshold(axes: Axes, threshold: Threshold, level: float, label: bool
         )  # fmt: skip
 
 
-def same_different_figure(result: SameDifferent, name: str, mark: str) -> str:
+def same_different_figure(result: SameDifferent, name: str, mark: str) -> Picture:
     """Percent "different" by difference in blend length, with both readings of the threshold (2004 Figure 6)."""
     rows, found, fitted = result.percent_different, result.believed, result.mixed or result.model
     with new_figure(7.2, 3.9) as (figure, axes):
@@ -89,7 +90,7 @@ def same_different_figure(result: SameDifferent, name: str, mark: str) -> str:
         axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
         axes.set_ylabel("answers “different”")
         _key(axes, found.whose if found else "")
-        return to_svg(figure, name, "Percent “different” by difference in blend length", _spoken_levels(rows), mark)
+        return picture_of(figure, name, "Percent “different” by difference in blend length", _spoken_levels(rows), mark)
 
 
 def _key(axes: Axes, whose: str) -> None:
@@ -108,7 +109,7 @@ def _spoken_levels(rows: Sequence[PercentDifferent]) -> str:
     return "; ".join(f"{row.difference_frames:+g} frames: {row.percent:.0f}%" for row in rows)
 
 
-def motions_figure(result: SameDifferent, name: str, mark: str) -> str:
+def motions_figure(result: SameDifferent, name: str, mark: str) -> Picture:
     """The same curve for every motion, side by side."""
     motions = result.motions
     columns = min(len(motions), 3)
@@ -129,10 +130,10 @@ def motions_figure(result: SameDifferent, name: str, mark: str) -> str:
         for axes in grid[-1]:
             axes.set_xlabel("difference, frames")
         spoken = ". ".join(f"{readable(m.motion)}: {_spoken_levels(m.percent_different)}" for m in motions)
-        return to_svg(figure, name, "Percent “different” for every motion", spoken, mark)
+        return picture_of(figure, name, "Percent “different” for every motion", spoken, mark)
 
 
-def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mapping[Side, float]) -> str:
+def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mapping[Side, float]) -> Picture:
     """Thresholds with intervals: all motions and each one, linear interpolation and model, shorter and longer."""
     entries: list[tuple[str, SameDifferent | MotionThresholds]] = [("all motions", result)]
     entries += [(readable(motion.motion), motion) for motion in result.motions if len(result.motions) > 1]
@@ -153,7 +154,7 @@ def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mappin
             _level_ticks(axes, ticks)
         axes.set_xlabel(f"{100 * result.level:.0f}% “different”, frames from k")
         _threshold_key(axes, bool(known))
-        return to_svg(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries), mark)
+        return picture_of(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries), mark)
 
 
 def _own(entry: SameDifferent | MotionThresholds) -> Mapping[Side, Threshold]:

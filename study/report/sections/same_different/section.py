@@ -31,7 +31,7 @@ from study.report.sections.same_different.tables import (
     motion_table,
     percent_table,
     recovery_table,
-    threshold_table,
+    threshold_tables,
 )
 from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
@@ -54,17 +54,19 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
     motions = sorted(result.motions, key=lambda row: about.place(row.motion))
     result, name = replace(result, motions=tuple(motions)), about.name
     several = len(result.motions) > 1
+    used, others = threshold_tables(name, result, about.fps)
     return Section(
         anchor=f"study-{name}",
         title=about.title,
         headlines=(headline(result, about),),
         drawings=tuple(_drawings(result, about)),
         tables=(
-            threshold_table(name, result, about.fps),
+            used,
             *([recovery_table(name, result, about.known)] if about.known else []),
         ),
         notes=(*_notes(result), *_weber(result, about.lengths)),
         folded=(
+            *([others] if others.rows else []),
             percent_table(name, result),
             *([motion_table(name, result, about)] if several else []),
             d_prime_table(name, result),

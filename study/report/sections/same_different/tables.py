@@ -11,6 +11,9 @@ from study.report import words
 from study.report.sections.section import About
 from study.report.tables import Table, make
 
+USED = ("median observer", "median observer, best criterion", "linear interpolation (as published)")
+"""The estimates that stand in the open; of one or two participants the group's take the first two places."""
+
 
 def _threshold_rows(entry: SameDifferent | MotionThresholds, fps: float) -> list[dict[str, Any]]:
     """One row an estimate of the thresholds, of all motions together or of one: both sides beside each other."""
@@ -47,21 +50,31 @@ _THRESHOLDS = f"estimate {_SHORTER} {_LONGER} remark"
 _FILES_ONLY = "shorter_seconds shorter_standard_error longer_seconds longer_standard_error"
 
 
-def threshold_table(name: str, result: SameDifferent, fps: float) -> Table:
-    """Return the thresholds, one row an estimate."""
+def threshold_tables(name: str, result: SameDifferent, fps: float) -> tuple[Table, Table]:
+    """Return the thresholds, one row an estimate: those that are used most, and the others."""
     percent = f"{100 * result.level:.0f}%"
     rows = _threshold_rows(result, fps)
+    used = [row for row in rows if row["estimate"] in USED or (not result.mixed and "group" in row["estimate"])]
+    used += [row for row in rows if result.staircases and row is rows[-1]]
+    hidden = _FILES_ONLY + ("" if any(row["remark"] for row in rows) else " remark")
     return make(
         f"{name}_thresholds",
         f"The just noticeable difference in frames, with confidence intervals. Where {percent} of the answers are "
-        "“different”: of the median observer and over all observers, by a mixed model of participants with individual "
-        "sensitivities and criteria; on one curve fitted to all answers (jackknife over participants); and by linear "
-        "interpolation between the levels (Fieller), which depends on the levels and is biased for a curved function. "
-        f"Best criterion: the difference at which an observer with the best criterion would be right in {percent} of "
-        "same and different pairs; it alone does not move with the false-alarm rate. A dash: beyond the levels shown.",
+        f"“different”. Best criterion: the difference at which an observer with the best criterion would be right in "
+        f"{percent} of same and different pairs; it alone does not move with the false-alarm rate. Linear "
+        "interpolation between the levels (Fieller’s interval) depends on the levels and is biased for a curved "
+        "function. A dash: beyond the levels shown.",
         _THRESHOLDS,
-        rows,
-        files_only=_FILES_ONLY + ("" if any(row["remark"] for row in rows) else " remark"),
+        used,
+        files_only=hidden,
+    ), make(
+        f"{name}_other_thresholds",
+        "Other estimates of the just noticeable difference, in frames. Of the median observer for these motions alone, "
+        "and where the mean of all observers’ curves crosses (mixed model); on one curve fitted to all answers "
+        "(jackknife over participants).",
+        _THRESHOLDS,
+        [row for row in rows if row not in used],
+        files_only=hidden,
     )
 
 
