@@ -22,6 +22,7 @@ EXAMPLES = {
     "one-hop chain": "segue one-hop chain dance dance_modern box --pair dance box --at 200 --hops 2",
     "one-hop reach": "segue one-hop reach dance dance_modern box --pair dance box --at 200 --turn 30 --within-turn 60",
     "one-hop connect": "segue one-hop connect dance box dance_modern --out joined.mp4",
+    "one-hop between": "segue one-hop between walk_slow walk_fast --count 3 --out walks",
     "one-hop robustness": "segue one-hop robustness dance dance_modern box --out costs.png",
     "advise": "segue advise walk run box --out advice",
     "check": "segue check my_study.toml --library motions",
@@ -46,6 +47,8 @@ ARGUMENTS = {
     "SRC": f"source, {CLIP}",
     "DST": f"destination, {CLIP}",
     "HOP": CLIP,
+    "SLOW": CLIP,
+    "FAST": CLIP,
     "CLIP": CLIP,
     "FILE": "a motion file: .bvh, .amc with its .asf, .glb or .gltf.",
     "FILE|NAME": CLIP,
@@ -64,8 +67,9 @@ def explain(command: click.Command, verb: str) -> None:
         for name, inner in command.commands.items():
             explain(inner, f"{verb} {name}")
         return
-    named = [words for word in arguments(command) if (words := f"{word} is {_said(word)}")]
-    command.epilog = "\n\n".join([*named, f"\b\nExample: {EXAMPLES[verb]}"])
+    named = [f"{word} is {_said(word)}" for word in arguments(command)]
+    # A verb without them is for the tests to find, and no reason to refuse it.
+    command.epilog = "\n\n".join([*named, f"\b\nExample: {EXAMPLES.get(verb, 'none yet')}"])
 
 
 def arguments(command: click.Command) -> list[str]:
@@ -80,7 +84,7 @@ def arguments(command: click.Command) -> list[str]:
 
 def _said(argument: str) -> str:
     if argument != "PROTOCOL":
-        return ARGUMENTS[argument]
+        return ARGUMENTS.get(argument, CLIP)
     from study.experiment.protocol.published import protocols_folder
 
     return ARGUMENTS[argument].format(names=", ".join(sorted(path.stem for path in protocols_folder().glob("*.toml"))))

@@ -58,8 +58,12 @@ def problem_at(loaded: tuple[Clip, ...], pair: tuple[str, str], options: dict[st
 @click.argument("slow")
 @click.argument("fast")
 @clips_options
-@click.option("--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frame rate to work at.")
-@click.option("--count", type=click.IntRange(1, 50), default=3, show_default=True, help="How many.")
+@click.option(
+    "--fps", type=click.FloatRange(min=1), default=60.0, show_default=True, help="Frames per second to work at."
+)
+@click.option(
+    "--count", type=click.IntRange(1, 50), default=3, show_default=True, help="Number of clips between the two."
+)
 @click.option("--out", type=FOLDER, required=True, help="Folder for SLOW_FAST_1.bvh and so on.")
 @json_option
 def between(slow: str, fast: str, library: str | None, fps: float, count: int, out: Path) -> None:
