@@ -9,8 +9,9 @@ smoothest.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -308,13 +309,13 @@ class _Parts:
         return matrix
 
 
-@dataclass(frozen=True, eq=False)
-class _Bound:
-    """`rows @ unknowns + base` is to stay where `nearest` puts it."""
+class _Bound(NamedTuple):
+    """`rows @ unknowns + base`, `(rows, axes)`, has lengths up to `high`; of one axis, values from `low` to it."""
 
     rows: FloatArray
     base: FloatArray
-    nearest: Callable[[FloatArray], FloatArray]
+    low: FloatArray
+    high: FloatArray
 
 
 def _calm(rows: FloatArray, base: FloatArray, bends: FloatArray, times: float = 1.0) -> _Bound:
@@ -324,17 +325,12 @@ def _calm(rows: FloatArray, base: FloatArray, bends: FloatArray, times: float = 
 
 def _within(rows: FloatArray, base: FloatArray, radius: FloatArray) -> _Bound:
     """Vectors no longer than a radius each."""
-
-    def nearest(values: FloatArray) -> FloatArray:
-        length = np.linalg.norm(values, axis=1, keepdims=True)
-        return np.asarray(values * np.minimum(1.0, radius[:, None] / np.maximum(length, 1e-12)))
-
-    return _Bound(rows, base, nearest)
+    return _Bound(rows, base, -radius, radius)
 
 
 def _at_least(rows: FloatArray, base: FloatArray) -> _Bound:
     """Values `(rows, 1)` not below 0."""
-    return _Bound(rows, base[:, None], lambda values: np.maximum(values, 0.0))
+    return _Bound(rows, base[:, None], np.zeros(len(base)), np.full(len(base), np.inf))
 
 
 def _least(cost: FloatArray, right: FloatArray, bounds: Sequence[_Bound]) -> FloatArray:
@@ -343,17 +339,26 @@ def _least(cost: FloatArray, right: FloatArray, bounds: Sequence[_Bound]) -> Flo
     Boyd et al. (2011), Distributed optimization and statistical learning via the alternating direction method of
     multipliers, section 3.1.1. Where bounds contradict each other it ends between them.
     """
-    rows, base = np.concatenate([b.rows for b in bounds]), np.concatenate([b.base for b in bounds])
-    ends = np.cumsum([len(b.rows) for b in bounds])[:-1]
+    rows, base, low, high = (np.concatenate(parts) for parts in zip(*bounds, strict=True))
+    low, high = low[:, None], high[:, None]
     inverse = np.linalg.inv(cost + _STIFF * (rows.T @ rows))
     found = np.linalg.solve(cost, right)
     owed = np.zeros_like(base)
     for _ in range(_ROUNDS):
         values = rows @ found + base
-        split = np.split(values + owed, ends)
-        near = np.concatenate([bound.nearest(part) for bound, part in zip(bounds, split, strict=True)])
-        if np.linalg.norm(values - near, axis=1).max() < _CLOSE_M:
+        near = values + owed
+        if near.shape[1] == 1:
+            np.clip(near, low, high, out=near)
+        else:
+            near *= np.minimum(1.0, high / np.maximum(_lengths(near), 1e-12))
+        apart = values - near
+        if _lengths(apart).max() < _CLOSE_M:
             break
-        owed += values - near
+        owed += apart
         found = inverse @ (right + _STIFF * (rows.T @ (near - owed - base)))
     return np.asarray(found)
+
+
+def _lengths(vectors: FloatArray) -> FloatArray:
+    """`(rows, axes)` to `(rows, 1)`."""
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))[:, None]
