@@ -130,7 +130,7 @@ def test_a_simulated_person_gives_answers_that_count_and_mean_something(task: Ta
     assert right is None or right in legal
     row = answer_columns(trial, Answer(1, "", 1, given[0][0], 1.0))
     assert row["correct"] == (None if right is None else given[0][0] == right)
-    task.truth(default_observer(), study, 0.75)
+    task.truth(default_observer(), study, 0.75, [1.0])
     assert task.in_words(study, lambda method: method)
 
 

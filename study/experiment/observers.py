@@ -6,8 +6,9 @@ analysis should find (`truth`). `simulation` takes such people through whole ses
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +20,11 @@ from study.models.up_down import UpDown
 from study.tasks.answer import CONFIDENCE
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.registry import task_of, task_of_trial
-from study.tasks.trial import Trial
+from study.tasks.trial import Pair, Trial
+
+if TYPE_CHECKING:
+    from study.experiment.stimuli.manifest import Manifest
+    from study.experiment.stimuli.stimulus import StimulusSet
 
 
 def knowing(settings: ObserverSettings, protocol: Protocol) -> ObserverSettings:
@@ -31,26 +36,45 @@ def knowing(settings: ObserverSettings, protocol: Protocol) -> ObserverSettings:
     return replace(settings, preference=preference)
 
 
-def truth(protocol: Protocol, settings: ObserverSettings) -> dict[str, Any]:
+def lengths_apart(protocol: Protocol, stimuli: StimulusSet | Manifest) -> dict[str, int]:
+    """Frames by which the second blend of a pair of methods is longer, by the pair's name, where nothing else differs:
+    the same points, and blends of one make.
+    """
+    records = {record.id: record for record in stimuli.records}
+    found = {}
+    for pair in stimuli.pairs:
+        shown = [records[stimulus] for stimulus in pair.stimuli if stimulus in records]
+        if len(shown) == 2 and pair.difference_frames is None:
+            makes = [protocol.methods_of(protocol.study(pair.study))[name].make for name in pair.methods]
+            points = [(one.source.frame, one.destination.frame) for one in shown]
+            if makes[0] == makes[1] and points[0] == points[1]:
+                found[pair.name] = shown[1].blend_frames - shown[0].blend_frames
+    return found
+
+
+def truth(
+    protocol: Protocol, settings: ObserverSettings, pairs: Sequence[Pair] = (), apart: Mapping[str, int] | None = None
+) -> dict[str, Any]:
     """What an analysis should find: the observer's parameters, and study by study what follows from them.
 
     Of a study with staircases there is also what they aim at (`staircase`). Rounded to six digits, so that it is the
-    same everywhere.
+    same everywhere. `pairs` and `apart` (from `lengths_apart`) say how visible differences are; without them, wholly.
     """
-    studies = {}
+    typical, studies = Person("", 0, settings, 0.0, 0.0, apart=apart or {}), {}
     for study in protocol.studies:
         task = task_of(study)
-        found = task.truth(settings, study, protocol.analysis.threshold)
+        seen = [typical.sees(pair.name) for pair in pairs if pair.study == study.name] or [1.0]
+        found = task.truth(settings, study, protocol.analysis.threshold, seen)
         rule = study.procedure.rule_of(study.task)
         if found is not None and isinstance(rule, UpDown):
-            found = {**found, "staircase": task.truth(settings, study, rule.target)}
+            found = {**found, "staircase": task.truth(settings, study, rule.target, seen)}
         if found is not None:
             studies[study.name] = found
     return {"observer": asdict(settings), "studies": studies}
 
 
-def person(settings: ObserverSettings, name: str, seed: int) -> Person:
-    """Draw a participant's deviations; they depend on the seed and the name alone."""
+def person(settings: ObserverSettings, name: str, seed: int, apart: Mapping[str, int] | None = None) -> Person:
+    """Draw a participant's deviations; they depend on the seed and the name alone. `apart` is from `lengths_apart`."""
     rng = generator(seed, "person", name)
     sensitivity, criterion, leaning, leniency = rng.standard_normal(4)
     typical = settings.same_different
@@ -68,6 +92,7 @@ def person(settings: ObserverSettings, name: str, seed: int) -> Person:
         settings.preference.participant_sd * float(leaning),
         settings.rating.participant_sd * float(leniency),
         bool(generator(seed, "careless", name).random() < settings.careless),
+        apart or {},
     )
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from study.errors import SessionError
-from study.experiment.observers import knowing, person, respond, shown_well, truth
+from study.experiment.observers import knowing, lengths_apart, person, respond, shown_well, truth
 from study.experiment.plan import Plan, draw_plan, questions
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import open_session, walk
@@ -71,7 +71,8 @@ def simulate(
     if participants < 1:
         raise SessionError(f"Expected one participant or more to simulate, found {participants}.")
     settings = knowing(settings or default_observer(), protocol)
-    known = {**truth(protocol, settings), "seed": seed}
+    apart = lengths_apart(protocol, stimuli)
+    known = {**truth(protocol, settings, stimuli.pairs, apart), "seed": seed}
     names = [f"sim-{number:03d}" for number in range(1, participants + 1)]
     plans = [draw_plan(protocol, stimuli.pairs, name, group=group) for group, name in enumerate(names)]
     total = sum(questions(protocol, plan) for plan in plans)
@@ -82,7 +83,7 @@ def simulate(
         found += len(before)
         if has_event(responses, record, "finished"):
             continue
-        who = person(settings, plan.participant, seed)
+        who = person(settings, plan.participant, seed, apart)
         forms = (form_event(name) for name in ("", *(study.name for study in protocol.studies)))
         state = open_session(protocol, plan, before, passed=("consent", *forms))
         for trial, answer in walk(state, partial(respond, who), partial(shown_well, who)):

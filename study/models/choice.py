@@ -13,7 +13,8 @@ from study.models.sigmoids import logistic
 
 @dataclass(frozen=True)
 class PreferenceObserver:
-    """Choice by utilities: log-odds of choosing a over b are the difference of the methods' utilities.
+    """Choice by utilities: log-odds of choosing a over b are the difference of the methods' utilities, times how
+    visible the difference of the two stimuli is.
 
     `order_bias` is the log-odds that the first of two equal stimuli is chosen; `participant_sd` the standard
     deviation over participants of their preference between methods; `ties` Davidson's nu, where neither may be chosen.
@@ -54,10 +55,10 @@ def share_of_more(apart: FloatArray) -> float:
     return float(ndtr(apart / np.sqrt(2.0)).mean())
 
 
-def preference_probability(observer: PreferenceObserver, method_a: str, method_b: str) -> float:
-    """Probability over participants and both orders that method a is chosen."""
+def preference_probability(observer: PreferenceObserver, method_a: str, method_b: str, seen: float = 1.0) -> float:
+    """Probability over participants and both orders that method a is chosen, where the difference is seen so far."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(31)
-    leaning = lean(observer, method_a, method_b) + observer.participant_sd * nodes
+    leaning = seen * (lean(observer, method_a, method_b) + observer.participant_sd * nodes)
     both = 0.5 * (logistic(leaning + observer.order_bias) + logistic(leaning - observer.order_bias))
     chosen = float((both * weights).sum() / weights.sum())
     return observer.lapse / 2 + (1 - observer.lapse) * chosen

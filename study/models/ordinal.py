@@ -25,7 +25,7 @@ def stretch(points: int) -> float:
     return 25.0 if points > 11 else 1.0
 
 
-def mean_score(observer: RatingObserver, apart: float, points: int) -> float:
+def mean_score(observer: RatingObserver, apart: float, points: int, seen: float = 1.0) -> float:
     """Mean over participants of what is rated, in points from 0.
 
     Parameters
@@ -34,10 +34,12 @@ def mean_score(observer: RatingObserver, apart: float, points: int) -> float:
         Its utility; of a pair, that of the comparison less that of the reference.
     points
         Of the scale.
+    seen
+        Of a pair, how visible its difference is, 0 to 1.
     """
     from scipy.special import ndtr
 
-    middle = (points - 1) / 2 + observer.utility_weight * apart
-    spread = np.hypot(observer.noise_sd, observer.participant_sd)
+    middle = (points - 1) / 2 + seen * observer.utility_weight * apart
+    spread = np.hypot(observer.noise_sd, seen * observer.participant_sd)
     # The mean of a whole number from 0 is the sum of the chances to reach each point; points are reached by rounding.
     return float(ndtr((middle - np.arange(points - 1) - 0.5) / spread).sum())

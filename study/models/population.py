@@ -48,6 +48,15 @@ def probability_odd_found(observer: SameDifferentObserver, difference_frames: fl
     return np.asarray(observer.lapse * CHANCE + (1 - observer.lapse) * seen)
 
 
+def visibility(observer: SameDifferentObserver, difference_frames: float) -> float:
+    """How visible a difference is to one observer, 0 to 1: how far the chance to tell in two-alternative forced choice
+    which of two percepts is larger lies between guessing and certainty, 2 Phi(d' / root 2) - 1.
+    """
+    from scipy.special import ndtr
+
+    return float(2 * ndtr(_d_prime(observer, difference_frames) / np.sqrt(2.0)) - 1)
+
+
 def population_different(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
     """Probability of "different" over all participants: the mean over their sensitivities and criteria."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(31)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from study.errors import SessionError
 from study.models.choice import PreferenceObserver
 from study.models.ordinal import RatingObserver
-from study.models.population import SameDifferentObserver, crossing
+from study.models.population import SameDifferentObserver, crossing, visibility
 from study.transitions.methods.registry import METHODS
 
 UTILITIES: Mapping[str, float] = {method.name: method.utility for method in METHODS.values()}
@@ -51,6 +51,12 @@ class Person:
     lean: float
     leniency: float
     careless: bool = False
+    apart: Mapping[str, int] = field(default_factory=dict)
+    """Frames by which the second blend of a pair is longer, by the pair's name, where they differ in nothing else."""
+
+    def sees(self, pair: str) -> float:
+        """How visible the difference of a pair is, 0 to 1; 1 where it is not one of lengths alone."""
+        return visibility(self.settings.same_different, self.apart[pair]) if pair in self.apart else 1.0
 
 
 def default_observer(shorter_frames: float = 8.0, longer_frames: float = 7.0) -> ObserverSettings:

@@ -40,7 +40,7 @@ def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Gener
     return answer, max((chance - CHANCE) / (1 - CHANCE), 0.0)
 
 
-def _truth(settings: ObserverSettings, _asked: Asked, _level: float) -> dict[str, Any]:
+def _truth(settings: ObserverSettings, _asked: Asked, _level: float, _seen: Sequence[float]) -> dict[str, Any]:
     """The differences at which participants without lapses are right halfway between chance and always."""
     from scipy.optimize import brentq
 

@@ -27,13 +27,14 @@ def _problems(asked: Asked) -> Iterator[Problem]:
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
     reference, comparison = trial.methods
     apart = lean(who.settings.preference, comparison, reference)
-    higher = who.settings.rating.utility_weight * apart + who.leniency
+    higher = who.sees(trial.pair) * (who.settings.rating.utility_weight * apart + who.leniency)
     return rated_point(who, higher if trial.a_first else -higher, legal, rng)
 
 
-def _truth(settings: ObserverSettings, asked: Asked, _level: float) -> dict[str, Any]:
+def _truth(settings: ObserverSettings, asked: Asked, _level: float, seen: Sequence[float]) -> dict[str, Any]:
     apart = lean(settings.preference, asked.comparison or asked.reference, asked.reference)
-    return {"mean_score": round(mean_score(settings.rating, apart, asked.scale_points), 6)}
+    scores = [mean_score(settings.rating, apart, asked.scale_points, sees) for sees in seen]
+    return {"mean_score": round(float(np.mean(scores)), 6)}
 
 
 PAIR_RATING = Task(

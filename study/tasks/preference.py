@@ -21,7 +21,7 @@ def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
 
 
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
-    leaning = lean(who.settings.preference, *trial.methods) + who.lean
+    leaning = who.sees(trial.pair) * (lean(who.settings.preference, *trial.methods) + who.lean)
     towards_first = leaning if trial.a_first else -leaning
     chance = chance_of_first(who.settings.preference, towards_first)
     if "equal" in legal and rng.random() < chance_of_neither(who.settings.preference, towards_first):
@@ -29,14 +29,15 @@ def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Gener
     return ("first" if rng.random() < chance else "second"), abs(2 * chance - 1)
 
 
-def _truth(settings: ObserverSettings, asked: Asked, _level: float) -> dict[str, Any]:
+def _truth(settings: ObserverSettings, asked: Asked, _level: float, seen: Sequence[float]) -> dict[str, Any]:
     if asked.others:
         utility = settings.preference.utility
         first = utility.get(asked.reference, 0.0)
         methods = (asked.reference, asked.comparison or asked.reference, *asked.others)
         return {"strengths": {name: round(utility.get(name, 0.0) - first, 6) for name in methods}}
-    share = preference_probability(settings.preference, asked.reference, asked.comparison or asked.reference)
-    return {"favouring_a": round(share, 6)}
+    methods = asked.reference, asked.comparison or asked.reference
+    shares = [preference_probability(settings.preference, *methods, sees) for sees in seen]
+    return {"favouring_a": round(float(np.mean(shares)), 6)}
 
 
 def _in_words(asked: Asked, blends: Callable[[str], str]) -> str:

@@ -86,7 +86,7 @@ RATING = Task(
     conditions=_conditions,
     practice=any_practice,
     judge=_judge,
-    truth=lambda _settings, _asked, _level: None,
+    truth=lambda _settings, _asked, _level, _seen: None,
     in_words=lambda asked, blends: f"rated {scale_in_words(asked, blends)}",
     shortcut=None,
 )

@@ -24,7 +24,7 @@ def _judge(who: Person, trial: Trial, _legal: Sequence[str], rng: np.random.Gene
     return ("different" if rng.random() < different else "same"), abs(2 * different - 1)
 
 
-def _truth(settings: ObserverSettings, asked: Asked, level: float) -> dict[str, Any]:
+def _truth(settings: ObserverSettings, asked: Asked, level: float, _seen: Sequence[float]) -> dict[str, Any]:
     """Where the population says "different" this often, and what linear interpolation between the levels gives."""
     observer = settings.same_different
     return {

@@ -145,8 +145,9 @@ class Task:
     """Pairs for so many practice trials, out of shuffled ones; fewer are repeated."""
     judge: Callable[[Person, Trial, Sequence[str], np.random.Generator], tuple[str, float]]
     """How a simulated person answers: the answer, and how easy it was from 0 to 1."""
-    truth: Callable[[ObserverSettings, Asked, float], dict[str, Any] | None]
-    """What an analysis of a simulated study should find, at a threshold; None where nothing is known."""
+    truth: Callable[[ObserverSettings, Asked, float, Sequence[float]], dict[str, Any] | None]
+    """What an analysis of a simulated study should find, at a threshold, given how visible the difference of each pair
+    is (0 to 1); None where nothing is known."""
     in_words: Callable[[Asked, Callable[[str], str]], str]
     """What participants did, as a clause for a Methods section, given words for the methods."""
     shortcut: Shortcut | None

@@ -19,10 +19,11 @@ import pytest
 from toys import FakeStimuli
 
 from study.errors import SessionError
-from study.experiment.observers import person, truth
+from study.experiment.observers import lengths_apart, person, truth
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import open_session, walk
 from study.experiment.simulation import simulate
+from study.experiment.stimuli.stimulus import MotionUse, StimulusRecord
 from study.experiment.store.answers import has_event
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import Responses, open_responses
@@ -30,6 +31,9 @@ from study.experiment.store.sessions import all_sessions
 from study.models.choice import PreferenceObserver, preference_probability
 from study.models.population import SameDifferentObserver, population_different, probability_different
 from study.tasks.observer import ObserverSettings, default_observer
+from study.tasks.trial import Pair
+
+METHODS = ("geodesic", "fixed")
 
 
 def alike(settings: ObserverSettings) -> ObserverSettings:
@@ -129,6 +133,42 @@ def test_simulated_preferences_follow_the_known_ones(
         assert rows["chose_a"].mean() == pytest.approx(chance, abs=0.12)
     expected = preference_probability(preference, *toy_protocol.study("liking").methods)
     assert chosen["chose_a"].mean() == pytest.approx(expected, abs=0.09)
+
+
+def test_preferences_follow_how_visible_the_difference_is(tmp_path: Path) -> None:
+    """Nine frames against ten are hardly told apart, 25 are; at other points, or made otherwise, the methods count."""
+    names = ("hardly", "plainly", "elsewhere")
+    transitions = [
+        f'[[transitions]]\nname = "{name}"\ncategory = "c"\nsource = "a"\ndestination = "b"' for name in names
+    ]
+    liking = 'task = "preference"\nreference = "geodesic"\ncomparison = "fixed"\norder = "both"\nrepeats = 20'
+    text = 'name = "seen"\ntitle = "Seen"\nfps = 30\nseed = 1\n' + "\n".join(transitions)
+    protocol = parse_protocol(f'{text}\n[[studies]]\nname = "liking"\n{liking}\n')
+    pairs, records = [], []
+    for name, length, at in (("hardly", 9, 60), ("plainly", 25, 60), ("elsewhere", 9, 61)):
+        pairs.append(Pair(f"liking/{name}", "liking", "preference", name, "c", (name, f"{name} fixed"), METHODS))
+        for identifier, frames, frame, method in ((name, length, 60, "geodesic"), (f"{name} fixed", 10, at, "fixed")):
+            use = MotionUse("a", "a.bvh", frame, 300, 0, 0)
+            records.append(
+                StimulusRecord(identifier, name, "c", method, frames, 0, frames, 120, 50, 70, use, use, "g", True)
+            )
+    stimuli = FakeStimuli(tuple(pairs), records=tuple(records))
+    assert lengths_apart(protocol, stimuli) == {"liking/hardly": 1, "liking/plainly": -15}
+    settings = replace(alike(default_observer()), missed=0.0)
+    with open_responses(tmp_path) as responses:
+        known = simulate(protocol, stimuli, responses, 25, seed=2, settings=settings).truth
+        table = answers_frame(responses)
+    rng, shares = np.random.default_rng(3), {}
+    slopes = settings.same_different.d_prime_longer, settings.same_different.d_prime_shorter
+    for name, apart in (("hardly", slopes[0]), ("plainly", 15 * slopes[1]), ("elsewhere", 99.0)):
+        right = (rng.standard_normal(400_000) + apart > rng.standard_normal(400_000)).mean()
+        logit = (2 * right - 1) * 3.29  # 270 of 280, as told apart beyond guessing
+        shares[name] = 0.005 + 0.99 * np.mean([1 / (1 + math.exp(-logit + bias)) for bias in (-0.1, 0.1)])
+    assert 0.6 < shares["hardly"] < 0.72 < 0.95 < shares["plainly"] <= shares["elsewhere"]
+    for name, rows in table.groupby("motion"):
+        error = math.sqrt(shares[name] * (1 - shares[name]) / len(rows))
+        assert rows["chose_a"].astype(float).mean() == pytest.approx(shares[name], abs=4 * error), name
+    assert known["studies"]["liking"]["favouring_a"] == pytest.approx(np.mean(list(shares.values())), abs=0.005)
 
 
 def test_response_times_are_plausible_and_some_answers_are_missed(

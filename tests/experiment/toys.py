@@ -9,6 +9,7 @@ import numpy as np
 
 from study.errors import MotionError
 from study.experiment.protocol.whole import Protocol
+from study.experiment.stimuli.stimulus import StimulusRecord
 from study.experiment.store.answers import Presentation, record_answer
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord
@@ -200,6 +201,7 @@ class FakeStimuli:
     pairs: tuple[Pair, ...]
     library: str = "toy"
     synthetic: bool = True
+    records: tuple[StimulusRecord, ...] = ()
 
 
 STAIRCASE = """

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from study.experiment.observers import truth
+from study.experiment.observers import lengths_apart, truth
 from study.experiment.plan import Plan, draw_plan
 from study.experiment.protocol.proofreading import to_do
 from study.experiment.protocol.whole import find_protocol, load_protocol, protocols_folder
@@ -251,7 +251,7 @@ def test_a_simulated_session_of_study_one_recovers_its_known_answers(tmp_path: P
     with open_responses(tmp_path) as responses:
         simulate(protocol, prepared, responses, 35, seed=1)
         table = answers_frame(responses)
-    known = truth(protocol, default_observer())
+    known = truth(protocol, default_observer(), prepared.pairs, lengths_apart(protocol, prepared))
     jnd = table[(table["study"] == "jnd") & ~table["missed"]]
     for difference, rows in jnd.groupby("difference_frames"):
         chance = float(population_different(default_observer().same_different, int(difference)))

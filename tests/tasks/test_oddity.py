@@ -150,7 +150,7 @@ def test_what_does_not_fit_is_refused(old: str, new: str, expected: str) -> None
 
 def simulated(protocol: Protocol, folder: Path, people: int) -> Oddity:
     class Stimuli:
-        pairs, library, synthetic = pairs_of(protocol), "toy", True
+        pairs, library, synthetic, records = pairs_of(protocol), "toy", True, ()
 
     with open_responses(folder) as responses:
         simulate(protocol, Stimuli(), responses, people, seed=3)
@@ -180,7 +180,7 @@ def test_a_simulated_study_finds_the_known_thresholds(protocol: Protocol, tmp_pa
 
 def test_every_export_has_all_three_stimuli_and_says_what_they_are(protocol: Protocol, tmp_path: Path) -> None:
     class Stimuli:
-        pairs, library, synthetic = pairs_of(protocol), "toy", True
+        pairs, library, synthetic, records = pairs_of(protocol), "toy", True, ()
 
     with open_responses(tmp_path / "results") as responses:
         simulate(protocol, Stimuli(), responses, 1, seed=3)
