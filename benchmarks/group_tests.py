@@ -397,15 +397,15 @@ def mixed(studies, seed):
 def power(studies, seed):
     """Time of `segue power` for a preference study of 35 people: simulated and analysed studies a second."""
     from study.analysis.exclusions import Rules
-    from study.apps.cli.power import AT_ONCE, plans_of
-    from study.apps.cli.shared import load
+    from study.apps.cli.shared import load, prepare_stimuli
     from study.power.curve import power_curve
     from study.power.design import Design
+    from study.power.planned import AT_ONCE, plans_of
     from study.power.registry import effect_of
     from study.power.sessions import whole_sessions
 
     protocol = load("geodesic_vs_fixed")
-    plans = plans_of(protocol, None, 35)
+    plans = plans_of(protocol, prepare_stimuli(protocol, None).pairs, 35)
     options = {"share": 0.65, "correlation": 0.1, "order_bias": 0.1, "missed": 0.02}
     effect = effect_of(protocol.studies[0], options, protocol.analysis)
     design = Design(protocol, protocol.studies[0], plans, effect.observer, Rules())

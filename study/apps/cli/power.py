@@ -14,40 +14,10 @@ from study.analysis.to_json import to_json
 from study.apps.cli.console import FOLDER, emit, json_option, library_option, progress
 from study.counting import counted
 from study.errors import AnalysisError
+from study.power.usual import USUAL
 
 if TYPE_CHECKING:
-    from study.experiment.plan import Plan
-    from study.experiment.protocol.whole import Protocol, StudySpec
     from study.power.design import PlannedStudy
-
-AT_ONCE = 250
-"""Studies drawn and analysed together: enough to be fast, few enough for little memory."""
-
-
-def plans_of(protocol: Protocol, library: str | None, participants: int) -> tuple[Plan, ...]:
-    """The real plans of this many participants."""
-    from study.apps.cli.shared import prepare_stimuli
-    from study.experiment.plan import draw_plan
-
-    pairs = prepare_stimuli(protocol, library).pairs
-    return tuple(draw_plan(protocol, pairs, f"power-{place:03}", group=place) for place in range(participants))
-
-
-def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
-    """The study asked for, or the only one.
-
-    Raises
-    ------
-    AnalysisError
-        When there is more than one to choose from, or none of that name.
-    """
-    names = ", ".join(study.name for study in protocol.studies)
-    if name is None and len(protocol.studies) > 1:
-        raise AnalysisError(f"{protocol.name}: expected --study with one of {names}")
-    for study in protocol.studies:
-        if name in (None, study.name):
-            return study
-    raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
 
 
 def _sizes(text: str, option: str = "--participants", example: str = "10,20,40") -> list[int]:
@@ -72,35 +42,35 @@ def _sizes(text: str, option: str = "--participants", example: str = "10,20,40")
 @click.option(
     "--target",
     type=click.FloatRange(0, 1, True, True),
-    default=0.8,
+    default=USUAL["target"],
     show_default=True,
     help="Power that is wanted: the share of studies that find the effect.",
 )
-@click.option("--share", type=click.FloatRange(0, 1, True, True), default=0.65, show_default=True,
+@click.option("--share", type=click.FloatRange(0, 1, True, True), default=USUAL["share"], show_default=True,
               help="Preference: true share of answers for the first method, from 0 to 1.")  # fmt: skip
-@click.option("--correlation", type=click.FloatRange(0, 0.9), default=0.1, show_default=True,
+@click.option("--correlation", type=click.FloatRange(0, 0.9), default=USUAL["correlation"], show_default=True,
               help="Preference, rating: intraclass correlation of a participant's responses.")  # fmt: skip
 @click.option(
     "--order-bias",
     type=float,
-    default=0.1,
+    default=USUAL["order_bias"],
     show_default=True,
     help="Preference: how much likelier the film shown first is chosen, log-odds.",
 )
-@click.option("--motion-sd", type=click.FloatRange(0, 3), default=0.0, show_default=True,
+@click.option("--motion-sd", type=click.FloatRange(0, 3), default=USUAL["motion_sd"], show_default=True,
               help="Preference: how motions differ, standard deviation in log-odds.")  # fmt: skip
 @click.option("--motions", help="Preference: other numbers of motions to try as well, such as 4,8,16 (default: none).")
-@click.option("--difference", type=float, default=0.7, show_default=True,
+@click.option("--difference", type=float, default=USUAL["difference"], show_default=True,
               help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
-@click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=8.0, show_default=True,
+@click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=USUAL["shorter"], show_default=True,
               help="Same-different, oddity: true threshold, frames shorter.")  # fmt: skip
-@click.option("--longer", type=click.FloatRange(min=0, min_open=True), default=7.0, show_default=True,
+@click.option("--longer", type=click.FloatRange(min=0, min_open=True), default=USUAL["longer"], show_default=True,
               help="Same-different, oddity: true threshold, frames longer.")  # fmt: skip
-@click.option("--spread", type=click.FloatRange(0, 1), default=0.15, show_default=True,
+@click.option("--spread", type=click.FloatRange(0, 1), default=USUAL["spread"], show_default=True,
               help="Same-different, oddity: how participants differ, SD of the logarithm of sensitivity.")  # fmt: skip
-@click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
+@click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=USUAL["precision"], show_default=True,
               help="Same-different, oddity: required half-width of the intervals (1 - alpha), frames.")  # fmt: skip
-@click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=0.005, show_default=True,
+@click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=USUAL["missed"], show_default=True,
               help="Share of trials without a response, from 0 to 1, besides late responses.")  # fmt: skip
 @click.option(
     "--studies", type=click.IntRange(min=10), help="Number of simulated studies (default: 1000; for thresholds 200)."
@@ -108,7 +78,9 @@ def _sizes(text: str, option: str = "--participants", example: str = "10,20,40")
 @click.option(
     "--sessions", is_flag=True, help="Simulate whole sessions and the whole analysis: slow, with the same result."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed, a whole number.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=USUAL["seed"], show_default=True, help="Seed, a whole number."
+)
 @click.option("--out", type=FOLDER,
               help="Results folder for power_STUDY.json and .csv, which its report shows (default: none).")  # fmt: skip
 @library_option
@@ -117,60 +89,20 @@ def power(
     protocol: str, name: str | None, participants: str, library: str | None, out: Path | None, **options: Any
 ) -> None:
     """How many participants a protocol needs for given effects, by simulation."""
-    from study.analysis.exclusions import rules_of
-    from study.apps.cli.shared import load
+    from study.apps.cli.shared import load, prepare_stimuli
     from study.files import check_place
-    from study.power.curve import power_curve
-    from study.power.design import Design, MotionsPoint, PlannedStudy
-    from study.power.registry import effect_of
-    from study.power.sessions import whole_sessions
+    from study.power.planned import chosen_study, plan_power
 
     checked, sizes = load(protocol), _sizes(participants)
     study = chosen_study(checked, name)
     if out is not None:
         check_place(out / f"power_{study.name}.json")
-    plans = plans_of(checked, library, max(sizes))
-    effect = effect_of(study, options, checked.analysis)
-    design = Design(checked, study, plans, effect.observer, rules_of(checked.analysis.exclusions))
-    slow = options["sessions"] or effect.slow
-    studies = options["studies"] or (200 if slow else 1000)
-    with_motions = effect.with_motions
-    counts = _sizes(options["motions"], "--motions", "4,8,16") if options["motions"] else []
-    if counts and with_motions is None:
-        raise AnalysisError(f"{study.name}: expected no --motions for this study, which is planned with its own alone")
-    settings = {"studies": studies, "target": options["target"], "seed": options["seed"]}
-    at_once = 10 if slow else AT_ONCE
+    options["motions"] = _sizes(options["motions"], "--motions", "4,8,16") if options["motions"] else ()
+    pairs = prepare_stimuli(checked, library).pairs
     with progress("studies") as report:
-        found = power_curve(
-            whole_sessions(design, effect) if options["sessions"] else effect.study(design),
-            sizes,
-            **settings,
-            at_once=at_once,
-            progress=lambda done, total: report(done / total, f"{done} of {total}"),
+        result = plan_power(
+            checked, study, pairs, sizes, options, lambda done, total: report(done / total, f"{done} of {total}")
         )
-    surface = []
-    for count in counts:
-        assert with_motions is not None, "refused above"
-        own = power_curve(with_motions(design, count), sizes, **settings, at_once=at_once)
-        surface.append(MotionsPoint(count, own.points, own.needed))
-    result = PlannedStudy(
-        protocol=checked.name,
-        study=study.name,
-        task=study.task,
-        effect={**effect.stated, "missed": options["missed"]},
-        icc=effect.icc,
-        test=effect.test,
-        aim=effect.aim,
-        points=found.points,
-        target=found.target,
-        needed=found.needed,
-        note=found.note,
-        simulations=studies,
-        through="whole sessions" if options["sessions"] else "plan, observers, exclusions and default test",
-        seed=options["seed"],
-        by_motions=tuple(surface),
-        answers_per_participant=effect.answers(design),
-    )
     if out is not None:
         _write(out, result)
     emit(to_json(result), _in_words(result))

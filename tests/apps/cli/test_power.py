@@ -15,11 +15,11 @@ from scipy.stats import binom, f, nct, t
 from study.analysis.analyse import Analysis
 from study.analysis.exclusions import Rules
 from study.apps.cli import run
-from study.apps.cli.power import plans_of
-from study.apps.cli.shared import load
+from study.apps.cli.shared import load, prepare_stimuli
 from study.power import preference as preferences
 from study.power import ratings, same_different
 from study.power.design import Design, Effect
+from study.power.planned import plans_of
 from study.power.sessions import whole_sessions
 from study.report.power import power_sentence, read_power
 
@@ -31,7 +31,7 @@ def preference() -> Design:
     study = protocol.studies[0]
     settings = preferences.preference_observer(study, 0.65, 0.0, 0.0, 0.0)
     settings = replace(settings, response_log_sd=0.0)
-    return Design(protocol, study, plans_of(protocol, None, 35), settings, Rules())
+    return Design(protocol, study, plans_of(protocol, prepare_stimuli(protocol, None).pairs, 35), settings, Rules())
 
 
 def share_found(run_of: Any, size: int, studies: int = 4000, seed: int = 1) -> float:
@@ -166,7 +166,9 @@ def test_ratings_at_once_are_those_of_whole_sessions() -> None:
     study = protocol.studies[0]
     protocol = protocol.model_copy(update={"studies": (study.model_copy(update={"items": study.items[:1]}),)})
     settings = ratings.rating_observer(study, 1.0, 0.2, 0.0)
-    design = Design(protocol, protocol.studies[0], plans_of(protocol, None, 12), settings, Rules())
+    design = Design(
+        protocol, protocol.studies[0], plans_of(protocol, prepare_stimuli(protocol, None).pairs, 12), settings, Rules()
+    )
     fast = ratings.rating_study(design, 0.05, 1.0)
     found = both_ways(design, fast, lambda analysis: ratings.rating_found(analysis, study, 1.0, 0.05), 12, 60)
     assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(60))
@@ -178,7 +180,9 @@ def test_rated_pairs_at_once_are_those_of_whole_sessions() -> None:
     study = protocol.study("compared")
     protocol = protocol.model_copy(update={"studies": (study.model_copy(update={"items": study.items[:1]}),)})
     settings = ratings.rating_observer(study, 0.6, 0.2, 0.0)
-    design = Design(protocol, protocol.studies[0], plans_of(protocol, None, 12), settings, Rules())
+    design = Design(
+        protocol, protocol.studies[0], plans_of(protocol, prepare_stimuli(protocol, None).pairs, 12), settings, Rules()
+    )
     fast = ratings.rating_study(design, 0.05, 0.6)
     found = both_ways(design, fast, lambda analysis: ratings.pair_rating_found(analysis, study, 0.6, 0.05), 12, 60)
     assert found[0] == pytest.approx(found[1], abs=3.5 * 0.5 / np.sqrt(60))
@@ -189,7 +193,7 @@ def test_thresholds_are_those_of_whole_sessions() -> None:
     protocol = load("blend_length_jnd")
     study = protocol.studies[0]
     settings = same_different.same_different_observer(8.0, 7.0, 0.15, 0.02)
-    design = Design(protocol, study, plans_of(protocol, None, 8), settings, Rules())
+    design = Design(protocol, study, plans_of(protocol, prepare_stimuli(protocol, None).pairs, 8), settings, Rules())
     fast = same_different.same_different_study(design, 1.7, protocol.analysis.threshold)
 
     def narrow(analysis: Analysis) -> bool:
