@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from segue.clips import blend, blend_length, costs, film, motions, read, strip, write
     from segue.fits import fit
-    from segue.one_hop import one_hop, play
+    from segue.hops import one_hop, play
     from segue.studies import Results, Study, analyse
     from segue.views import View
     from study import __version__
@@ -31,7 +31,7 @@ __all__ = [
 _FROM = {
     "segue.clips": ("blend", "blend_length", "costs", "film", "motions", "read", "strip", "write"),
     "segue.fits": ("fit",),
-    "segue.one_hop": ("one_hop", "play"),
+    "segue.hops": ("one_hop", "play"),
     "segue.studies": ("Results", "Study", "analyse"),
     "segue.views": ("View",),
     "study": ("__version__",),

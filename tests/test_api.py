@@ -40,6 +40,7 @@ def test_every_public_name_is_there_and_explained() -> None:
     assert set(dir(segue)) == set(segue.__all__)
     for name in segue.__all__:
         assert name == "__version__" or getattr(segue, name).__doc__
+        assert getattr(segue, name) is getattr(segue, name), f"a module of this name takes its place: {name}"
     with pytest.raises(AttributeError, match="found 'blends'"):
         getattr(segue, "blends")  # noqa: B009
 
