@@ -181,10 +181,8 @@ def dead_blended(
     end_frame: int,
     blend_frames: int,
     extrapolation: Extrapolation,
-    *,
-    weight: str = "sigmoid",
 ) -> Transition:
-    """Source, then a cross-fade from its pose, moved on by its decaying velocity, to the destination.
+    """Source, then a cross-fade (sigmoid) from its pose, moved on by its decaying velocity, to the destination.
 
     Parameters
     ----------
@@ -192,8 +190,6 @@ def dead_blended(
         As in `blending.blend` with the specification `"start-end"`.
     extrapolation
         How the source's velocity decays.
-    weight
-        As in `blending.blend`.
 
     Raises
     ------
@@ -202,7 +198,7 @@ def dead_blended(
     """
     seam = _seam(source, destination, start_frame, end_frame, blend_frames, blend_frames)
     on = quat.exp(0.5 * extrapolation.moved(-seam.offset, seam.velocity, seam.times))
-    share = blend_weights(blend_frames, weight)
+    share = blend_weights(blend_frames, "sigmoid")
     shares = np.repeat(share[:, None], len(seam.pose), axis=1)
     poses = slerp_one_way(quat.continuous(quat.multiply(on, seam.pose)), seam.poses, shares)
     way, speed = np.array([-seam.drop]), np.array([seam.height_rate])

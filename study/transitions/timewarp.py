@@ -18,7 +18,6 @@ from functools import lru_cache
 import numpy as np
 
 from study.arrays import FloatArray, IntArray
-from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip, retarget, sample
 from study.transitions.blend_length import length_range
@@ -26,7 +25,7 @@ from study.transitions.blending import Stretch, Transition, blend_weights, join,
 from study.transitions.distances import half_angle_squares
 from study.transitions.registration import registration
 from study.transitions.weights import joint_weights
-from study.transitions.windows import held, joined_at
+from study.transitions.windows import held, joined_at, lacking
 
 STEEPEST = 2.0
 """The slope of a warp lies between one over this and this."""
@@ -225,17 +224,11 @@ class _Arcs:
 def _check_supply(
     source: Clip, destination: Clip, start_frame: int, end_frame: int, source_frames: int, destination_frames: int
 ) -> None:
-    names = [
-        f"the {kind} {c.name}" if c.name else f"the {kind}"
-        for kind, c in (("source", source), ("destination", destination))
+    # A warped window also looks at the frame before its first.
+    faults = [
+        *lacking(source, "source", start_frame - 1, start_frame + source_frames),
+        *lacking(destination, "destination", end_frame - destination_frames, end_frame + 1),
     ]
-    faults = []
-    if start_frame < 1:
-        faults.append(f"{names[0]} lacks 1 frame before its first")
-    if (lacking := start_frame + source_frames - source.frames) > 0:
-        faults.append(f"{names[0]} lacks {counted(lacking, 'frame')} after its last")
-    if (lacking := destination_frames - end_frame) > 0:
-        faults.append(f"{names[1]} lacks {counted(lacking, 'frame')} before its first")
     if faults:
         raise TransitionError(
             f"Expected clips with frames for warped blends of {source_frames} source and {destination_frames} "

@@ -10,6 +10,7 @@ The three ways to name a transition that Wang & Bodenheimer 2004 compare in sect
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from study.counting import counted
@@ -75,20 +76,20 @@ def joined_at(source: Clip, destination: Clip, start_frame: int, end_frame: int)
 
 def shortfall(source: Clip, destination: Clip, frames: Window) -> str:
     """In words, the frames that the clips lack for a window; empty where they lack none."""
-    faults = []
-    for clip, kind, start, stop in (
-        (source, "source", frames.source_start, frames.source_stop),
-        (destination, "destination", frames.destination_start, frames.destination_stop),
-    ):
-        name = f"the {kind} {clip.name}" if clip.name else f"the {kind}"
-        if start < 0:
-            faults.append(f"{name} lacks {counted(-start, 'frame')} before its first (needs frame {start})")
-        if stop > clip.frames:
-            faults.append(
-                f"{name} lacks {counted(stop - clip.frames, 'frame')} after its last "
-                f"(needs frames to {stop - 1}, has them to {clip.frames - 1})"
-            )
-    return "; ".join(faults)
+    ours, theirs = (frames.source_start, frames.source_stop), (frames.destination_start, frames.destination_stop)
+    return "; ".join((*lacking(source, "source", *ours), *lacking(destination, "destination", *theirs)))
+
+
+def lacking(clip: Clip, kind: str, start: int, stop: int) -> Iterator[str]:
+    """What a clip lacks of a stretch of frames, as a slice counts them, in words."""
+    name = f"the {kind} {clip.name}" if clip.name else f"the {kind}"
+    if start < 0:
+        yield f"{name} lacks {counted(-start, 'frame')} before its first (needs frame {start})"
+    if stop > clip.frames:
+        yield (
+            f"{name} lacks {counted(stop - clip.frames, 'frame')} after its last (needs frames to {stop - 1}, has them "
+            f"to {clip.frames - 1})"
+        )
 
 
 def held(available: int, shortest: int, longest: int) -> tuple[int, str]:

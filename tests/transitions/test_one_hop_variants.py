@@ -157,7 +157,7 @@ def test_a_connection_is_the_best_of_all_hops_frames_and_stays(seed: int) -> Non
     assert (entry.hop, last - entry.offset, entry.stay_hop) == (hop, frame, waited)
     assert found.cost == pytest.approx(cost * DISTANCE.unit, abs=3 * DISTANCE.unit)
     steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.alignment.offset or 0, blend)]
-    played = play_steps(clips, 0, 0, last, steps)
+    played = play_steps(clips, 0, last, steps)
     assert played.clip.frames == last + blend + waited + frames[1]
 
 
@@ -476,7 +476,7 @@ def test_what_is_reached_is_where_the_destination_plays() -> None:
     assert found.entry != free.entry
     assert found.cost >= free.cost
     steps = [Step(found.entry.stay_source, found.entry.hop, found.entry.offset, 6), Step(found.entry.stay_hop, 1, 2, 6)]
-    played = play_steps(clips, 0, 0, 20, steps)
+    played = play_steps(clips, 0, 20, steps)
     state = played.segments[-1]
     yaw, shift, rest = align(
         joint_positions(trim(played.clip, state.start, state.stop)),
@@ -568,7 +568,7 @@ def test_two_hops_equal_exhaustive_search_and_never_cost_more_than_one() -> None
             assert len(single.steps) == 2
             assert chain.cost <= single.cost
             gained += chain.cost < single.cost
-        played = play_steps(clips, 0, 0, trigger, chain.steps)
+        played = play_steps(clips, 0, trigger, chain.steps)
         assert played.segments[-1].clip == 1
         assert played.clip.frames == 16 - 1  # the destination stands one frame before the source, and ends as it would
     assert gained > 2

@@ -150,7 +150,7 @@ def chain(
     costs = [None if one is None else one.cost for one in found]
     said = ", ".join(f"{counted(most, 'hop')} {one.cost:.4g}" for most, one in enumerate(found, start=1) if one)
     result = {"costs": costs, "weight": problem.weight * problem.distance.unit, "steps": steps}
-    played = play_steps(loaded, switch.source, 0, trigger, best.steps)
+    played = play_steps(loaded, switch.source, trigger, best.steps)
     show_played(played, names, out, result, [f"cost by at most {said}"])
 
 
@@ -227,7 +227,7 @@ def reach(
     )
     last = Step(entry.stay_hop, switch.destination, options["offset"], blend)
     steps = [Step(entry.stay_source, entry.hop, entry.offset, blend), last]
-    show_played(play_steps(loaded, switch.source, 0, trigger, steps), names, out, result, [words])
+    show_played(play_steps(loaded, switch.source, trigger, steps), names, out, result, [words])
 
 
 @one_hop.command()
@@ -259,7 +259,7 @@ def connect(
     assert found.alignment.offset is not None, "a connection stands at an offset"
     steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.alignment.offset, blend)]
     words = f"hop {result['hop']} from its frame {result['frame']}, stay {entry.stay_hop}; cost {found.cost:.4g}"
-    show_played(play_steps(loaded, 0, 0, last, steps), names, out, result, [words])
+    show_played(play_steps(loaded, 0, last, steps), names, out, result, [words])
 
 
 @one_hop.command()

@@ -54,19 +54,10 @@ def regular_beats(clip: Clip, beats_per_minute: float, first_s: float = 0.0) -> 
     return frames[frames < clip.frames]
 
 
-def find_beats(clip: Clip, beats_per_minute: tuple[float, float] = BEATS_PER_MINUTE) -> IntArray:
+def find_beats(clip: Clip) -> IntArray:
     """The beats that a dance keeps to: the steady tempo and phase at which the body most comes to rest.
 
-    Parameters
-    ----------
-    clip
-        At least two beats of the slowest tempo long.
-    beats_per_minute
-        The slowest and the fastest tempo to consider.
-
-    Returns
-    -------
-    Frames, ascending.
+    Frames, ascending; `TransitionError` for a clip of less than two beats of the slowest tempo.
 
     Notes
     -----
@@ -74,13 +65,11 @@ def find_beats(clip: Clip, beats_per_minute: tuple[float, float] = BEATS_PER_MIN
     Fourier component of that speed is largest is taken, and its minima are the beats. It finds the tempo of the
     motion, which may be half or twice that of the music.
     """
-    slowest, fastest = beats_per_minute
-    if not 0 < slowest <= fastest:
-        raise TransitionError(f"Expected a slowest and a fastest tempo above 0, got {slowest:g} and {fastest:g}.")
+    slowest, fastest = BEATS_PER_MINUTE
     if clip.seconds < 2 * 60.0 / slowest:
         raise TransitionError(
             f"Expected at least two beats at {slowest:g} a minute ({2 * 60.0 / slowest:.1f} s) to find a tempo in, "
-            f"{clip.name or 'the clip'} lasts {clip.seconds:.1f} s. Give its beats, or a faster slowest tempo."
+            f"{clip.name or 'the clip'} lasts {clip.seconds:.1f} s. Give its beats."
         )
     positions = joint_positions(clip)
     about_root = positions - positions[:, :1]
@@ -130,14 +119,14 @@ def beat_offsets(source_beats: IntArray, hop_beats: IntArray, tolerance: int = 1
 
 
 def all_beat_offsets(
-    beats: Mapping[int, IntArray], sources: Sequence[int], hops: Sequence[int], tolerance: int = 1
+    beats: Mapping[int, IntArray], sources: Sequence[int], hops: Sequence[int]
 ) -> dict[tuple[int, int], IntArray]:
     """`Problem.offsets` for a beat-aware search, from the beats of each clip by its number.
 
     A clip without beats can't be a hop; a source without beats takes any.
     """
     return {
-        (source, hop): beat_offsets(beats[source], beats.get(hop, np.zeros(0, dtype=np.int64)), tolerance)
+        (source, hop): beat_offsets(beats[source], beats.get(hop, np.zeros(0, dtype=np.int64)))
         for source in set(sources)
         for hop in set(hops)
         if source in beats

@@ -79,7 +79,6 @@ class _Tape:
     """Frames as they are recorded, with the clip that plays now and where it was placed."""
 
     clips: tuple[Clip, ...]
-    weight: str
     number: int
     frame: int
     placed: Clip
@@ -100,7 +99,7 @@ class _Tape:
         theirs = trim(whole, frame, frame + blend_frames)
         yaw, translation, _ = align(joint_positions(ours), joint_positions(theirs))
         self.placed = moved(whole, yaw, translation)
-        self._record(crossfade(ours, moved(theirs, yaw, translation), self.weight), "blend", frame, number)
+        self._record(crossfade(ours, moved(theirs, yaw, translation)), "blend", frame, number)
         self.number, self.frame = number, frame + blend_frames
 
     def _record(self, part: Clip, kind: str, clip_start: int, number: int | None = None) -> None:
@@ -115,12 +114,12 @@ class _Tape:
         self.length += part.frames
 
 
-def crossfade(a: Clip, b: Clip, weight: str = "linear") -> Clip:
+def crossfade(a: Clip, b: Clip) -> Clip:
     """Pose by pose from one stretch of motion into another of the same length, that was placed on it.
 
     The paper's pose-space linear blend: slerp of every joint, the root by linear interpolation.
     """
-    share = blend_weights(a.frames, weight)
+    share = blend_weights(a.frames)
     rotations = slerp_one_way(a.rotations, b.rotations, np.tile(share[:, None], (1, a.skeleton.joints)))
     positions = a.root_positions + share[:, None] * (b.root_positions - a.root_positions)
     return replace(a, root_positions=positions, rotations=rotations)
@@ -132,10 +131,7 @@ def play(
     triggers: Sequence[Trigger],
     *,
     first: int = 0,
-    first_frame: int = 0,
-    frames: int | None = None,
     method: str = "one-hop",
-    weight: str = "linear",
 ) -> Played:
     """The motion of a state machine.
 
@@ -147,14 +143,10 @@ def play(
         The transitions; also what says where each destination stands on its source's timeline.
     triggers
         In the order of their frames.
-    first, first_frame
-        The clip that plays at the start, and its frame then.
-    frames
-        Frames of output; to the end of the last clip unless given.
+    first
+        The clip that plays at the start, from its first frame on; the last one plays to its end.
     method
         `"one-hop"`, or `"direct"`: a blend into the destination from the triggered frame on.
-    weight
-        `"linear"` or `"sigmoid"`; see `blend_weights`.
 
     Raises
     ------
@@ -172,7 +164,7 @@ def play(
     check_clips(clips)
     _check_table(clips, table)
     same_body = tuple(retarget(clip, clips[0].skeleton) for clip in clips)
-    tape = _Tape(same_body, weight, first, first_frame, same_body[first])
+    tape = _Tape(same_body, first, 0, same_body[first])
     entries: list[Entry | None] = []
     for trigger in triggers:
         frame = tape.frame + trigger.frame - tape.length
@@ -192,11 +184,7 @@ def play(
             steps = entry_steps(table, entry, trigger.destination, alignment.offset_at(frame))
         entries.append(entry)
         _follow(tape, frame, steps)
-    wanted = tape.clips[tape.number].frames if frames is None else tape.frame + frames - tape.length
-    if wanted > tape.clips[tape.number].frames or (frames is not None and frames < tape.length):
-        longest = tape.length + tape.clips[tape.number].frames - tape.frame
-        raise TransitionError(f"Expected {tape.length} to {longest} frames of output for these triggers, got {frames}.")
-    tape.play_to(wanted, "state")
+    tape.play_to(tape.clips[tape.number].frames, "state")
     return Played(_joined(tape, method), tuple(tape.segments), tuple(entries))
 
 
@@ -258,27 +246,21 @@ def _follow(tape: _Tape, frame: int, steps: Sequence[Step]) -> None:
         offset = step.offset
 
 
-def play_steps(
-    clips: Sequence[Clip], first: int, first_frame: int, frame: int, steps: Sequence[Step], weight: str = "linear"
-) -> Played:
+def play_steps(clips: Sequence[Clip], first: int, frame: int, steps: Sequence[Step]) -> Played:
     """One transition, given step by step, and its last clip to its end.
 
     Parameters
     ----------
     clips
         Clips of one rig at one frame rate.
-    first, first_frame
-        The clip that plays at the start, and its frame then.
-    frame
-        Its triggered frame.
+    first, frame
+        The clip that plays at the start, and its triggered frame.
     steps
         The transition: hops, and the destination last.
-    weight
-        As in `play`.
     """
     check_clips(clips)
     same_body = tuple(retarget(clip, clips[0].skeleton) for clip in clips)
-    tape = _Tape(same_body, weight, first, first_frame, same_body[first])
+    tape = _Tape(same_body, first, 0, same_body[first])
     _follow(tape, frame, steps)
     tape.play_to(same_body[tape.number].frames, "state")
     return Played(_joined(tape, "step by step"), tuple(tape.segments))

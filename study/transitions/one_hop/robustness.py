@@ -131,7 +131,7 @@ def costs_of(problem: Problem, table: OneHopTable, number: int, trigger: int) ->
     )
 
 
-def draw_costs(costs: Sequence[Costs], path: Path, *, unit: str = "m²", names: Sequence[str] = ()) -> None:
+def draw_costs(costs: Sequence[Costs], path: Path) -> None:
     """Bars of what each transition costs, direct on the left and one-hop in its three parts on the right (Figure 10).
 
     Parameters
@@ -140,10 +140,6 @@ def draw_costs(costs: Sequence[Costs], path: Path, *, unit: str = "m²", names: 
         From `costs_of`.
     path
         The PNG file.
-    unit
-        The cost's unit, for the axis.
-    names
-        A name for each transition; numbers from 1 unless given.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -162,9 +158,9 @@ def draw_costs(costs: Sequence[Costs], path: Path, *, unit: str = "m²", names: 
     ):
         axes.bar(place + 0.2, heights, 0.38, bottom=below, color=colour, label=label)
         below = below + np.array(heights)
-    axes.set_xticks(place, list(names) if names else [str(k + 1) for k in range(len(costs))])
+    axes.set_xticks(place, [str(k + 1) for k in range(len(costs))])
     axes.set_xlabel("transition")
-    axes.set_ylabel(f"cost, {unit}")
+    axes.set_ylabel("cost, m²")
     axes.set_ylim(0.0, 1.28 * max(float(direct.max(initial=0.0)), float(below.max(initial=0.0)), 1e-9))
     axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper left")
     with whole_file(path) as unfinished:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 # The hop beside the strip's own colours for source, blend and destination.
 HOP_COLOUR = (196, 160, 0)
+_POSES, _MARGIN_S, _HEIGHT = 13, 0.4, 300
 
 
 def strip_segments(played: Played) -> list[Segment]:
@@ -27,45 +28,21 @@ def strip_segments(played: Played) -> list[Segment]:
     return parts
 
 
-def draw_played(
-    played: Played,
-    out: Path,
-    *,
-    poses: int = 13,
-    margin_s: float = 0.4,
-    span: tuple[int, int] | None = None,
-    height: int = 300,
-) -> None:
-    """A strip as a PNG file.
-
-    Parameters
-    ----------
-    played, out
-        What to draw, and where to.
-    poses
-        How many, evenly spaced.
-    margin_s
-        How long before the first blend the strip starts, and after the last one it ends.
-    span
-        The first and the last frame of the strip instead, so that several strips show the same times.
-    height
-        Of the picture, pixels.
-    """
+def draw_played(played: Played, out: Path) -> None:
+    """A strip of poses, evenly spaced from shortly before the first blend to shortly after the last, as a PNG file."""
     from renderer.strip import render_strip
     from study.motion.clip import joint_positions
     from study.motion.drawing import figure_for
 
-    clip, margin = played.clip, round(margin_s * played.clip.fps)
+    clip, margin = played.clip, round(_MARGIN_S * played.clip.fps)
     blends = [part for part in played.segments if part.kind == "blend"]
     first = max(blends[0].start - margin, 0) if blends else 0
     last = min(blends[-1].stop + margin, clip.frames) - 1 if blends else clip.frames - 1
-    first, last = span or (first, last)
-    frames = sorted({round(first + (last - first) * k / max(poses - 1, 1)) for k in range(poses)})
     render_strip(
         out,
         joint_positions(clip, ends=True),
         figure_for(clip.skeleton),
-        frames=frames,
+        frames=sorted({round(first + (last - first) * k / (_POSES - 1)) for k in range(_POSES)}),
         segments=strip_segments(played),
-        height=height,
+        height=_HEIGHT,
     )
