@@ -181,6 +181,12 @@ def joint_positions(clip: Clip, *, ends: bool = False) -> FloatArray:
     return np.ascontiguousarray(positions.transpose(2, 1, 0))
 
 
+def rest_positions(skeleton: Skeleton, *, ends: bool = False) -> FloatArray:
+    """The joints of the rest pose, root at the origin, `(joints, 3)`, metres; `ends` as `joint_positions` takes it."""
+    still = Clip(skeleton, np.zeros((1, 3)), np.tile(quat.IDENTITY, (1, skeleton.joints, 1)), 1.0)
+    return np.asarray(joint_positions(still, ends=ends)[0])
+
+
 def with_roles(clip: Clip, mapping: Mapping[str, str] | None = None) -> Clip:
     """The clip with its joints' roles found again, also from its poses; `mapping` as `rigs.find_roles` takes it."""
     some = np.unique(np.linspace(0, clip.frames - 1, min(clip.frames, _POSES)).astype(np.int64))

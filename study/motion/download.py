@@ -30,16 +30,9 @@ def download_trial(trial: str, folder: Path | str, *, site: str = CMU_SITE, time
     trial
         Subject and number, as in `16_35`, or a name of the CMU index, whose first take is fetched.
     folder
-        Where `subjects/` is or will be.
-    site
-        Address of the site.
-    timeout_s
-        Seconds without an answer after which the download is given up.
-
-    Returns
-    -------
-    Path
-        The AMC file.
+        Where `subjects/` is or will be; the AMC file in it is returned.
+    site, timeout_s
+        Address of the site, and seconds without an answer after which the download is given up.
 
     Raises
     ------

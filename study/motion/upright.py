@@ -13,7 +13,7 @@ import numpy as np
 
 from study.arrays import FloatArray
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, joint_positions
+from study.motion.clip import Clip, joint_positions, rest_positions
 
 # Between legs that are straight in rest and those of somebody in a fighting stance.
 _WITHIN = np.cos(np.radians(35.0))
@@ -38,7 +38,7 @@ def put_upright(clip: Clip) -> Clip:
     returned as it is; `study.motion.defects.find_defects` tells of one that lies.
     """
     axis = lying_axis(clip)
-    if axis is None or _axis_of_legs(clip, _rest_positions(clip)) != axis:
+    if axis is None or _axis_of_legs(clip, rest_positions(clip.skeleton)[None]) != axis:
         return clip
     turn = quat.from_axis_angle(*_TURNS[axis])
     skeleton = replace(
@@ -52,14 +52,6 @@ def put_upright(clip: Clip) -> Clip:
         root_positions=quat.rotate(turn, clip.root_positions),
         rotations=quat.multiply(quat.multiply(turn, clip.rotations), quat.conjugate(turn)),
     ).noting(f"turned from {axis} up to Y up: the body stands along {axis} in rest and in motion")
-
-
-def _rest_positions(clip: Clip) -> FloatArray:
-    """Joint positions with no rotations, one frame `(1, joints, 3)`, metres."""
-    positions = np.zeros((1, clip.skeleton.joints, 3))
-    for joint in range(1, clip.skeleton.joints):
-        positions[0, joint] = positions[0, clip.skeleton.parents[joint]] + clip.skeleton.offsets[joint]
-    return positions
 
 
 def _axis_of_legs(clip: Clip, positions: FloatArray) -> str | None:

@@ -27,26 +27,12 @@ _BLOCK = 8_000_000
 def geodesic_lengths(
     source: Clip, destination: Clip, start_frames: ArrayLike, end_frames: ArrayLike
 ) -> tuple[IntArray, FloatArray]:
-    """The geodesic blend length of many transitions between two clips.
+    """The geodesic blend length of many transitions between two clips of one rig at one frame rate, and their costs.
 
-    Parameters
-    ----------
-    source, destination
-        Clips of one rig at one frame rate.
-    start_frames, end_frames : (transitions,)
-        Whole frame numbers, as `geodesic_length` takes them one at a time.
-
-    Returns
-    -------
-    lengths : (transitions,)
-        Frames; the shortest of those that cost least.
-    costs : (transitions,)
-        What they cost. Running sums round a little: good to about 1e-13.
-
-    Raises
-    ------
-    TransitionError
-        Where the clips don't supply even the shortest blend at some of the frames; the message says how many.
+    `start_frames` and `end_frames (transitions,)` are whole frame numbers, as `geodesic_length` takes them one at a
+    time. Lengths and costs are `(transitions,)`: frames, the shortest of those that cost least, and what they cost
+    (running sums round a little: good to about 1e-13). `TransitionError` where the clips don't supply even the shortest
+    blend at some of the frames; the message says how many.
     """
     destination = on_joints_of(source, destination)
     starts, ends, low, longest_there = _transitions(source, destination, start_frames, end_frames)

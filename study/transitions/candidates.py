@@ -43,23 +43,9 @@ def candidates(
 ) -> tuple[Candidate, ...]:
     """Cuts to label.
 
-    Parameters
-    ----------
-    source, destination
-        Clips of one rig at one frame rate.
-    rng
-        For the random ones, and for the order.
-    best, worst
-        How many of each by each metric.
-    at_random
-        How many random ones in all.
-    margin_s
-        Seconds of each clip that a cut leaves to be seen; less where a clip is short.
-
-    Raises
-    ------
-    TransitionError
-        For clips of under four frames.
+    Of two clips of one rig at one frame rate, so many `best` and `worst` by each metric, and so many `at_random` in
+    all. A cut leaves `margin_s` seconds of each clip to be seen; less where a clip is short. `TransitionError` for
+    clips of under four frames.
     """
     rows, columns = _shown(source, margin_s, after=False), _shown(destination, margin_s, after=True)
     found: dict[tuple[int, int], str] = {}

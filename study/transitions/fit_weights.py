@@ -89,21 +89,7 @@ def weight_groups(skeleton: Skeleton) -> tuple[tuple[str, ...], ...]:
 def cost_terms(cuts: Sequence[LabelledCut], groups: Sequence[Sequence[str]], nu: float = 1.0) -> FloatArray:
     """The matrix A of Eq. 3: what each group of joints adds to the cost of each cut per unit of weight.
 
-    Parameters
-    ----------
-    cuts
-        Labelled cuts, all of one rig.
-    groups
-        Roles that share a weight, as `weight_groups` gives them.
-    nu
-        Weight of the velocities, as in `cost_matrix`.
-
-    Returns
-    -------
-    (cuts, groups) squared half angles of pose, plus `nu` times those of velocity, summed over each group's joints.
-
-    Notes
-    -----
+    Squared half angles of pose, plus `nu` times those of velocity, summed over each group's joints `(cuts, groups)`.
     The root's position carries no weight in Eq. 2, and a cut matches it on the floor, so it is not in A.
     """
     return np.array([_terms_of(cut, groups, nu) for cut in cuts]).reshape(len(cuts), len(groups))

@@ -47,11 +47,6 @@ class Lead:
         """The curve at shares `(n,)` of the blend, from 0 to 1."""
         return np.asarray(_ramps(shares, len(self.slopes) + 1) @ self.slopes)
 
-    def rate(self, shares: FloatArray) -> FloatArray:
-        """Its slope there."""
-        level = np.concatenate([[0.0], self.slopes, [0.0]])
-        return np.asarray(np.interp(shares, np.linspace(0.0, 1.0, len(level)), level))
-
 
 def _ramps(shares: FloatArray, pieces: int) -> FloatArray:
     """What a slope of 1 at one inner knot alone adds to a curve up to each share, `(shares, pieces - 1)`."""

@@ -156,7 +156,7 @@ def test_a_connection_is_the_best_of_all_hops_frames_and_stays(seed: int) -> Non
     entry = found.entry
     assert (entry.hop, last - entry.offset, entry.stay_hop) == (hop, frame, waited)
     assert found.cost == pytest.approx(cost * DISTANCE.unit, abs=3 * DISTANCE.unit)
-    steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.alignment.offset or 0, blend)]
+    steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.offset, blend)]
     played = play_steps(clips, 0, last, steps)
     assert played.clip.frames == last + blend + waited + frames[1]
 

@@ -256,8 +256,7 @@ def connect(
     entry, blend = found.entry, problem.settings.blend_frames
     last = loaded[0].frames - blend
     result = {"hop": names[entry.hop], "frame": last - entry.offset, "stay_hop": entry.stay_hop, "cost": found.cost}
-    assert found.alignment.offset is not None, "a connection stands at an offset"
-    steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.alignment.offset, blend)]
+    steps = [Step(0, entry.hop, entry.offset, blend), Step(entry.stay_hop, 1, found.offset, blend)]
     words = f"hop {result['hop']} from its frame {result['frame']}, stay {entry.stay_hop}; cost {found.cost:.4g}"
     show_played(play_steps(loaded, 0, last, steps), names, out, result, [words])
 

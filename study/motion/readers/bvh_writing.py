@@ -24,10 +24,8 @@ def write_bvh(clip: Clip, path: Path | str, *, metres_per_unit: float | None = N
 
     Parameters
     ----------
-    clip
-        What to write; channels are `Zrotation Yrotation Xrotation`, in degrees.
-    path
-        The file; one that is there is replaced.
+    clip, path
+        What to write, with channels `Zrotation Yrotation Xrotation`, in degrees; the file, replaced if it is there.
     metres_per_unit
         The length unit to write; by default that of the file which the clip was read from, and centimetres for clips
         that were read from none.

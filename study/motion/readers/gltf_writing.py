@@ -18,8 +18,7 @@ from study import __version__
 from study.arrays import FloatArray, IntArray
 from study.errors import MotionError
 from study.files import write_whole
-from study.motion.clip import Clip, joint_positions
-from study.motion.quaternions import IDENTITY
+from study.motion.clip import Clip, rest_positions
 from study.motion.readers.gltf import END
 from study.motion.readers.gltf_file import pack
 from study.motion.readers.rigid import unique
@@ -52,8 +51,7 @@ def write_glb(clips: Mapping[str, Clip], path: Path | str) -> None:
     if skeleton is None or any(clip.skeleton is not skeleton for clip in clips.values()):
         raise MotionError(f"Expected clips on one skeleton to write, found {len(clips)}, or other skeletons.")
     file = _File()
-    still = Clip(skeleton, np.zeros((1, 3)), np.tile(IDENTITY, (1, skeleton.joints, 1)), 1.0)
-    rest = joint_positions(still, ends=True)[0]
+    rest = rest_positions(skeleton, ends=True)
     rest[:, 1] -= rest[:, 1].min()
     names = unique([*skeleton.names, *(skeleton.names[parent] + END for parent in skeleton.end_parents)])
     parents = np.concatenate([skeleton.parents, skeleton.end_parents])

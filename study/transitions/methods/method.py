@@ -102,6 +102,10 @@ class Room:
     stay: int = 0
     after: int = 0
 
+    def with_one_before(self) -> Room:
+        """The same with one frame of each motion before its window."""
+        return replace(self, blend=self.blend + 1, search=self.search + 1, entry=max(self.entry, 1))
+
 
 @dataclass(frozen=True, eq=False)
 class Made:

@@ -171,7 +171,7 @@ class _Search:
         for left in range(self.hops, 0, -1):
             to_go = self.to_go[left - 1]
             longest = self.problem.settings.longest_stay_hop if steps else self.problem.settings.longest_stay_source
-            if steps and self._best_last(clip, frame, time) == owed:
+            if steps and self.to_go[0][clip].counts[time - self.times.start, frame] == owed:
                 break
             best = (FORBIDDEN, 0, 0, 0, 0)
             for stay in range(longest + 1):
@@ -195,9 +195,6 @@ class _Search:
         steps.append(Step(stay, self.switch.destination, self.offset, self.blend))
         return Chain(total * self.problem.distance.unit, tuple(steps))
 
-    def _best_last(self, clip: int, frame: int, time: int) -> int:
-        return int(self.to_go[0][clip].counts[time - self.times.start, frame])
-
     def _last_stay(self, clip: int, frame: int, time: int, owed: int) -> int:
         """The shortest stay with which the last blend costs what it must."""
         if clip == self.switch.destination and frame == time:
@@ -210,8 +207,7 @@ class _Search:
         raise AssertionError("the value table and the distances disagree")
 
     def _place(self, where: int) -> tuple[int, int]:
-        for hop in self.used:
-            if where < self.windows[hop]:
-                return hop, where
-            where -= self.windows[hop]
-        raise AssertionError("a column beyond all hops")
+        """The hop, and its frame, of a column of all hops side by side."""
+        starts = np.cumsum([0, *(self.windows[hop] for hop in self.used)])
+        number = int(np.searchsorted(starts, where, side="right")) - 1
+        return self.used[number], where - int(starts[number])

@@ -11,7 +11,7 @@ import numpy as np
 
 from study.counting import counted
 from study.errors import TransitionError
-from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem
+from study.transitions.one_hop.problem import FORBIDDEN, Problem
 from study.transitions.one_hop.table import Entry
 
 
@@ -21,8 +21,8 @@ class Connection:
 
     entry: Entry
     """The hop, its offset on the source's timeline, no stay in the source, and the stay in the hop."""
-    alignment: Alignment
-    """Where the destination then stands: its frame 0 at the start of the second blend."""
+    offset: int
+    """The source's frame at which the second blend starts, with the destination's frame 0."""
     cost: float
     """Eq. 2, in the distance's cost."""
 
@@ -74,5 +74,4 @@ def connect(problem: Problem, source: int, destination: int) -> Connection:
     if best is None:
         raise TransitionError(f"Expected a hop of at least {2 * blend} frames, two blends, found none. Add clips.")
     cost, hop, frame, stay = best
-    alignment = Alignment(offset=last + blend + stay)
-    return Connection(Entry(hop, last - frame, 0, stay), alignment, cost * distance.unit)
+    return Connection(Entry(hop, last - frame, 0, stay), last + blend + stay, cost * distance.unit)

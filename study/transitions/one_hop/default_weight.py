@@ -48,10 +48,8 @@ def default_weight(
     ----------
     clips
         The clips that transitions are made between and that may be hops.
-    rng
-        Draws the conditions.
-    conditions
-        How many (2019: 100).
+    rng, conditions
+        Draws the conditions, so many (2019: 100).
     settings
         Blend and longest stays (2019: 30 and 60 frames at 60 fps); the paper's at the clips' frame rate unless given.
         Where blends may have several lengths, what the stays gain is that of the fixed length.

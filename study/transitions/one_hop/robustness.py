@@ -48,27 +48,12 @@ class Costs:
 
 
 def robustness_set(clips: Sequence[Clip], settings: Settings, count: int = COUNT) -> tuple[Switch, ...]:
-    """Transitions at triggered frames a fixed interval apart.
+    """So many transitions (2019: 15) at triggered frames a fixed interval apart, between two clips or more, in order.
 
-    Parameters
-    ----------
-    clips
-        At least two, in a given order.
-    settings
-        Blend and stays: only frames are used from which a transition with all its stays fits in both clips.
-    count
-        How many (2019: 15).
-
-    Returns
-    -------
-    The usable frames of all clips, one after the other, give up `count` frames at equal distances, the first half an
-    interval from the start. Each is a trigger to go to the next clip (from the last one to the first), which at
-    that moment is as far, in parts of its own usable frames, as the source.
-
-    Raises
-    ------
-    TransitionError
-        Where a clip is too short for even one such frame.
+    Frames are usable from which a transition with all its stays fits in both clips; those of all clips, one after the
+    other, give up `count` frames at equal distances, the first half an interval from the start. Each is a trigger to go
+    to the next clip (from the last one to the first), which at that moment is as far, in parts of its own usable
+    frames, as the source. `TransitionError` where a clip is too short for even one such frame.
     """
     needed = 2 * settings.blend_frames + settings.longest_stay_source + settings.longest_stay_hop
     usable = [clip.frames - needed + 1 for clip in clips]

@@ -104,20 +104,8 @@ class Table:
 def second_leg(to_hop: Table, times: range, frames: range, longest_stay: int, weight: int) -> Table:
     """The best stay in the hop and blend into the destination, from every (destination frame, hop frame).
 
-    Parameters
-    ----------
-    to_hop
-        Costs of blends between the destination (rows) and the hop (columns), by the frames where they start.
-    times, frames
-        The destination's and the hop's frames at the end of the first blend.
-    longest_stay
-        The most frames to stay.
-    weight
-        Counts a frame of stay.
-
-    Returns
-    -------
-    For each pair `(e, v)` the least of `to_hop[e + s, v + s] + weight * s` over the stays `s`.
+    For each pair `(e, v)` of `times` and `frames`, the destination's and the hop's frames at the end of the first
+    blend, it is the least of `to_hop[e + s, v + s] + weight * s` over the stays `s` up to `longest_stay`.
 
     Notes
     -----
@@ -169,34 +157,12 @@ def stays_in_hop(to_hop: Table, times: IntArray, frames: IntArray, longest: IntA
     return stays
 
 
-def row_minima(first: CountArray, second: CountArray) -> CountArray:
-    """`min(first + second)` along the rows, in blocks that stay in cache; `second` may be a single row."""
-    out = np.empty(len(first), dtype=np.int32)
-    work = np.empty((min(_ROWS, len(first)), first.shape[1]), dtype=np.int32)
-    for top in range(0, len(first), _ROWS):
-        rows = slice(top, min(top + _ROWS, len(first)))
-        total = np.add(first[rows], second[rows] if len(second) > 1 else second, out=work[: rows.stop - top])
-        total.min(axis=1, out=out[rows])
-    return out
-
-
 def minima_with_fixed_alignment(first: Table, second: Table, frames: range, shift: int) -> CountArray:
-    """For each source frame the least sum of both legs over the hop's frames.
+    """For each source frame the least sum of both legs over the hop's frames, `(len(frames),)` counts.
 
-    Parameters
-    ----------
-    first
-        First legs by (source frame, hop frame) where the first blend starts.
-    second
-        Second legs by (destination frame, hop frame) where it ends.
-    frames
-        Source frames at which the first blend may start.
-    shift
-        The destination's frame at the end of the first blend, less the source's frame at its start.
-
-    Returns
-    -------
-    (len(frames),) counts.
+    `first` are legs by (source frame, hop frame) where the first blend starts, `second` by (destination frame, hop
+    frame) where it ends, `frames` the source frames at which it may start, and `shift` the destination's frame at its
+    end, less the source's at its start.
     """
     top = max(frames.start, first.first_row, second.first_row - shift)
     bottom = min(first.first_row + len(first.counts), second.first_row + len(second.counts) - shift, frames.stop)
@@ -204,29 +170,19 @@ def minima_with_fixed_alignment(first: Table, second: Table, frames: range, shif
     if top < bottom:
         left = first.counts[top - first.first_row : bottom - first.first_row]
         right = second.counts[top + shift - second.first_row : bottom + shift - second.first_row]
-        out[top - frames.start : bottom - frames.start] = row_minima(left, right)
+        work = np.empty((min(_ROWS, len(left)), left.shape[1]), dtype=np.int32)
+        for row in range(0, len(left), _ROWS):  # in blocks that stay in cache
+            total = np.add(left[row : row + _ROWS], right[row : row + _ROWS], out=work[: len(left) - row])
+            total.min(axis=1, out=out[top - frames.start + row :][: len(total)])
     return out
 
 
 def minima_by_stay(first: Table, second: CountArray, triggers: range, weight: int, limit: CountArray) -> CountArray:
     """For each triggered frame and stay in the source the least sum of both legs, where it may matter.
 
-    Parameters
-    ----------
-    first
-        First legs by (source frame, hop frame).
-    second : (stays, hop frames)
-        Second legs by stay in the source, which gives the destination's frame.
-    triggers
-        Triggered frames.
-    weight
-        Counts a frame of stay.
-    limit : (triggers,)
-        The best cost known so far; higher costs are skipped.
-
-    Returns
-    -------
-    (triggers, stays) counts, stays not yet paid for; `FORBIDDEN` where the sum with its stay exceeds the best.
+    `first` are legs by (source frame, hop frame), `second (stays, hop frames)` by the stay in the source, which gives
+    the destination's frame, and `limit (triggers,)` the best costs known so far. It gives `(triggers, stays)` counts,
+    stays not yet paid for; `FORBIDDEN` where the sum with its stay exceeds the best.
 
     Notes
     -----

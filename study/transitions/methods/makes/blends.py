@@ -155,8 +155,7 @@ class Registered(Interpolating):
 
     def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
         """One frame of each clip before its window."""
-        room = super().room(length, fps, longest_frames)
-        return replace(room, blend=room.blend + 1, search=room.search + 1, entry=max(room.entry, 1))
+        return super().room(length, fps, longest_frames).with_one_before()
 
 
 class Warped(Interpolating):

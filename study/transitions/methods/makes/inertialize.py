@@ -89,8 +89,7 @@ class Switching(CleaningFeet):
 
     def room(self, length: Length, fps: float, longest_frames: int | None) -> Room:
         """One frame of each clip before the switch, which says how fast it moves."""
-        room = super().room(length, fps, longest_frames)
-        return replace(room, blend=room.blend + 1, search=room.search + 1, entry=max(room.entry, 1))
+        return super().room(length, fps, longest_frames).with_one_before()
 
 
 class InertializeQuintic(Switching):
