@@ -23,6 +23,7 @@ from study.apps.cli import run
 from study.errors import TransitionError
 from study.motion.clip import Clip, joint_positions, moved, retarget
 from study.motion.library import Library, open_library
+from study.motion.readers.bvh_writing import write_bvh
 from study.motion.readers.registry import read_clip
 from study.transitions.blending import blend, blend_weights
 from study.transitions.engines.export import Advised, export, read_advice
@@ -137,6 +138,20 @@ def test_the_verb_takes_what_advise_and_one_hop_write(capsys: pytest.CaptureFixt
     assert run(["one-hop", "show", str(out / "one_hop.bin")]) == 0
     assert run(["export-engine", str(found), "walk", "--out", str(out)]) == 2
     assert "expected 2 clips (walk, run), found 1" in capsys.readouterr().err
+
+
+def test_states_of_files_have_the_files_names(tmp_path: Path) -> None:
+    files = {name: tmp_path / "moves" / f"{name}.bvh" for name in ("slow", "quick")}
+    for name, file in files.items():
+        write_bvh(make_walk(80, cadence=1.4 if name == "quick" else 1.0), file)
+    row = {**ROW, "source": str(files["slow"]), "destination": str(files["quick"]), "make": "dead-blend",
+           "start_frame": 30, "end_frame": 40, "blend_frames": 8}  # fmt: skip
+    (tmp_path / "advice.json").write_text(json.dumps({"fps": 30, "advice": [row]}))
+    assert run(["export-engine", str(tmp_path / "advice.json"), "--out", str(tmp_path / "game")]) == 0
+    machine = json.loads((tmp_path / "game" / "state_machine.json").read_text())
+    assert [state["name"] for state in machine["states"]] == ["slow", "quick"]
+    (one,) = machine["transitions"]
+    assert (one["source"], one["destination"], one["animation"]) == ("slow", "quick", "slow to quick")
 
 
 @pytest.mark.parametrize(

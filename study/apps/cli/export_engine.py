@@ -26,6 +26,7 @@ def export_engine(found: Path, clips: tuple[str, ...], library: str | None, out:
     The clips are those that the file names, in its order (default: found by these names, in --library).
     """
     import json
+    from dataclasses import replace
 
     from study.errors import TransitionError
     from study.files import read_text
@@ -49,7 +50,10 @@ def export_engine(found: Path, clips: tuple[str, ...], library: str | None, out:
         raise click.UsageError(f"expected {counted(len(names), 'clip')} ({', '.join(names)}), found {len(clips)}.")
     loaded = load_clips(clips or names, library, fps)
     shown = load_clips(clips or names, library, None) if native else loaded
-    machine = export(out, dict(zip(names, loaded, strict=True)), shown, advice, table)
+    # Advice names files by their paths; states have the files' names.
+    states = dict(zip(names, names if table else (clip.name for clip in loaded), strict=True))
+    advice = [replace(row, source=states[row.source], destination=states[row.destination]) for row in advice]
+    machine = export(out, dict(zip(states.values(), loaded, strict=True)), shown, advice, table)
     result = {"folder": str(out), "states": machine["states"], "transitions": len(machine["transitions"])}
     transitions = f"{len(table.rows)} in a one-hop table" if table else counted(len(advice), "transition")
     emit(result, f"{out}: {counted(len(names), 'animation')}, {transitions}")
