@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from study.arrays import FloatArray, IntArray
 from study.counting import counted
 from study.errors import TransitionError
+from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.transitions.blend_length import joint_speeds, length_range
-from study.transitions.distances import distance_matrix, joint_differences, on_joints_of
+from study.transitions.distances import distance_matrix, on_joints_of
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 
 # Numbers held at once: 64 MB of them.
@@ -65,7 +66,7 @@ def velocity_lengths(
     block = max(1, _BLOCK // (16 * len(joints)))
     for at in range(0, len(starts), block):
         i, j = starts[at : at + block], ends[at : at + block]
-        differences = joint_differences(source.rotations[i][:, joints], destination.rotations[j][:, joints])
+        differences = quat.half_angle_between(source.rotations[i][:, joints], destination.rotations[j][:, joints])
         most = np.argmax(differences, axis=1)
         rows = np.arange(len(i))
         speed = 0.5 * (speeds[0][i, most] + speeds[1][j, most])

@@ -18,7 +18,7 @@ from study.counting import counted
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, trim
-from study.transitions.distances import frame_distance, half_angle_squares, joint_differences
+from study.transitions.distances import frame_distance, half_angle_squares
 from study.transitions.weights import MAJOR_ROLES, joint_weights
 from study.transitions.windows import held, joined_at, longest_available, shortfall, window
 
@@ -253,7 +253,9 @@ def _anti_diagonals(size: int) -> tuple[IntArray, IntArray]:
 def major_joint_differences(source: Clip, destination: Clip, start_frame: int, end_frame: int) -> dict[str, float]:
     """Half angle between start and end frame for each major joint, by role (2004 Eq. 3 and Table 1)."""
     joints = [source.skeleton.role(role) for role in MAJOR_ROLES]
-    differences = joint_differences(source.rotations[start_frame, joints], destination.rotations[end_frame, joints])
+    differences = quat.half_angle_between(
+        source.rotations[start_frame, joints], destination.rotations[end_frame, joints]
+    )
     return {role: float(value) for role, value in zip(MAJOR_ROLES, differences, strict=True)}
 
 

@@ -229,10 +229,8 @@ def join(
         What is mixed; `len(share) + 2` poses each.
     source_frames, destination_frames
         The frames of each clip that the stretches cover, as slices count them; the rest before and after is kept.
-    share : (blend_frames,)
-        The destination's share in the root.
-    shares : (blend_frames, joints)
-        The destination's share in each joint.
+    share, shares : (blend_frames,), (blend_frames, joints)
+        The destination's share in the root and in each joint.
     note
         What is done, in words.
     """

@@ -1,4 +1,4 @@
-"""How far two poses are apart: the weighted joint geodesic of Wang & Bodenheimer 2004, Eq. 2, and Eq. 3 by joint.
+"""How far two poses are apart: the weighted joint geodesic of Wang & Bodenheimer 2004, Eq. 2.
 
 In: joint rotations `(..., joints, 4)` and weights `(joints,)`. Out: costs. The logarithm is the half angle, so a
 joint that differs by a straight angle is pi/2 away. Everything here compares local rotations only: turning or
@@ -15,27 +15,14 @@ from study.motion import quaternions as quat
 from study.motion.clip import Clip, retarget
 
 
-def joint_differences(a: FloatArray, b: FloatArray) -> FloatArray:
-    """`||log(q_b^-1 q_a)||` of each joint (2004 Eq. 3), half angles: `(..., joints, 4)` to `(..., joints)`."""
-    return quat.half_angle_between(a, b)
-
-
 def frame_distance(a: FloatArray, b: FloatArray, weights: FloatArray) -> FloatArray:
-    """The difference of two frames (2004 Eq. 2).
+    """The difference of two frames (2004 Eq. 2): sums `(...)` over the joints of weight times squared half angle.
 
-    Parameters
-    ----------
-    a, b : (..., joints, 4)
-        Joint rotations; leading axes broadcast.
-    weights : (joints,)
-        From `joint_weights`.
-
-    Returns
-    -------
-    (...) sums over the joints of weight times squared half angle.
+    `a` and `b (..., joints, 4)` are joint rotations, whose leading axes broadcast, `weights (joints,)` those of
+    `joint_weights`.
     """
     used = np.flatnonzero(weights)
-    differences = joint_differences(a[..., used, :], b[..., used, :])
+    differences = quat.half_angle_between(a[..., used, :], b[..., used, :])
     return np.asarray((differences**2) @ weights[used])
 
 

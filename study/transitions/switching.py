@@ -116,18 +116,17 @@ def spring_s(halflife_s: float) -> float:
 class Extrapolation:
     """How dead blending moves the source on: velocities halve in a time of their own, about each axis of each joint.
 
-    It is `scale_s` times the seconds in which the velocity would cover the way to the destination, within `shortest_s`
-    and `longest_s`: long where the source already goes there, short where it goes elsewhere or quickly.
+    It is the seconds in which the velocity would cover the way to the destination, within `shortest_s` and `longest_s`:
+    long where the source already goes there, short where it goes elsewhere or quickly.
     """
 
-    scale_s: float = 1.0
     shortest_s: float = 0.05
     longest_s: float = 1.0
 
     def halflives(self, offset: FloatArray, velocity: FloatArray) -> FloatArray:
         """Seconds, for ways to the destination and velocities of one shape."""
         quick = np.where(np.abs(velocity) < 1e-6, np.where(velocity < 0.0, -1e-6, 1e-6), velocity)
-        return np.clip(self.scale_s * offset / quick, self.shortest_s, self.longest_s)
+        return np.clip(offset / quick, self.shortest_s, self.longest_s)
 
     def moved(self, offset: FloatArray, velocity: FloatArray, times: FloatArray) -> FloatArray:
         """How far the source has moved on `(t, ..., n)`: `v / c (1 - exp(-c t))` with `c = ln 2 / halflife`."""

@@ -92,16 +92,9 @@ def lengths_at(fps: float, usual: int) -> tuple[int, ...]:
 def adaptive(problem: Problem) -> Problem:
     """The problem with blends of their own length.
 
-    Parameters
-    ----------
-    problem
-        With the paper's blends of one length, which is the one whose cost stays as it is. Where its settings have no
-        `lengths`, they are those of `lengths_at`, among them the fixed one: then no transition costs more than with it.
-
-    Raises
-    ------
-    MotionError
-        Where the rig lacks joints by which the motion's own time is told.
+    A problem with the paper's blends of one length, which is the one whose cost stays as it is. Where its settings have
+    no `lengths`, they are those of `lengths_at`, among them the fixed one: then no transition costs more than with it.
+    `MotionError` where the rig lacks joints by which the motion's own time is told.
     """
     settings = problem.settings
     usual = settings.blend_frames

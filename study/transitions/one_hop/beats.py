@@ -89,17 +89,9 @@ def find_beats(clip: Clip) -> IntArray:
 def beat_offsets(source_beats: IntArray, hop_beats: IntArray, tolerance: int = 1) -> IntArray:
     """The offsets at which a hop's beats fall on the source's, ascending (section 4.4).
 
-    Parameters
-    ----------
-    source_beats, hop_beats
-        Frames of both clips.
-    tolerance
-        How many frames apart two beats may be and still count as one.
-
-    Returns
-    -------
-    Every offset that puts a hop's beat on a beat of the source, and at which all other beats that fall between the
-    source's first and last beat are on one, too. None at all where the tempi differ.
+    From the frames of both clips' beats, every offset that puts a hop's beat on a beat of the source, and at which all
+    other beats that fall between the source's first and last beat are on one, too; none at all where the tempi differ.
+    Beats up to `tolerance` frames apart count as one.
     """
     source_beats, hop_beats = np.unique(source_beats), np.unique(hop_beats)
     if not len(source_beats) or not len(hop_beats):
@@ -136,14 +128,7 @@ def all_beat_offsets(
 def genre_costs(genres: Sequence[str], target: str, cost: float, distance: Distance) -> dict[int, int]:
     """`Problem.hop_costs` for a genre-aware search (Eq. 6).
 
-    Parameters
-    ----------
-    genres
-        The genre of each clip.
-    target
-        The genre to stay in.
-    cost
-        `c` of Eq. 6, in the distance's cost.
+    `genres` are those of the clips, `target` is the one to stay in, `cost` the `c` of Eq. 6, in the distance's cost.
     """
     if target not in genres:
         raise TransitionError(f"Expected one of the clips' genres ({', '.join(sorted(set(genres)))}), got {target!r}.")

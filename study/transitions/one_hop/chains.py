@@ -41,20 +41,16 @@ def find_chains(
 ) -> tuple[Chain | None, ...]:
     """The best transition through at most n hops, for each triggered frame of a switch.
 
+    One for each triggered frame; None where none fits. With one hop the costs are those of `build_table`, and more hops
+    never cost more.
+
     Parameters
     ----------
     problem, switch
-        What is asked; the destination's alignment must be an offset (music), and stays have no bound together. Offsets
-        and costs of hops are not looked at.
-    hops
-        The most hops, at least 1.
-    memory_bytes
-        The most memory for the distances.
-
-    Returns
-    -------
-    One for each triggered frame; None where none fits. With one hop the costs are those of `build_table`, and more hops
-    never cost more.
+        What is asked; the destination's alignment must be an offset (music), and neither stays nor single hops have
+        bounds or costs of their own.
+    hops, memory_bytes
+        The most hops, at least 1, and the most memory for the distances.
 
     Raises
     ------
