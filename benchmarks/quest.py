@@ -20,7 +20,7 @@ import numpy as np
 
 from study.models.quest_plus import QuestPlus, QuestRule
 
-RULE = QuestRule("same-different", tuple(range(1, 21)), 8.0, 0.8, 2.0, 1.0, 0.1, 1, 100, 1.0)
+RULE = QuestRule("same-different", tuple(range(1, 21)), 8.0, 0.8, 2.0, 1.0, 0.1, 0.45, 1, 100, 1.0)
 CONSTANT = {"shorter": (5, 10, 15), "longer": (5, 10, 20)}
 DELTA = 2.5498586
 """d' at which an observer with the best criterion is right in 75% of the pairs, by scipy's normal distribution."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
-from study.analysis.oddity.analyse import Oddity, analyse_oddity
+from study.analysis.oddity.analyse import Oddity, TwoAlternatives, analyse_forced
 from study.analysis.preference.analyse import Preference, analyse_preference
 from study.analysis.ratings.analyse import PairRatings, Ratings, analyse_ratings
 from study.analysis.same_different.analyse import SameDifferent, analyse_same_different
@@ -15,7 +16,8 @@ ANALYSES: Mapping[str, TaskAnalysis] = {
     "same-different": TaskAnalysis(analyse_same_different, (SameDifferent,)),
     "preference": TaskAnalysis(analyse_preference, (Preference,)),
     "rating": TaskAnalysis(analyse_ratings, (Ratings, PairRatings)),
-    "oddity": TaskAnalysis(analyse_oddity, (Oddity,)),
+    "oddity": TaskAnalysis(partial(analyse_forced, Oddity), (Oddity,)),
+    "2afc": TaskAnalysis(partial(analyse_forced, TwoAlternatives), (TwoAlternatives,)),
 }
 
 

@@ -68,6 +68,7 @@ class Study(NamedTuple):
 OF_TASK: Mapping[str, Study] = {
     "same-different": Study("How noticeable is the length of a blend?", _LEVELS, (-3, -2, -1, 0, 1, 2, 4)),
     "oddity": Study("Which of three blends has another length?", _LEVELS, (-3, -2, -1, 1, 2, 4)),
+    "2afc": Study("Which of two blends is longer?", _LEVELS, (-3, -2, -1, 1, 2, 4)),
     "preference": Study(
         "Does a blend of the geodesic length look more natural than one of ten frames?",
         _METHODS + 'order = "balanced"  # half of the pairs in each order\n',

@@ -13,7 +13,7 @@ import numpy as np
 from study.arrays import FloatArray
 from study.errors import SessionError
 from study.models.differencing import detected
-from study.models.oddity import CHANCE, oddity_correct
+from study.models.forced import Forced
 
 LEAST_CRITERION = 0.2
 """No participant's criterion lies below this: at 0 a person would say "different" always."""
@@ -42,10 +42,11 @@ def probability_different(observer: SameDifferentObserver, difference_frames: fl
     return _with_lapses(detected(_d_prime(observer, difference_frames), observer.criterion), observer.lapse)
 
 
-def probability_odd_found(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
-    """Probability that one observer finds which of three differs, in the shape of the differences."""
-    seen = oddity_correct(_d_prime(observer, difference_frames))
-    return np.asarray(observer.lapse * CHANCE + (1 - observer.lapse) * seen)
+def probability_found(
+    forced: Forced, observer: SameDifferentObserver, difference_frames: float | FloatArray
+) -> FloatArray:
+    """Probability that one observer is right in a forced choice, in the shape of the differences."""
+    return forced.with_lapses(_d_prime(observer, difference_frames), observer.lapse)
 
 
 def visibility(observer: SameDifferentObserver, difference_frames: float) -> float:

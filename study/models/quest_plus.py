@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import ClassVar
 
 import numpy as np
 
 from study.arrays import FloatArray, IntArray
 from study.models.differencing import criterion_free_delta, detected
-from study.models.oddity import CHANCE, HALFWAY, d_prime_of, oddity_correct
+from study.models.forced import FORCED, Forced
 from study.models.population import LEAST_CRITERION
 from study.models.tracks import Found, Rule
 
@@ -136,7 +136,7 @@ class QuestRule(Rule):
 
     title: ClassVar[str] = "QUEST+ track"
     task: str
-    """`same-different`: the differencing model; the threshold is criterion-free. `oddity`: which of three differs."""
+    """`same-different`: the differencing model; the threshold is criterion-free. Else one of `FORCED`."""
     levels: tuple[int, ...]
     """The differences that may be asked, in frames, from the least."""
     threshold_frames: float
@@ -147,6 +147,9 @@ class QuestRule(Rule):
     """`criterion`, `criterion_spread`: mean and standard deviation of the prior, for same-different."""
     most_lapses: float
     """Lapse rates up to this are as likely as one another."""
+    slope_spread: float
+    """In forced choices d' grows with the difference to a power; its median is 1, this its natural logarithm's
+    standard deviation."""
     least_trials: int
     trials: int
     narrow: float
@@ -218,7 +221,8 @@ class Deciding:
     """The share of right answers at threshold; with a criterion, that of an observer with the best one."""
     has_criterion: bool
     right: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-    """Chances of right answers, given the difference over the threshold (0 for none), the criterion, the lapse rate."""
+    """Chances of right answers, given the difference over the threshold (0 for none), the criterion or else the slope,
+    and the lapse rate."""
 
 
 def _same_different(over: FloatArray, criterion: FloatArray, lapse: FloatArray) -> FloatArray:
@@ -226,44 +230,51 @@ def _same_different(over: FloatArray, criterion: FloatArray, lapse: FloatArray) 
     return np.where(over > 0, different, 1 - different)
 
 
-def _oddity(over: FloatArray, _criterion: FloatArray, lapse: FloatArray) -> FloatArray:
-    d_prime = d_prime_of(HALFWAY)
-    assert d_prime is not None
-    return lapse * CHANCE + (1 - lapse) * oddity_correct(d_prime * over)
+def _forced(forced: Forced, over: FloatArray, slope: FloatArray, lapse: FloatArray) -> FloatArray:
+    return forced.with_lapses(forced.at_threshold * over**slope, lapse)
 
 
 DECIDING = {
     "same-different": Deciding(0.75, True, _same_different),
-    "oddity": Deciding(HALFWAY, False, _oddity),
+    **{name: Deciding(forced.halfway, False, partial(_forced, forced)) for name, forced in FORCED.items()},
 }
 """By the task."""
 
-THRESHOLDS, CRITERIA, LAPSES = 41, 19, 5
+THRESHOLDS, CRITERIA, SLOPES, LAPSES = 41, 19, 9, 5
 WIDE, STRICTEST = 3.0, 5.0
 """`WIDE`: standard deviations of its prior that the threshold's grid goes on either side; `STRICTEST`: those that the
 criterion's goes up, since strict participants say little of theirs and an interval must not end where the grid does."""
 LOOSE = 4.0
-"""In intervals the prior of the criterion counts as if it were so many times as wide. As it is, it says more than most
-answers do: intervals of participants who are stricter than it says held 99% of the thresholds instead of 95%. Without
-it they would be too short of participants who never lapse."""
+"""In intervals the prior of criterion or slope counts as if it were so many times as wide. As it is, it says more than
+most answers do: intervals of participants who are stricter than it says held 99% of the thresholds instead of 95%.
+Without it they would be too short of participants who never lapse."""
 
 
 @lru_cache(maxsize=64)
 def _grid(rule: QuestRule) -> QuestPlus:
-    """The grid of a rule: the logarithm of the threshold, the criterion where there is one, the lapse rate."""
+    """The grid of a rule: the logarithm of the threshold, the criterion or else the slope, the lapse rate."""
     steps = np.linspace(-WIDE, WIDE, THRESHOLDS)
     logs = np.log(rule.threshold_frames) + rule.threshold_spread * steps
     lapses = np.linspace(0, rule.most_lapses, LAPSES)
-    criteria = np.array([rule.criterion])
-    if DECIDING[rule.task].has_criterion:
-        low, high = (rule.criterion + rule.criterion_spread * ends for ends in (-2.5, STRICTEST))
-        criteria = np.linspace(max(low, LEAST_CRITERION), high, CRITERIA)
-    threshold, criterion, lapse = (part.ravel() for part in np.meshgrid(np.exp(logs), criteria, lapses, indexing="ij"))
+    others, off = _criteria(rule) if DECIDING[rule.task].has_criterion else _slopes(rule)
+    threshold, other, lapse = (part.ravel() for part in np.meshgrid(np.exp(logs), others, lapses, indexing="ij"))
     frames = np.array([0, *rule.levels], dtype=np.float64)[:, None]
-    right = DECIDING[rule.task].right(frames / threshold, criterion, lapse)
-    prior = np.exp(-0.5 * (((np.log(threshold) - logs.mean()) / rule.threshold_spread) ** 2))
-    prior *= np.exp(-0.5 * ((criterion - rule.criterion) / rule.criterion_spread) ** 2)
-    return QuestPlus((logs, criteria, lapses), np.clip(right, 1e-9, 1 - 1e-9), prior / prior.sum())
+    right = DECIDING[rule.task].right(frames / threshold, other, lapse)
+    prior = np.exp(-0.5 * (steps[:, None, None] ** 2 + off[:, None] ** 2 + 0 * lapses)).ravel()
+    return QuestPlus((logs, others, lapses), np.clip(right, 1e-9, 1 - 1e-9), prior / prior.sum())
+
+
+def _criteria(rule: QuestRule) -> tuple[FloatArray, FloatArray]:
+    """Values, and how many standard deviations of the prior they are off its middle."""
+    low, high = (rule.criterion + rule.criterion_spread * end for end in (-2.5, STRICTEST))
+    criteria = np.linspace(max(low, LEAST_CRITERION), high, CRITERIA)
+    return criteria, (criteria - rule.criterion) / rule.criterion_spread
+
+
+def _slopes(rule: QuestRule) -> tuple[FloatArray, FloatArray]:
+    """Likewise; one value where no other is likely."""
+    off = np.linspace(-WIDE, WIDE, SLOPES) if rule.slope_spread else np.zeros(1)
+    return np.exp(rule.slope_spread * off), off
 
 
 @lru_cache(maxsize=20_000)
@@ -275,8 +286,9 @@ def _summary(rule: QuestRule, right: tuple[int, ...], wrong: tuple[int, ...]) ->
     told = np.round(quest.information_on(0, posterior)[1:], ROUNDED)
     mass, frames = quest.marginal(posterior, 0), np.exp(quest.axes[0])
     spread = float(np.sqrt(mass @ frames**2 - (mass @ frames) ** 2))
-    loose = -0.5 * ((quest.axes[1] - rule.criterion) / (LOOSE * rule.criterion_spread)) ** 2
-    likely = quest.likelihood(*counts) + np.tile(np.repeat(loose, len(quest.axes[2])), len(frames))
+    off = (_criteria if DECIDING[rule.task].has_criterion else _slopes)(rule)[1]
+    loose = np.repeat(-0.5 * (off / LOOSE) ** 2, len(quest.axes[2]))
+    likely = quest.likelihood(*counts) + np.tile(loose, len(frames))
     ends = likelihood_interval(quest.axes[0], quest.profile(likely, 0))
     middle, low, high = map(float, np.exp([median(quest.axes[0], mass), *ends]))
     return rule.levels[int(np.argmax(told))], Found(middle, spread, low, high)

@@ -124,6 +124,8 @@ class Effect:
     """Whether a study takes so long that fewer are simulated."""
     answers: Callable[[Design], int] = lambda design: len(design.trials()[0])
     """How many trials of the study a participant answers, on average."""
+    beside: Callable[[Design], str] = lambda _: ""
+    """What another procedure would take, in words."""
 
 
 def motions_of(trials: Sequence[Sequence[Trial]]) -> FloatArray:

@@ -92,7 +92,7 @@ def plan_power(
         points=found.points,
         target=found.target,
         needed=found.needed,
-        note=found.note,
+        note="; ".join(filter(None, (found.note, effect.beside(design)))),
         simulations=studies,
         through="whole sessions" if options["sessions"] else "plan, observers, exclusions and default test",
         seed=options["seed"],

@@ -8,7 +8,7 @@ from study.errors import AnalysisError
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.power.design import Effect
-from study.power.oddity import oddity_effect
+from study.power.oddity import forced_effect
 from study.power.preference import preference_effect
 from study.power.ratings import rating_effect
 from study.power.same_different import same_different_effect
@@ -21,7 +21,8 @@ EFFECTS: Mapping[str, Make] = {
     "same-different": same_different_effect,
     "preference": preference_effect,
     "rating": rating_effect,
-    "oddity": oddity_effect,
+    "oddity": forced_effect,
+    "2afc": forced_effect,
 }
 
 OF_PROCEDURES: Mapping[str, Make] = {"staircase": staircase_effect, "quest-plus": staircase_effect}

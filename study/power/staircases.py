@@ -7,38 +7,41 @@ their responses as it reads stored ones. How tracks are interleaved changes noth
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
 
 from study.analysis.analyse import Analysis
 from study.analysis.exclusions import exclude
-from study.analysis.oddity.analyse import Oddity
+from study.analysis.oddity.analyse import ForcedChoice
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import SIGNS
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.arrays import BoolArray, FloatArray
+from study.counting import counted
 from study.errors import AnalysisError
 from study.experiment.observers import person
+from study.experiment.procedures.interleaved import SIGNS as SIGNS_OF
 from study.experiment.procedures.interleaved import Interleaving
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
-from study.models.oddity import CHANCE
-from study.models.population import SameDifferentObserver, probability_different, probability_odd_found
+from study.models.forced import FORCED
+from study.models.population import SameDifferentObserver, probability_different, probability_found
+from study.models.quest_plus import Asked, QuestRule
 from study.power.curve import Run
 from study.power.design import Design, Effect, times
-from study.power.oddity import oddity_observer
+from study.power.oddity import forced_observer
 from study.power.same_different import narrow, same_different_observer, threshold_numbers
 from study.tasks.observer import ObserverSettings
 
 OBSERVERS: Mapping[str, Callable[[float, float, float, float], ObserverSettings]] = {
     "same-different": same_different_observer,
-    "oddity": oddity_observer,
+    **{name: partial(forced_observer, forced) for name, forced in FORCED.items()},
 }
 RIGHT: Mapping[str, tuple[Callable[[SameDifferentObserver, FloatArray], FloatArray], float]] = {
     "same-different": (probability_different, 0.5),
-    "oddity": (probability_odd_found, CHANCE),
+    **{name: (partial(probability_found, forced), forced.chance) for name, forced in FORCED.items()},
 }
 """The probability of a right response by the difference, and what it is for an observer who does not know."""
 
@@ -59,12 +62,13 @@ def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: An
         study=lambda design: staircase_study(design, precision, 1 - decided.alpha),
         found=lambda analysis: staircases_found(analysis, study.name, precision),
         answers=trials_each,
+        beside=against_constant,
     )
 
 
 def staircases_found(analysis: Analysis, name: str, precision: float) -> bool:
     """Return whether the intervals of the thresholds of all sides are as narrow as asked."""
-    result = analysis.of(SameDifferent).get(name) or analysis.of(Oddity).get(name)
+    result = analysis.of(SameDifferent).get(name) or analysis.of(ForcedChoice).get(name)
     return result is not None and result.staircases is not None and _told(result.staircases, precision)
 
 
@@ -76,6 +80,69 @@ def trials_each(design: Design) -> int:
     """Return how many trials a participant answers on average, those without a difference among them."""
     rng = np.random.default_rng(0)
     return round(float(np.mean([sum(1 for _ in _responses(design, seed, 0, rng)) for seed in range(100)])))
+
+
+SPACED, PEOPLE, AT_MOST, EVERY = 5, 60, 10, 5
+"""Levels a side of the constant stimuli that QUEST+ is compared with; participants; how many times the trials of QUEST+
+are tried, looking each so many trials.
+"""
+
+
+def against_constant(design: Design) -> str:
+    """Return how many trials constant stimuli, equally far apart, take for the intervals that QUEST+ comes to."""
+    rule, rng = _procedure(design).rule_of(design.study.task), np.random.default_rng(0)
+    if not isinstance(rule, QuestRule):
+        return ""
+    levels = [rule.levels[place] for place in np.linspace(0, len(rule.levels) - 1, SPACED).round().astype(int)]
+    taken, wanted = [], []
+    for who in range(PEOPLE):
+        right = _rightly(design, f"compared-{who:03}", rng)
+        track = _run(design, rule, right)
+        wanted.append(track.trials)
+        taken.append(_run(design, rule, right, levels, _width(rule, track)).trials)
+    asked, fixed = float(np.median(wanted)), float(np.median(taken))
+    saves, share = ("QUEST+", 1 - asked / fixed) if asked < fixed else ("constant stimuli", 1 - fixed / asked)
+    return (
+        f"for a participant's interval by QUEST+, after {counted(round(asked), 'trial')} of a track, constant stimuli "
+        f"at {', '.join(map(str, levels))} frames take {round(fixed)}: {saves} saves {100 * share:.0f}%"
+    )
+
+
+def _rightly(design: Design, name: str, rng: np.random.Generator) -> Callable[[int], bool]:
+    """Whether a simulated participant is right at a difference to the longer side, or the side that there is."""
+    observer, sign = person(design.settings, name, 0).settings.same_different, max(SIGNS_OF[_procedure(design).side])
+    probability, _ = RIGHT[design.study.task]
+
+    def right(level: int) -> bool:
+        share = float(probability(observer, np.array(float(sign * level))))
+        return bool(rng.random() < (share if level else 1 - share))
+
+    return right
+
+
+def _run(
+    design: Design, rule: QuestRule, right: Callable[[int], bool], levels: Sequence[int] = (), goal: float = 0.0
+) -> Asked:
+    """A track of QUEST+ to its end; with levels, these in turn until the interval is as narrow as the goal."""
+    every, track, trial = _procedure(design).catch_every, rule.begin(), 0
+    while not (_enough(rule, track, goal) if levels else rule.over(track)):
+        trial += 1
+        if every and trial % every == 0:
+            track = rule.beside(track, right(0))
+        else:
+            level = levels[track.trials % len(levels)] if levels else rule.due(track)
+            track = rule.after(track, level, right(level))
+    return track
+
+
+def _enough(rule: QuestRule, track: Asked, goal: float) -> bool:
+    looked = track.trials > 0 and track.trials % EVERY == 0
+    return looked and (_width(rule, track) <= goal or track.trials >= AT_MOST * rule.trials)
+
+
+def _width(rule: QuestRule, track: Asked) -> float:
+    found = rule.found(track)
+    return (found.high or np.inf) / (found.low or 1e-9)
 
 
 def _procedure(design: Design) -> Interleaving:

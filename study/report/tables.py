@@ -103,6 +103,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "standard_errors": ("in standard errors", "two"),
     # Preferences.
     "spread": ("spread of participants, logits", "two"),
+    "narrow": ("upper end, times the lower", "two"),
     "margin": ("counts as none", "text"),
     "equivalence_p_value": ("equivalence p", "p"),
     "bayes_factor_null": ("Bayes factor for none", "short"),

@@ -13,8 +13,11 @@ from study.tasks.rating import RATING
 from study.tasks.same_different import SAME_DIFFERENT
 from study.tasks.task import Asked, Kind, Problem, Task
 from study.tasks.trial import Trial
+from study.tasks.two_alternatives import TWO_ALTERNATIVES
 
-TASKS: Mapping[str, Task] = {task.name: task for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING, ODDITY)}
+TASKS: Mapping[str, Task] = {
+    task.name: task for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING, ODDITY, TWO_ALTERNATIVES)
+}
 
 DECIDES: Mapping[str, str] = {task.name: task.decides for task in TASKS.values() if task.name == task.asked_as}
 """What participants decide, by what a protocol calls the task."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,22 +14,23 @@ import pytest
 from scipy import stats
 
 from study.analysis.exclusions import Rules
-from study.analysis.oddity.analyse import analyse_oddity
+from study.analysis.oddity.analyse import Oddity, analyse_forced
 from study.analysis.psychometric.analyse import typical_threshold
 from study.analysis.psychometric.mixed import TypicalThreshold
 from study.analysis.psychometric.model import make_model
 from study.analysis.study_result import Settings
 from study.errors import AnalysisError
 from study.experiment.plan import draw_plan
+from study.experiment.procedures.quest_plus import Quest
 from study.experiment.protocol.whole import Protocol, parse_protocol
-from study.models.oddity import CHANCE
-from study.models.population import probability_odd_found
+from study.models.forced import FORCED
+from study.models.population import probability_found
 from study.power import oddity
 from study.power.design import Design
 from study.power.registry import effect_of
 from study.power.same_different import Conditions, level_study
 from study.power.sessions import whole_sessions
-from study.power.staircases import staircase_effect
+from study.power.staircases import against_constant, staircase_effect
 from study.tasks.registry import task_of
 from study.tasks.trial import Pair
 
@@ -105,7 +109,7 @@ def test_oddity_observers_are_right_as_often_as_percepts_drawn_one_by_one() -> N
         shown_in_all.append(shown.sum(axis=0))
         return True
 
-    level_study(design, probability_odd_found, CHANCE, note)(np.random.default_rng(0), 60, [30])
+    level_study(design, partial(probability_found, FORCED["oddity"]), 1 / 3, note)(np.random.default_rng(0), 60, [30])
     shares = np.sum(seen, axis=0) / np.sum(shown_in_all, axis=0)
     rng, reached = np.random.default_rng(2), d_prime_at_threshold()
     people = np.exp(0.2 * rng.standard_normal(2000))
@@ -124,7 +128,7 @@ def test_the_verdict_on_a_study_is_that_of_the_whole_analysis(monkeypatch: pytes
         return typical_threshold(trials, *arguments)
 
     monkeypatch.setattr(oddity, "typical_threshold", kept)
-    oddity.oddity_study(design, 9.0, 0.95)(np.random.default_rng(5), 1, [10])
+    oddity.forced_study(FORCED["oddity"], design, 9.0, 0.95)(np.random.default_rng(5), 1, [10])
     rows = [
         {"participant": row.participant, "difference_frames": sign * row.level, "correct": right, "answer": "first"}
         for sign, table in zip((-1, 1), tables, strict=True)
@@ -132,7 +136,7 @@ def test_the_verdict_on_a_study_is_that_of_the_whole_analysis(monkeypatch: pytes
         for right, count in ((True, row.yes), (False, row.shown - row.yes))
         for _ in range(int(count))
     ]
-    whole = analyse_oddity(pd.DataFrame(rows), "odd", Settings())
+    whole = analyse_forced(Oddity, pd.DataFrame(rows), "odd", Settings())
     for side, table in zip(("shorter", "longer"), tables, strict=True):
         fast, slow = typical_threshold(table, make_model("2afc", choices=3), 0.95), whole.functions[side].mixed
         assert isinstance(fast, TypicalThreshold)
@@ -187,3 +191,19 @@ def test_an_unplanned_task_is_refused() -> None:
     unknown = protocol.studies[0].model_copy(update={"task": "guessing"})
     with pytest.raises(AnalysisError, match=r"expected one of the tasks same-different, .*, found 'guessing'"):
         effect_of(unknown, OPTIONS, protocol.analysis)
+
+
+def test_quest_plus_is_compared_with_constant_stimuli() -> None:
+    """Levels far beyond the threshold tell little: the wider their range, the more trials constant stimuli take."""
+    base = design_of(PROTOCOL + LEVELS, 2)
+    times = []
+    for most in (12, 60):
+        procedure = Quest(most_frames=most, catch_every=0, narrow=4.0, least_trials=8, most_trials=40)
+        said = against_constant(replace(base, study=base.study.model_copy(update={"procedure": procedure})))
+        asked, fixed = map(float, re.search(r"after (\d+) trials .* take (\d+):", said).groups())
+        assert 8 <= asked <= 40
+        share = float(re.search(r"(\d+)%", said).group(1)) / 100
+        assert share == pytest.approx(1 - min(asked, fixed) / max(asked, fixed), abs=0.03)
+        assert ("QUEST+ saves" if asked < fixed else "constant stimuli saves") in said
+        times.append(fixed / asked)
+    assert times[1] > 1.5 * times[0]

@@ -1,8 +1,8 @@
-"""Which of three differs: answers of an oddity task in; right answers, d' and thresholds out.
+"""Forced choices, oddity and 2AFC: answers in; right answers, d' and thresholds out.
 
 For each difference in blend length the share of right answers, one number a participant, and the d' at which an
-observer of three percepts is right as often (`models.oddity`). For each side a psychometric function with a guess rate
-of one third; its threshold lies half of the way from chance to never wrong, at 67% right.
+observer is right as often (`models.forced`). For each side a psychometric function that begins at chance; its threshold
+lies half of the way from there to never wrong, at 67% right of three and 75% of two.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from study.analysis.psychometric.model import make_model
 from study.analysis.same_different.counts import SIDES, SIGNS, Side
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
-from study.models.oddity import CHANCE, d_prime_of
+from study.models.forced import FORCED, Forced
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,16 +41,19 @@ class OddityLevel:
     high: float | None
     """`percent`, `low`, `high`: right answers: mean over participants, with Student's interval, cut at 0 and 100%."""
     p_value: float | None
-    """That participants are right as often as by chance, one time in three."""
+    """That participants are right as often as by chance."""
     d_prime: float | None
     """Of an observer who is right as often; None where that is always."""
 
 
 @dataclass(frozen=True)
-class Oddity:
-    """The result of an oddity study."""
+class ForcedChoice:
+    """The result of a study of forced choices."""
 
-    keys: ClassVar[Mapping[str, str]] = {"oddity": ""}
+    keys: ClassVar[Mapping[str, str]]
+    forced: ClassVar[Forced]
+    found: ClassVar[str]
+    """What was to be found."""
 
     levels: tuple[OddityLevel, ...]
     """By difference, rising."""
@@ -80,15 +83,33 @@ class Oddity:
             return ["No answers were given."]
         best = max(self.levels, key=lambda level: level.percent)
         told = [
-            f"The odd one of three was found in {best.percent:.0f}% of the trials at {best.difference_frames:+d} "
-            f"frames, where chance gives {100 * CHANCE:.0f}%."
+            f"{self.found.capitalize()} was found in {best.percent:.0f}% of the trials at "
+            f"{best.difference_frames:+d} frames, where chance gives {100 * self.forced.chance:.0f}%."
         ]
         told += [self.staircases.in_words()] if self.staircases else []
         return [*told, *(f"Blends that are {side}: {found.answer}" for side, found in self.functions.items())]
 
 
-def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddity:
-    """Analyse one oddity study.
+@dataclass(frozen=True)
+class Oddity(ForcedChoice):
+    """The result of an oddity study."""
+
+    keys: ClassVar[Mapping[str, str]] = {"oddity": ""}
+    forced: ClassVar[Forced] = FORCED["oddity"]
+    found: ClassVar[str] = "the odd one of three"
+
+
+@dataclass(frozen=True)
+class TwoAlternatives(ForcedChoice):
+    """The result of a 2AFC study."""
+
+    keys: ClassVar[Mapping[str, str]] = {"two_alternatives": ""}
+    forced: ClassVar[Forced] = FORCED["2afc"]
+    found: ClassVar[str] = "the longer one of two"
+
+
+def analyse_forced(kind: type[ForcedChoice], answers: pd.DataFrame, name: str, settings: Settings) -> ForcedChoice:
+    """Analyse one study of forced choices; `kind` is the class of its result.
 
     Parameters
     ----------
@@ -104,7 +125,7 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
     AnalysisError
         When a column is missing.
     """
-    estimates.check_columns(answers, NEEDED_COLUMNS, "an oddity analysis")
+    estimates.check_columns(answers, NEEDED_COLUMNS, "an analysis of right answers")
     given = answers[answers["answer"].notna() & answers["correct"].notna() & answers["difference_frames"].notna()]
     estimates.check_participants(given)
     trials = given.assign(
@@ -113,7 +134,7 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
         yes=given["correct"].astype(float),
         shown=1.0,
     )
-    model = make_model("2afc", choices=3)
+    model = make_model("2afc", choices=kind.forced.choices)
     functions: dict[Side, PsychometricStudy] = {}
     for side in SIDES:
         own = trials[trials["difference_frames"].astype(float) * SIGNS[side] > 0]
@@ -121,16 +142,16 @@ def analyse_oddity(answers: pd.DataFrame, name: str, settings: Settings) -> Oddi
             functions[side] = analyse_psychometric(own, model, confidence=settings.confidence)
     rule = settings.tracks.get(name)
     staircases = None if rule is None else staircase_thresholds(answers, rule, settings.confidence, "right")
-    return Oddity(tuple(_levels(trials, settings.confidence)), functions, staircases)
+    return kind(tuple(_levels(kind.forced, trials, settings.confidence)), functions, staircases)
 
 
-def _levels(trials: pd.DataFrame, confidence: float) -> list[OddityLevel]:
+def _levels(forced: Forced, trials: pd.DataFrame, confidence: float) -> list[OddityLevel]:
     found = []
     for difference, part in trials.groupby(trials["difference_frames"].astype(int), sort=True):
-        test = estimates.mean_test(part.groupby("participant")["yes"].mean().to_numpy(), CHANCE, confidence)
+        test = estimates.mean_test(part.groupby("participant")["yes"].mean().to_numpy(), forced.chance, confidence)
         share = test.mean or 0.0
         ends = (test.low, test.high)
         low, high = (None if end is None else 100 * min(max(end, 0.0), 1.0) for end in ends)
         counts = int(difference), test.participants, len(part)
-        found.append(OddityLevel(*counts, 100 * share, low, high, test.p_value, d_prime_of(share)))
+        found.append(OddityLevel(*counts, 100 * share, low, high, test.p_value, forced.d_prime_of(share)))
     return found

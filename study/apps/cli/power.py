@@ -63,13 +63,13 @@ def _sizes(text: str, option: str = "--participants", example: str = "10,20,40")
 @click.option("--difference", type=float, default=USUAL["difference"], show_default=True,
               help="Rating: by how many points the comparison is rated higher.")  # fmt: skip
 @click.option("--shorter", type=click.FloatRange(min=0, min_open=True), default=USUAL["shorter"], show_default=True,
-              help="Same-different, oddity: true threshold, frames shorter.")  # fmt: skip
+              help="Differences of length: true threshold, frames shorter.")  # fmt: skip
 @click.option("--longer", type=click.FloatRange(min=0, min_open=True), default=USUAL["longer"], show_default=True,
-              help="Same-different, oddity: true threshold, frames longer.")  # fmt: skip
+              help="Differences of length: true threshold, frames longer.")  # fmt: skip
 @click.option("--spread", type=click.FloatRange(0, 1), default=USUAL["spread"], show_default=True,
-              help="Same-different, oddity: how participants differ, SD of the logarithm of sensitivity.")  # fmt: skip
+              help="Differences of length: how participants differ, SD of the logarithm of sensitivity.")  # fmt: skip
 @click.option("--precision", type=click.FloatRange(min=0, min_open=True), default=USUAL["precision"], show_default=True,
-              help="Same-different, oddity: required half-width of the intervals (1 - alpha), frames.")  # fmt: skip
+              help="Differences of length: required half-width of the intervals (1 - alpha), frames.")  # fmt: skip
 @click.option("--missed", type=click.FloatRange(0, 1, max_open=True), default=USUAL["missed"], show_default=True,
               help="Share of trials without a response, from 0 to 1, besides late responses.")  # fmt: skip
 @click.option(

@@ -41,6 +41,11 @@ class Quest(Interleaving):
     criterion_spread: Annotated[float, Ge(0.05), Le(5)] = setting(
         1.0, "Prior of a same-different criterion: its standard deviation."
     )
+    slope_spread: Annotated[float, Ge(0), Le(2)] = setting(
+        0.45,
+        "Prior of the power of the difference with which d' grows in oddity and 2AFC: its median is 1, this the "
+        "standard deviation of its natural logarithm; 0 for exactly 1.",
+    )
     most_lapses: Annotated[float, Ge(0.001), Le(0.5)] = setting(
         0.1, "Prior of the lapse rate: all values up to this one are as likely."
     )
@@ -89,6 +94,7 @@ class Quest(Interleaving):
             self.criterion,
             self.criterion_spread,
             self.most_lapses,
+            self.slope_spread,
             self.least_trials,
             self.most_trials,
             self.narrow,
@@ -102,5 +108,7 @@ class Quest(Interleaving):
         return (
             f"QUEST+ with {self.range_in_words()}, a log-normal prior of the threshold (median "
             f"{self.threshold_frames:g} frames, standard deviation {self.threshold_spread:g} in natural logarithms), "
-            f"and criterion and lapse rate as nuisance parameters; each track stopped {stops}"
+            f"and as nuisance parameters the lapse rate (up to {100 * self.most_lapses:g}%, all as likely) and the "
+            f"criterion (same-different; normal prior, {self.criterion:g} ± {self.criterion_spread:g}) or the slope "
+            f"(oddity, 2AFC; log-normal prior, median 1, {self.slope_spread:g}); each track stopped {stops}"
         )

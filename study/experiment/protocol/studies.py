@@ -115,8 +115,8 @@ class StudySpec(Part):
     )
     differences_frames: Listed[Difference] = Field(
         default=(),
-        description="Same-different, oddity: comparison minus reference blend length, a pair each; 0 shows one twice, "
-        "in same-different studies. [frames]",
+        description="Same-different, oddity, 2AFC: comparison minus reference blend length, a pair each; 0 shows one "
+        "twice, in same-different studies. [frames]",
     )
     fixed_frames: int | None = Field(
         default=None,

@@ -107,7 +107,7 @@ def known_beforehand(protocol: Protocol, pairs: Sequence[Pair]) -> set[str]:
     for pair in pairs:
         study = protocol.study(pair.study)
         waits = isinstance(study.procedure, Adaptive) and pair.motion not in study.practice_transitions
-        found |= set(pair.stimuli[:1] if waits else pair.stimuli)
+        found |= set(pair.stimuli[:-1] if waits else pair.stimuli)
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from study.analysis.oddity.analyse import Oddity
+from study.analysis.oddity.analyse import Oddity, TwoAlternatives
 from study.analysis.preference.analyse import Preference
 from study.analysis.ratings.analyse import PairRatings, Ratings
 from study.analysis.same_different.analyse import SameDifferent
@@ -23,4 +23,5 @@ SECTIONS: Mapping[type[StudyResult], SectionKind[Any]] = {
     Ratings: ratings.KIND,
     PairRatings: pair_ratings.KIND,
     Oddity: oddity.KIND,
+    TwoAlternatives: oddity.KIND,
 }

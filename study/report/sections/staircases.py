@@ -23,12 +23,19 @@ MOST_DRAWN = 40
 
 def staircase_table(name: str, found: Staircases) -> Table:
     """Return every track."""
-    reversals, interval = ("reversals ", "") if found.averaged else ("", " low high")
+    reversals, interval = ("reversals ", "") if found.averaged else ("", " low high narrow")
     return make(
         f"{name}_staircases",
         f"Every {found.title}: the {found.estimate}, in frames. A dash where it stopped too early for it.",
         f"participant motion side repeat trials {reversals}frames spread{interval}",
-        [{**vars(run), "motion": words.readable(run.motion)} for run in found.runs],
+        [
+            {
+                **vars(run),
+                "motion": words.readable(run.motion),
+                "narrow": run.high / run.low if run.high and run.low else None,
+            }
+            for run in found.runs
+        ],
         headings={"spread": "standard deviation"},
     )
 
@@ -38,7 +45,11 @@ def tracks_drawing(name: str, found: Staircases, mark: str) -> Drawing:
     people = sorted({run.participant for run in found.runs})
     drawn = people[:MOST_DRAWN]
     of_all = "" if drawn == people else f" The first {len(drawn)} of {counted(len(people), 'participant')} are drawn."
-    points = "Points are reversals; the dashed lines are" if found.averaged else "The dashed lines are"
+    points = (
+        "Points are reversals; the dashed lines are"
+        if found.averaged
+        else "Bars after the last trial are the 95% interval of the threshold, with its median; the dashed lines are"
+    )
     caption = (
         f"The course of every {found.title}: the difference from k in each of its trials. {points} the "
         f"{found.estimate}, over all of a participant and a side.{of_all}"
@@ -69,6 +80,10 @@ def _tracks(axes: Axes, runs: Sequence[StaircaseRun]) -> None:
         for run in own:
             levels = [sign * level for level in run.levels]
             axes.plot(range(1, len(levels) + 1), levels, color=BLUE, linewidth=0.9, drawstyle="steps-mid", alpha=0.75)
+            if run.low is not None and run.high is not None and run.frames is not None:
+                ends, end = [sign * run.low, sign * min(run.high, 1.3 * max(run.levels))], len(levels) + 1
+                axes.plot([end, end], ends, color=ORANGE, linewidth=1.6, solid_capstyle="butt")
+                axes.plot(end, sign * run.frames, "o", color=ORANGE, markersize=2.6)
             axes.plot(run.turns, [levels[turn - 1] for turn in run.turns], "o", color=INK, markersize=2.6)
         means = [run.frames for run in own if run.frames is not None]
         if means:

@@ -50,6 +50,14 @@ def serving(stimuli: Any, tmp_path: Path) -> Iterator[Callable[[], Person]]:
     stop()
 
 
+def after(person: Person, view: dict[str, Any], value: str | None = "") -> dict[str, Any]:
+    """The next view with films, past questions that have none."""
+    view = person.answer(view, value)
+    while view["kind"] != "trial" or not view["films"]:
+        view = person.step(view)
+    return view
+
+
 def frames_of(person: Person, film: dict[str, Any]) -> int:
     """Load a film as the page does, and read its frames."""
     reply = person.client.get(f"/{film['url']}")
@@ -74,7 +82,7 @@ def test_levels_are_rendered_as_they_come_and_a_restart_goes_on(
             again = person.until(person.begin(), "trial")
             assert (again["trial"], again["films"]) == (view["trial"], view["films"])
             assert [frames_of(person, film) for film in again["films"]] == seen[-1][1]
-        view = person.until(person.answer(view, "different" if number % 3 else "same"), "trial")
+        view = after(person, view, "different" if number % 3 else "same")
     manifest = read_manifest(tmp_path)
     rendered = {path.stem for path in (tmp_path / "stimuli").glob("*.mp4")}
     assert beforehand < rendered < {record.id for record in manifest.records}
@@ -93,7 +101,7 @@ def test_a_film_that_cannot_be_rendered_is_a_fault_and_comes_when_it_can(
     person = serving()
     view = person.until(person.begin(parameters={"participant": "p01"}), "trial")
     while view["label"]:  # practice
-        view = person.until(person.answer(view), "trial")
+        view = after(person, view)
     folder, away = tmp_path / "stimuli", tmp_path / "away"
     with monkeypatch.context() as broken:
 

@@ -24,7 +24,7 @@ SETTINGS = Quest(most_frames=40)
 def begun(
     settings: Quest, seed: int, task: str = "same-different", motions: tuple[str, ...] = ("walk",)
 ) -> Interleaved:
-    slots = ((0, 1), (1, 0)) if task == "same-different" else ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    slots = ((1, 0, 0), (0, 1, 0), (0, 0, 1)) if task == "oddity" else ((0, 1), (1, 0))
     pairs = tuple(
         Pair(
             f"jnd/{motion}/{level:+d}",
@@ -89,6 +89,60 @@ def test_thresholds_are_found_and_their_intervals_hold_them(criterion: float, la
         frames = {longer: 8 * float(np.exp(0.5 * rng.standard_normal())) for longer in (False, True)}
         procedure = begun(SETTINGS, seed)
         for longer, track in tracks(procedure, run(procedure, Observer(rng, frames, criterion, lapse))).items():
+            found = procedure.rule.found(track)
+            assert found is not None
+            assert found.low is not None
+            assert found.high is not None
+            ratios.append(found.frames / frames[longer])
+            held.append(found.low <= frames[longer] <= found.high)
+    assert np.median(ratios) == pytest.approx(1, abs=0.1)
+    assert 0.93 <= np.mean(held) <= 0.97
+
+
+class Finder:
+    """Names the percept that lies apart of three, or the larger of two; d' grows with a power of the difference."""
+
+    def __init__(self, rng: np.random.Generator, frames: dict[bool, float], slope: float, lapse: float) -> None:
+        self.rng, self.frames, self.slope, self.lapse = rng, frames, slope, lapse
+
+    def __call__(self, trial: Trial) -> str:
+        assert trial.difference_frames is not None
+        longer, slots = trial.difference_frames > 0, len(trial.members)
+        apart = AT_THRESHOLD[slots] * (abs(trial.difference_frames) / self.frames[longer]) ** self.slope
+        percepts = self.rng.normal(apart * np.array(trial.members) * (1 if longer else -1))
+        if self.rng.random() < self.lapse:
+            named = int(self.rng.integers(slots))
+        elif slots == 2:
+            named = int(np.argmax(percepts))
+        else:
+            named = int(np.argmax(np.abs(percepts - (percepts.sum() - percepts) / 2)))
+        return ("first", "second", "third")[named]
+
+
+AT_THRESHOLD = {2: 2**0.5 * norm.ppf(0.75), 3: 2.3219}
+"""d' where 75% are right of two, and 67% of three (the latter by simulation: `test_the_threshold_of_three`)."""
+
+
+@pytest.mark.slow
+def test_the_threshold_of_three() -> None:
+    percepts = np.random.default_rng(3).standard_normal((3, 1_000_000))
+    percepts[2] += AT_THRESHOLD[3]
+    apart = np.abs(percepts - (percepts.sum(axis=0) - percepts) / 2)
+    assert (apart.argmax(axis=0) == 2).mean() == pytest.approx(2 / 3, abs=0.002)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["2afc", "oddity"])
+@pytest.mark.parametrize(("slope", "lapse"), [(1.0, 0.02), (1.3, 0.0), (0.85, 0.05)])
+def test_forced_choices_tell_thresholds_whatever_the_slope(task: str, slope: float, lapse: float) -> None:
+    """Over 250 people, two thresholds each, whose slope and lapses are not the prior's; of two, trials tell less."""
+    settings = replace(SETTINGS, catch_every=0, most_trials=80 if task == "2afc" else 40)
+    ratios, held = [], []
+    for seed in range(250):
+        rng = np.random.default_rng([seed, 12])
+        frames = {longer: 8 * float(np.exp(0.5 * rng.standard_normal())) for longer in (False, True)}
+        procedure = begun(settings, seed, task)
+        for longer, track in tracks(procedure, run(procedure, Finder(rng, frames, slope, lapse))).items():
             found = procedure.rule.found(track)
             assert found is not None
             assert found.low is not None

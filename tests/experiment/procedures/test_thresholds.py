@@ -70,7 +70,7 @@ def test_the_answer_and_the_report_say_which_threshold_is_which(found: SameDiffe
     assert [row["estimate"] for row in tables["jnd_recovery"].rows].count("staircases") == 2
     assert len(tables["jnd_staircases"].rows) == 48
     tracks = next(drawing for drawing in section.drawings if drawing.name == "jnd_tracks")
-    assert tracks.svg.count(" reversals") == 24  # each participant is read out
+    assert tracks.picture.svg.count(" reversals") == 24  # each participant is read out
     assert section.notes[0].startswith(
         "Trials were chosen by staircases. Their threshold is where 70.7% of the responses are “different”: the mean"
     )

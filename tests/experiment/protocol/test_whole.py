@@ -100,7 +100,7 @@ def test_nothing_can_be_changed_afterwards() -> None:
         ('name = "demo"', 'name = "The demo"', r"name: expected a name of small letters, digits, - and _, found 'The"),
         ('title = "A small study of blend lengths"', 'title = ""', r"title: expected some text, found ''"),
         ('title = "A small study of blend lengths"', "", r"demo.toml: title: expected this key, found none; add it. H"),
-        ('task = "same-different"', 'task = "2afc"', r"'2afc'; choose one. What .* 'preference', which of two "),
+        ('task = "same-different"', 'task = "abx"', r"'abx'; choose one. What .* 'preference', which of two "),
         ("seed = 7", 'seed = 7\nform = ["age"]', r'form\[0\]: .*, found .*; write { name = "age" }\.'),
         ('name = "boxing"', 'name = "walking"', r"demo.toml:\d+: transitions\[3\].name: .*'walking' twice"),
         ('name = "geodesic_vs_fixed"', 'name = "jnd"', r"studies\[1\].name: .*'jnd' twice"),

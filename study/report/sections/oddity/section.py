@@ -1,4 +1,4 @@
-"""An oddity study on the page: right answers by difference, d' and thresholds in, headline, figure and tables out."""
+"""A study of forced choices on the page: right answers, d' and thresholds in, headline, figure and tables out."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from study.analysis.analyse import Analysis
-from study.analysis.oddity.analyse import Oddity
+from study.analysis.oddity.analyse import ForcedChoice
 from study.analysis.psychometric.analyse import BelievedThreshold
 from study.analysis.same_different.counts import SIGNS
 from study.counting import counted
-from study.models.oddity import CHANCE, HALFWAY
 from study.report import tables, words
 from study.report.drawing import BLUE, INK, SOFT, Picture, new_figure, percent_axis, picture_of
 from study.report.references import MACMILLAN_2005
@@ -22,16 +21,16 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def oddity_section(result: Oddity, about: About) -> Section | None:
-    """Return the section of an oddity study; None where nothing was answered."""
+def oddity_section(result: ForcedChoice, about: About) -> Section | None:
+    """Return the section of a study; None where nothing was answered."""
     if not result.levels:
         return None
     name = about.name
     known = [_recovered(name, result, about)] if about.known else []
     caption = (
         "Right answers by difference in blend length: means over participants with confidence intervals (Student’s t), "
-        "and psychometric functions of all answers. The dashed line is chance; the dotted one, at 67%, defines "
-        "thresholds."
+        "and psychometric functions of all answers. The dashed line is chance; the dotted one, at "
+        f"{result.forced.halfway:.0%}, defines thresholds."
     )
     return Section(
         anchor=f"study-{name}",
@@ -51,13 +50,13 @@ def oddity_section(result: Oddity, about: About) -> Section | None:
     )
 
 
-def oddity_figure(result: Oddity, name: str, mark: str) -> Picture:
+def oddity_figure(result: ForcedChoice, name: str, mark: str) -> Picture:
     """Draw right answers by difference, with the function of each side and its threshold."""
     levels = result.levels
     with new_figure(7.2, 3.7) as (figure, axes):
         percent_axis(axes)
-        axes.axhline(100 * CHANCE, color=SOFT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
-        axes.axhline(100 * HALFWAY, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
+        axes.axhline(100 * result.forced.chance, color=SOFT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.axhline(100 * result.forced.halfway, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
         for side, found in result.functions.items():
             line = [(SIGNS[side] * level, 100 * share) for level, share in found.pooled.curve]
             if line:
@@ -80,36 +79,38 @@ def _frames(found: BelievedThreshold, fps: float) -> str:
     return f"is {found.value:.1f} frames ({found.value / fps:.3f} s)"
 
 
-def _headline(result: Oddity, fps: float) -> Headline:
+def _headline(result: ForcedChoice, fps: float) -> Headline:
     told = [f"for {side} blends it {_frames(found, fps)}" for side, found in result.thresholds.items()]
     answers, people = sum(one.answers for one in result.levels), max(one.participants for one in result.levels)
+    chance, right = f"{result.forced.chance:.0%}", f"{result.forced.halfway:.0%}"
     return Headline(
-        f"The threshold for finding the odd one of three, 67% right: {'; '.join(told)}.",
-        f"{counted(answers, 'answer')} of {counted(people, 'participant')}; chance gives 33% right.",
+        f"The threshold for finding {result.found}, {right} right: {'; '.join(told)}.",
+        f"{counted(answers, 'answer')} of {counted(people, 'participant')}; chance gives {chance} right.",
     )
 
 
-def _levels_table(name: str, result: Oddity) -> Table:
+def _levels_table(name: str, result: ForcedChoice) -> Table:
     return tables.make(
         f"{name}_right",
-        "Right answers by difference, over participants; p against chance (one in three); d-prime of an observer of "
-        "three percepts who is right as often (Macmillan & Creelman 2005, chapter 9).",
+        f"Right answers by difference, over participants; p against chance (one in {result.forced.choices}); d-prime "
+        f"of an observer of {result.forced.choices} percepts who is right as often (Macmillan & Creelman 2005).",
         "difference_frames participants answers percent low:one high:one p_value d_prime",
         [vars(level) for level in result.levels],
     )
 
 
-def _threshold_table(name: str, result: Oddity, fps: float) -> Table:
+def _threshold_table(name: str, result: ForcedChoice, fps: float) -> Table:
     rows = [
         {"side": side, "frames": found.value, "low": found.low, "high": found.high, "remark": found.note}
         | {"seconds": None if found.value is None else found.value / fps}
         for side, found in result.thresholds.items()
     ]
-    caption = f"Thresholds: the difference at which 67% of the answers are right; seconds at {fps:g} fps."
+    right = f"{result.forced.halfway:.0%}"
+    caption = f"Thresholds: the difference at which {right} of the answers are right; seconds at {fps:g} fps."
     return tables.make(f"{name}_thresholds", caption, "side frames seconds low high remark", rows)
 
 
-def _recovered(name: str, result: Oddity, about: About) -> Table:
+def _recovered(name: str, result: ForcedChoice, about: About) -> Table:
     """What is known of simulated observers beside what was found."""
     rows = []
     for side, found in result.thresholds.items():
@@ -119,20 +120,22 @@ def _recovered(name: str, result: Oddity, about: About) -> Table:
     return tables.make(f"{name}_recovery", caption, "side known found low high", rows)
 
 
-def _readings(result: Oddity) -> Iterator[Reading]:
+def _readings(result: ForcedChoice) -> Iterator[Reading]:
     for side, found in result.thresholds.items():
         if found.value is not None:
             told = f"{found.value:.1f} [{words.bare_interval(found.low, found.high)}]"
             yield Reading(f"threshold, {side} [frames]", "", told)
 
 
-def _methods(found: Collection[Oddity], analysis: Analysis) -> str:
-    del found, analysis
+def _methods(found: Collection[ForcedChoice], analysis: Analysis) -> str:
+    del analysis
+    named = {3: "three percepts of which the one farthest from the others", 2: "two percepts of which the larger one"}
+    (choices,) = {one.forced.choices for one in found}
     return (
-        "Right answers in the oddity task are means over participants with Student’s intervals, turned into d-prime by "
-        "a model of three percepts of which the one farthest from the others is named (Macmillan & Creelman 2005, "
-        "chapter 9). Thresholds are where a psychometric function with a guess rate of one third lies halfway between "
-        "chance and its upper end, of a typical participant by a mixed model."
+        f"Right answers of finding {next(iter(found)).found} are means over participants with Student’s intervals, "
+        f"turned into d-prime by a model of {named[choices]} is named (Macmillan & Creelman 2005). Thresholds are "
+        f"where a psychometric function with a guess rate of one in {choices} lies halfway between chance and its "
+        "upper end, of a typical participant by a mixed model."
     )
 
 

@@ -1,4 +1,4 @@
-"""Oddity: three percepts against the closed form, and a whole study from its protocol to its report."""
+"""Oddity and 2AFC: percepts against the closed form, and a whole study from its protocol to its report."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.analysis.oddity.analyse import Oddity, analyse_oddity
+from study.analysis.oddity.analyse import Oddity, TwoAlternatives, analyse_forced
 from study.analysis.study_result import Settings
 from study.errors import ProtocolError
 from study.experiment.observers import truth
@@ -22,12 +22,14 @@ from study.experiment.store.export import export
 from study.experiment.store.frames import answers_frame, export_csv
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import session_by_id
-from study.models.oddity import d_prime_of, oddity_correct
+from study.models.forced import FORCED, oddity_correct
 from study.report.sections.oddity.section import KIND
 from study.report.sections.section import About
 from study.tasks.observer import default_observer
 from study.tasks.registry import answer_columns, right_answer
 from study.tasks.trial import Pair
+
+ODD = FORCED["oddity"]
 
 TEXT = """
 name = "odd"
@@ -93,9 +95,9 @@ def test_chance_is_one_third_and_the_inverse_leads_back() -> None:
     # The published table of the triangle test (Ennis 1993) has 0.418 at d' of 1 and 0.605 at 2.
     assert oddity_correct(np.array([1.0, 2.0])) == pytest.approx([0.418, 0.605], abs=0.001)
     for d_prime in (0.3, 1.0, 4.0):
-        assert d_prime_of(float(oddity_correct(d_prime))) == pytest.approx(d_prime, abs=1e-6)
-    assert d_prime_of(0.2) == 0.0
-    assert d_prime_of(1.0) is None
+        assert ODD.d_prime_of(float(oddity_correct(d_prime))) == pytest.approx(d_prime, abs=1e-6)
+    assert ODD.d_prime_of(0.2) == 0.0
+    assert ODD.d_prime_of(1.0) is None
 
 
 def test_the_odd_one_stands_in_each_place_equally_often(protocol: Protocol) -> None:
@@ -155,7 +157,7 @@ def simulated(protocol: Protocol, folder: Path, people: int) -> Oddity:
     with open_responses(folder) as responses:
         simulate(protocol, Stimuli(), responses, people, seed=3)
         answers = answers_frame(responses)
-    return analyse_oddity(answers, "odd", Settings())
+    return analyse_forced(Oddity, answers, "odd", Settings())
 
 
 def test_a_simulated_study_finds_the_known_thresholds(protocol: Protocol, tmp_path: Path) -> None:
@@ -169,13 +171,13 @@ def test_a_simulated_study_finds_the_known_thresholds(protocol: Protocol, tmp_pa
     people = np.exp(observer.log_sensitivity_sd * np.random.default_rng(1).standard_normal(4000))
     right = float(oddity_correct(10 * observer.d_prime_longer * people).mean())
     assert level.percent == pytest.approx(100 * (observer.lapse / 3 + (1 - observer.lapse) * right), abs=4)
-    assert level.d_prime == pytest.approx(d_prime_of(level.percent / 100))
+    assert level.d_prime == pytest.approx(ODD.d_prime_of(level.percent / 100))
     assert level.answers == pytest.approx(24 * 2 * 3 * 4, rel=0.02)
     section = KIND.section(found, About("odd", "Odd", known=known))
     assert section is not None
     assert "67% right" in section.headlines[0].statement
     assert [table.name for table in section.tables] == ["odd_right", "odd_thresholds", "odd_recovery"]
-    assert "<svg" in section.drawings[0].svg
+    assert "<svg" in section.drawings[0].picture.svg
 
 
 def test_every_export_has_all_three_stimuli_and_says_what_they_are(protocol: Protocol, tmp_path: Path) -> None:
@@ -201,3 +203,57 @@ def test_every_export_has_all_three_stimuli_and_says_what_they_are(protocol: Pro
     described = json.loads((tmp_path / "psych-ds" / "dataset_description.json").read_text())["variableMeasured"]
     assert "third" in {one["name"] for one in described}
     assert "third" in json.loads(files[2].with_suffix(".json").read_text())
+
+
+TWO = (
+    TEXT.replace('task = "oddity"', 'task = "2afc"')
+    .replace("practice = 3", "practice = 3\nrepeats = 4")
+    .replace("[-20, -15, -10, -5, 5, 10, 15, 20]", "[-8, -4, -2, -1, 1, 2, 4, 8]")
+)
+FORCED_TWO = FORCED["2afc"]
+
+
+@pytest.mark.parametrize("d_prime", [0.0, 0.5, 1.0, 2.0, 3.5])
+def test_the_chance_to_be_right_of_two_is_that_of_percepts_drawn_one_by_one(d_prime: float) -> None:
+    percepts = np.random.default_rng(8).standard_normal((2, 400_000))
+    right = float((percepts[1] + d_prime > percepts[0]).mean())
+    assert float(FORCED_TWO.correct(d_prime)) == pytest.approx(right, abs=0.0032)  # four standard errors
+
+
+def test_the_threshold_is_at_the_published_d_prime() -> None:
+    # Macmillan & Creelman 2005, Table A5.2: 75% right in 2AFC is d' = 0.954.
+    assert FORCED_TWO.at_threshold == pytest.approx(0.954, abs=5e-4)
+    assert (FORCED_TWO.chance, FORCED_TWO.halfway) == (0.5, 0.75)
+
+
+def test_the_longer_one_is_right_in_either_place_and_to_either_side() -> None:
+    protocol = parse_protocol(TWO)
+    pairs = [type(pair)(**{**vars(pair), "task": "2afc"}) for pair in pairs_of(protocol)]
+    trials = [trial for trial in draw_plan(protocol, pairs, "p01").trials if trial.role == "trial"]
+    assert len(trials) == 2 * 8 * 2 * 4
+    for trial in trials:
+        longer = f"{trial.motion}-k" if trial.difference_frames < 0 else f"{trial.motion}{trial.difference_frames:+d}"
+        assert trial.stimuli[("first", "second").index(right_answer(trial))] == longer
+    assert {right_answer(trial) for trial in trials if trial.difference_frames == 4} == {"first", "second"}
+    with pytest.raises(ProtocolError, match="expected no 0 in the 2afc study 'odd', where one of two has to be longer"):
+        parse_protocol(TWO.replace("[-8,", "[0, -8,"))
+
+
+def test_a_simulated_study_of_two_finds_the_known_thresholds(tmp_path: Path) -> None:
+    protocol = parse_protocol(TWO)
+
+    class Stimuli:
+        pairs = tuple(type(pair)(**{**vars(pair), "task": "2afc"}) for pair in pairs_of(protocol))
+        library, synthetic, records = "toy", True, ()
+
+    with open_responses(tmp_path) as responses:
+        simulate(protocol, Stimuli(), responses, 30, seed=3)
+        found = analyse_forced(TwoAlternatives, answers_frame(responses), "odd", Settings())
+    known = truth(protocol, default_observer())["studies"]["odd"]
+    for side, threshold in found.thresholds.items():
+        assert threshold.value == pytest.approx(abs(known[f"threshold_{side}_frames"]), rel=0.15)
+    section = KIND.section(found, About("odd", "Odd", known=known))
+    assert section is not None
+    assert "finding the longer one of two, 75% right" in section.headlines[0].statement
+    assert "chance gives 50% right" in section.headlines[0].detail
+    assert "two percepts of which the larger one is named" in KIND.methods([found], None)  # type: ignore[arg-type]
