@@ -92,6 +92,12 @@ def answer_keys(protocol: Protocol, legal: Sequence[str]) -> dict[str, str]:
     return {value: key for value, key in keys.items() if len(key) == 1}
 
 
+def answer_options(protocol: Protocol, legal: Sequence[str]) -> list[dict[str, str]]:
+    """Answers, each with its word and its key."""
+    keys = answer_keys(protocol, legal)
+    return [{"value": value, "label": answer_words(protocol, value), "key": keys.get(value, "")} for value in legal]
+
+
 def film_times(protocol: Protocol, plan: Plan, frames: Mapping[str, int]) -> wording.Films:
     """How long the films of a plan's trials take, by study; `frames` has those of each stimulus.
 

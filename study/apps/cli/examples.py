@@ -33,6 +33,8 @@ EXAMPLES = {
     "analyse": "segue analyse results/my_study",
     "report": "segue report results/my_study",
     "export": "segue export results/my_study --to csv --out answers.csv",
+    "export-stimuli": "segue export-stimuli my_study.toml --library motions --to jspsych --out web",
+    "import-answers": "segue import-answers web segue_p001.json segue_p002.json",
     "export-engine": "segue export-engine advice/advice.json --out game",
     "fit": "segue fit data.csv --task 2afc --level contrast --answer correct --participant participant",
     "power": "segue power my_study.toml --library motions --out results/my_study",

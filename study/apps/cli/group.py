@@ -47,6 +47,8 @@ VERBS = {
     "analyse": "study:analyse",
     "report": "study:report",
     "export": "export:export",
+    "export-stimuli": "elsewhere:export_stimuli",
+    "import-answers": "elsewhere:import_answers",
     "export-engine": "export_engine:export_engine",
     "fit": "fit:fit",
     "power": "power:power",

@@ -13,7 +13,7 @@ from typing import Any
 
 from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Session, advanced, current, near, progress
-from study.experiment.steps import Step, answer_keys, answer_words
+from study.experiment.steps import Step, answer_options
 from study.experiment.store.participants import Participant
 from study.tasks.registry import task_of
 
@@ -79,7 +79,7 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
         shown["fps"] = protocol.fps
         shown["example"] = _film(step, participant, film_bytes) if step.stimulus else None
         words = study is not None and task_of(study).kind == "word"
-        shown["keys"] = _options(protocol, task_of(study).legal(study)) if study and words else []
+        shown["keys"] = answer_options(protocol, task_of(study).legal(study)) if study and words else []
     return shown
 
 
@@ -119,12 +119,7 @@ def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
         "middle": step.middle,
         "high": step.high,
         "window_s": step.duration_s,
-        "options": [] if step.answered_by == "slider" else _options(protocol, step.legal),
+        "options": [] if step.answered_by == "slider" else answer_options(protocol, step.legal),
         "slider": protocol.study(step.study).slider,
         "kind": step.answered_by,
     }
-
-
-def _options(protocol: Protocol, legal: tuple[str, ...]) -> list[dict[str, str]]:
-    keys = answer_keys(protocol, legal)
-    return [{"value": value, "label": answer_words(protocol, value), "key": keys.get(value, "")} for value in legal]

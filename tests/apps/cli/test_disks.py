@@ -42,6 +42,8 @@ WRITES = {
     "power": ["power", "demo", "--study", "velocity_vs_fixed", "--participants", "4", "--studies=10", "--out", "OUT/x"],
     "render": ["render", "STUDY/protocol.toml", "--out", "OUT/x"],
     "simulate": ["simulate", "STUDY/protocol.toml", "--participants", "2", "--out", "OUT/x"],
+    "export-stimuli": ["export-stimuli", "STUDY/protocol.toml", "--participants", "2", "--out", "OUT/x"],
+    "import-answers": ["import-answers", "STUDY", "STUDY/rows.csv", "--database", "OUT/x.db"],
     "serve": ["serve", "STUDY/protocol.toml", "--port", "0", "--out", "OUT/x"],
     "demo": ["demo", "--out", "OUT/x"],
     "database": ["simulate", "STUDY/protocol.toml", "--participants", "2", "--out", "STUDY", "--database", "OUT/x.db"],
@@ -68,11 +70,12 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A study with two simulated participants, without films; and advice, for engines."""
+    """A study with two simulated participants, without films; advice, for engines; an answer, from elsewhere."""
     folder = tmp_path_factory.mktemp("finished")
     unfilmed(folder)
     assert run(["simulate", str(folder / "protocol.toml"), "--participants", "2", "--out", str(folder)]) == 0
     assert run(["advise", "walk", "run", "--no-strips", "--out", str(folder / "advice")]) == 0
+    (folder / "rows.csv").write_text("segue_participant,segue_trial,segue_item,answer,response_s\np001,1,,,\n")
     return folder
 
 
