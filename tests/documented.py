@@ -35,6 +35,8 @@ NOT_RUN = {
     "segue power transitions_today": "takes minutes",
     "segue render blend_length_jnd": "takes minutes",
     "segue serve protocols/blend_length_jnd.toml": "renders for minutes",
+    "segue import-answers": "needs answers from another program; tests/experiment/test_elsewhere.py has some",
+    "segue report results/web": "follows the one above",
     "segue report results/my_study --database URL": "needs another database",
     "segue preview hero.glb/walk": "a game's own file",
     "segue one-hop robustness": "takes half a minute; tests/apps/cli/test_one_hop.py runs it, and the next three",

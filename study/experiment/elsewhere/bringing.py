@@ -1,7 +1,7 @@
 """Bringing back: answers that were given in another program, as sessions of the results folder that was sent.
 
 Rows with the columns of `sending.KEY` come in, all cells as text; sessions go out, stored answer by answer like those
-of Segue's own participants, and checked against the plan that was sent. Brought again with more rows, a session goes on
+of Segue's own participants, and checked against the plan that was sent. Brought again with more rows, a session resumes
 where the earlier ones ended.
 """
 
