@@ -7,6 +7,8 @@ The requested kind (or none) comes in; a `Context` goes out. Tried in this order
 3. `osmesa`: the system's OSMesa (Mesa before 25.1);
 4. `osmesa-wheel`: OSMesa out of the Python package `lavavu-osmesa`, where the system has no GL at all.
 
+Windows and macOS have none of these, and draw without a window by what moderngl finds there (WGL, CGL): `native`.
+
 `SEGUE_GL` in the environment names one kind and rules out the others.
 """
 
@@ -15,6 +17,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,11 +27,19 @@ from typing import Any
 
 from renderer.errors import RendererError
 
-KINDS = ("egl", "egl-only", "osmesa", "osmesa-wheel")
+
+def kinds_on(platform: str) -> tuple[str, ...]:
+    """The kinds of contexts that a system (`sys.platform`) may have, in the order in which they are tried."""
+    return ("native",) if platform in ("win32", "darwin") else ("egl", "egl-only", "osmesa", "osmesa-wheel")
+
+
+KINDS = kinds_on(sys.platform)
 REQUIRED_GL = 330
 
 HOW_TO_INSTALL = (
-    "install libegl1 and libgl1 (Debian, Ubuntu: apt install libegl1 libgl1; Fedora: dnf install mesa-libEGL "
+    "install the driver of the graphics card"
+    if KINDS == ("native",)
+    else "install libegl1 and libgl1 (Debian, Ubuntu: apt install libegl1 libgl1; Fedora: dnf install mesa-libEGL "
     "mesa-libGL), or without root the Python package: pip install lavavu-osmesa"
 )
 
@@ -161,7 +172,9 @@ def _open(kind: str) -> Context:
     import moderngl
 
     create: Any = moderngl.create_context  # its stub types every keyword as a dict
-    if kind == "egl":
+    if kind == "native":
+        gl = create(standalone=True, require=REQUIRED_GL)
+    elif kind == "egl":
         gl = create(standalone=True, backend="egl", require=REQUIRED_GL)
     elif kind == "egl-only":
         gl = create(standalone=True, backend="egl", libgl="libEGL.so.1", require=REQUIRED_GL)

@@ -1,0 +1,387 @@
+# ruff: noqa: E501, D102 (sentences of a page, and the steps that make them)
+"""Every figure and table of the three papers in one page, each beside what the paper has.
+
+    python benchmarks/papers.py [--library FOLDER] [--out results/papers] [--only 2003,2004,2019]
+
+With the CMU's motions where the library has them, else with synthetic ones. Each entry says what the paper has, what is
+found here, the command that makes it, and what differs and why. Where people answered, simulated observers do, who were
+given the paper's findings: only the way from answers to numbers is tested.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import contextlib
+import html
+import io
+import json
+import sys
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parent))
+
+from fit_weights import labelled
+from one_hop_robustness import WEIGHT, draw_distances, floor_of, smoothness_of
+
+from study.apps.cli import run
+from study.files import write_whole
+from study.motion.clip import Clip, retarget, trim
+from study.motion.library import open_library
+from study.transitions.fit_weights import fit_weights
+from study.transitions.one_hop.beats import all_beat_offsets, find_beats
+from study.transitions.one_hop.build import build_table
+from study.transitions.one_hop.play import Trigger, play
+from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
+from study.transitions.one_hop.robustness import costs_of, draw_costs, robustness_set
+from study.transitions.one_hop.strip import draw_played
+from study.transitions.point_cloud import point_cloud, window_distances
+from study.transitions.weights import WANG2003
+
+GIVEN = "Simulated observers answer, who were given the paper's findings: this tests the way from answers to numbers."
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One figure or table of a paper."""
+
+    what: str
+    printed: str
+    found: str
+    command: str
+    differs: str = ""
+    pictures: tuple[Path, ...] = ()
+
+
+def segue(command: str) -> dict[str, Any]:
+    """What a command of Segue says in JSON."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        status = run([*command.split()[1:], "--json"])
+    assert status == 0, command
+    said: dict[str, Any] = json.loads(printed.getvalue())
+    return said
+
+
+class Papers:
+    """The figures, made from one library into one folder."""
+
+    def __init__(self, library: str, out: Path) -> None:
+        self.library, self.out = library, out
+        self.opened = open_library(library)
+        self.synthetic = self.opened.synthetic
+
+    def clip(self, name: str, fps: float) -> Clip:
+        return self.opened.clip(self.opened.find(name), fps=fps)
+
+    def at(self, name: str) -> Path:
+        return self.out / "figures" / f"{name}.png"
+
+    # 2003: which frames to join
+
+    def wang2003(self) -> Iterator[Entry]:
+        pair = "dance dance_modern"
+        same = "Other dances; ours are as long as they were recorded." if not self.synthetic else "Synthetic dances."
+        for figure, words, options in (
+            ("1", "The cost matrix of two dances, original weights", "--weights lee2002"),
+            ("2a", "The same with nu = 0.1", "--weights lee2002 --nu 0.1"),
+            ("2b", "The same with nu = 10", "--weights lee2002 --nu 10"),
+            ("3", "The same with the weights of Table 1", "--weights wang2003"),
+        ):
+            command = f"segue cost-matrix {pair} --library {self.library} {options} --out {self.at(f'2003_{figure}')}"
+            said = segue(command)
+            printed = {
+                "1": "stripes; darker is cheaper",
+                "2a": "the least cost is at the same frames for nu from 0 to 100",
+                "2b": "as 2a",
+                "3": "fewer cheap frames than Figure 1: “more restrictive”",
+            }[figure]
+            found = f"least cost {said['min']:.3g} at frames {said['argmin'][0]} and {said['argmin'][1]} (30 fps), of at most {said['max']:.3g}"
+            yield Entry(f"2003, Figure {figure}: {words}", printed, found, command, same, (self.at(f"2003_{figure}"),))
+        names = ("dance", "dance_modern", "dance_turns", "walk", "run", "walk_slow", "jog", "walk_fast")
+        clips = [self.clip(name, 30.0) for name in names]
+        pairs = [(a, retarget(b, a.skeleton)) for a, b in zip(clips, clips[1:] + clips[:1], strict=True)]
+        pairs = [(trim(a, 0, min(a.frames, 300)), trim(b, 0, min(b.frames, 300))) for a, b in pairs]
+        fitted = fit_weights(labelled(pairs, 0.1, 0))
+        parts = {part: fitted.weights[f"{part}.L"] for part in ("hip", "knee", "shoulder", "elbow")}
+        yield Entry(
+            "2003, Table 1: joint weights from 16 good and 26 bad transitions",
+            ", ".join(f"{part} {WANG2003[f'{part}.L']:.4f}" for part in parts),
+            ", ".join(f"{part} {value:.4f}" for part, value in parts.items()),
+            "segue label SRC DST --out labels.csv; segue fit-weights labels.csv",
+            "The paper's labels were people's. Ours are made from its weights, so that least squares has them to find again.",
+        )
+        figure = self.at("2003_4")
+        command = f"segue preview dance --library {self.library} --out {figure} --poses 5 --floor"
+        segue(command)
+        differs = "The paper's is a skinned character; ours is a mannequin of capsules."
+        yield Entry("2003, Figure 4: the character of the user study", "one frame of a dance", "the same dance, five poses", command,
+                    differs, (figure,))  # fmt: skip
+        results = self.out / "transition_points"
+        segue(f"segue simulate transition_points --library {self.library} --participants 26 --out {results}")
+        ratings = segue(f"segue analyse {results}")["headline"]
+        yield Entry(
+            "2003, Table 2: do optimized weights look better, more natural?",
+            "better 2.73 (SD 1.00), more natural 2.69 (SD 0.84); F = 6.39, p = 0.01",
+            " ".join(s for one in ratings if (s := one["statement"]).startswith(("looks_better", "more_natural"))),
+            f"segue simulate transition_points --library {self.library} --participants 26; segue analyse RESULTS",
+            GIVEN + " We print the degrees of freedom, which the paper leaves out.",
+        )
+
+    # 2004: how long to blend
+
+    def wang2004(self) -> Iterator[Entry]:
+        points, other = (
+            f"--start 60 --end {min(80, self.clip(name, 30.0).frames - 5)}" for name in ("run", "walk_fast")
+        )
+        figure = self.at("2004_1")
+        command = f"segue transition walk run --library {self.library} {points} --method geodesic --out {figure}"
+        segue(command)
+        yield Entry("2004, Figure 1: a transition", "a walk becomes another motion",
+                    "source blue, blend purple, destination orange; the left side is darker", command, "Other motions.", (figure,))  # fmt: skip
+        figure = self.at("2004_3")
+        command = f"segue blend-length walk walk_fast --library {self.library} {other} --method geodesic --out {figure}"
+        said = segue(command)
+        yield Entry(
+            "2004, Figures 2, 3 and 5: cost by blend length, frame by frame and joint by joint",
+            "one minimum, at 0.5 s; three joints have theirs elsewhere",
+            f"least at {said['blend_s']:.2f} s ({said['blend_frames']} frames at 30 fps), cost {said['cost']:.3g}",
+            command,
+            "Another walk, and other points.",
+            (figure,),
+        )
+        most = max(said["differences"], key=said["differences"].get)
+        yield Entry(
+            "2004, Table 1: differences of the joints between two frames",
+            "right shoulder 0.3029, left shoulder 0.1192, right knee 0.0481, ...",
+            ", ".join(f"{role} {value:.4f}" for role, value in said["differences"].items())
+            + f"; the largest is {most}",
+            f"segue blend-length walk walk_fast --library {self.library} {other} --method velocity",
+            "Other frames. The paper's own eight numbers are in tests/papers/test_transitions_2004.py.",
+        )
+        figure = self.at("2004_4")
+        command = f"segue blend-length walk run --library {self.library} {points} --method timewarp --out {figure}"
+        said = segue(command)
+        yield Entry(
+            "2004, Figure 4: two lengths, one for each motion",
+            "an illustration: fewer frames of the source than of the destination",
+            f"{said['source_frames']} frames of the walk over {said['destination_frames']} of the run; ringed in the costs of all pairs of lengths",
+            command,
+            "The paper's figure is a drawing; ours shows the costs of Eqs. 5 and 6, white where one length is twice the other.",
+            (figure,),
+        )
+        results = self.out / "wang2004_session"
+        command = f"segue simulate wang2004_session --library {self.library} --participants 35 --out {results}"
+        segue(command)
+        said = segue(f"segue analyse {results}")
+        segue(f"segue report {results}")
+        lengths = [one["statement"] for one in said["headline"] if one["unit"] == "frames"]
+        others = [one["statement"] for one in said["headline"] if one["unit"] != "frames"]
+        curves = sorted((results / "figures").glob("*curve.png"))
+        yield Entry(
+            "2004, Figure 6: the just noticeable difference of blend length",
+            "75% “different” at k + 7 and k − 8 frames",
+            " ".join(dict.fromkeys(lengths)),
+            f"{command}; segue analyse RESULTS",
+            GIVEN + " Below the published number stand those of a model, with and without the criterion.",
+            tuple(curves),
+        )
+        yield Entry(
+            "2004, Table 2: which method people prefer",
+            "geodesic over 10 frames 96.4% (χ² 241.4), velocity over 10 frames 65.7% (27.7), geodesic over timewarp 55.7% (3.66)",
+            " ".join(others),
+            f"{command}; segue analyse RESULTS",
+            GIVEN
+            + " The paper's χ² treats 280 answers as independent; ours tests participants and motions as samples.",
+        )
+
+    # 2019: through a third motion
+
+    def koyama2019(self) -> Iterator[Entry]:
+        names = ["dance", "dance_modern", "dance_turns"]
+        names += (
+            ["box"] if self.synthetic else [one for one in ("49_14", "49_15", "49_18") if one in self.opened.names()]
+        )
+        clips = [replace(self.clip(name, 60.0), name=name) for name in dict.fromkeys(names)]
+        clips = [retarget(trim(clip, 0, min(clip.frames, 1500)), clips[0].skeleton) for clip in clips]
+        settings, distance = Settings.at(60.0), PointCloudDistance()
+        switches = robustness_set(clips, settings)
+        problem = Problem(tuple(clips), switches, settings, weight_in_counts(WEIGHT, distance), distance)
+        tables = [build_table(replace(problem, switches=(switch,))) for switch in switches]
+        costs = [costs_of(replace(problem, switches=(switch,)), table, 0, switch.first_trigger)
+                 for switch, table in zip(switches, tables, strict=True)]  # fmt: skip
+        gain = np.array([one.direct - one.total for one in costs])
+        command = f"segue one-hop robustness {' '.join(clip.name for clip in clips)} --library {self.library}"
+
+        def pair(number: int, name: str) -> tuple[Path, Path]:
+            switch, table = switches[number], tables[number]
+            paths = []
+            for method in ("direct", "one-hop"):
+                played = self.played(clips, table, switch, method)
+                first = max(switch.first_trigger - 24, 0)
+                draw_played(played, self.at(f"{name}_{method}"), span=(first, min(first + 240, played.clip.frames - 1)))
+                paths.append(self.at(f"{name}_{method}"))
+            return paths[0], paths[1]
+
+        def words(number: int) -> str:
+            switch, cost = switches[number], costs[number]
+            where = f"{clips[switch.source].name} frame {switch.first_trigger} to {clips[switch.destination].name}"
+            return f"{where}: direct {cost.direct:.4g}, one-hop {cost.total:.4g} m²"
+
+        ranked = np.argsort(-gain)
+        shown = "Above the direct transition, below through the hop (yellow); blends purple, a pose every 0.33 s."
+        dances = "Other dances; the paper's are of a Japanese pop group."
+        for figure, rank, printed in (
+            ("1", 0, "a natural transition where the direct one has severe artifacts"),
+            ("7", 1, "crouching, and turned away: the hop first stands up, or turns"),
+        ):
+            number = int(ranked[rank])
+            yield Entry(f"2019, Figure {figure}: direct and optimal one-hop transition", printed, words(number),
+                        f"segue one-hop play TABLE --first {clips[switches[number].source].name} --trigger {switches[number].first_trigger} "
+                        f"{clips[switches[number].destination].name} --out X.png", f"{dances} {shown}", pair(number, f"2019_{figure}"))  # fmt: skip
+        figure = self.at("2019_5")
+        distances = window_distances(point_cloud(clips[0]), point_cloud(clips[1]), settings.blend_frames)
+        draw_distances(distances, figure, fps=60.0, names=(clips[0].name, clips[1].name), words="distance (m²)")
+        yield Entry("2019, Figure 5: distances between all frames of two clips", "a colour map, in units the paper does not state",
+                    f"from {distances.min():.3g} to {distances.max():.3g} m², mean over points and the 30 frames of a blend",
+                    "python benchmarks/one_hop_robustness.py FOLDER A.bvh B.bvh", dances, (figure,))  # fmt: skip
+        floor, skates = floor_of(clips), []
+        for number, switch in enumerate(switches):
+            slide = [smoothness_of(self.played(clips, tables[number], switch, method), switch.first_trigger, floor).slide_m
+                     for method in ("direct", "one-hop")]  # fmt: skip
+            skates.append(slide)
+        slides = np.array(skates)
+        worst = int(np.argmax(slides[:, 0] - slides[:, 1]))
+        yield Entry("2019, Figure 8: feet that slide", "severe sliding in the direct transition, none through the hop",
+                    f"{words(worst)}; the slower toe slides {slides[worst, 0]:.2f} m in the direct transition, {slides[worst, 1]:.2f} m through "
+                    f"the hop (mean of all {len(switches)}: {slides[:, 0].mean():.2f} and {slides[:, 1].mean():.2f} m)",
+                    f"{command}", f"{dances} Nothing is done about feet in either row.", pair(worst, "2019_8"))  # fmt: skip
+        alike = int(ranked[-1])
+        yield Entry("2019, Figure 9: where both are alike", "the destination itself is the hop", words(alike), command,
+                    f"{dances} The transition of the set that gains least.", pair(alike, "2019_9"))  # fmt: skip
+        figure = self.at("2019_10")
+        draw_costs(costs, figure)
+        yield Entry(
+            "2019, Figure 10 and the robustness set: 15 transitions by rule",
+            "one-hop costs less in every one",
+            f"one-hop costs less in {int((gain > 0).sum())} of {len(gain)}; mean {np.mean([one.total for one in costs]):.4g}, direct "
+            f"{np.mean([one.direct for one in costs]):.4g} m²",
+            f"{command} --out {figure}",
+            dances,
+            (figure,),
+        )
+        yield self.weights(clips, problem, switches[int(ranked[0])])
+        yield self.beats(clips, problem)
+
+    def played(self, clips: list[Clip], table: Any, switch: Switch, method: str) -> Any:
+        trigger = [Trigger(switch.first_trigger, switch.destination)]
+        return play(clips, table, trigger, first=switch.source, method=method)
+
+    def weights(self, clips: list[Clip], problem: Problem, switch: Switch) -> Entry:
+        """Figure 11: the same trigger with other weights."""
+        paths, found = [], []
+        for times in (0.0, 0.3, 1.0, 3.0, 10.0):
+            weighted = replace(problem, switches=(switch,), weight=round(problem.weight * times))
+            table = build_table(weighted)
+            entry = table.look_up(switch.source, switch.destination, switch.first_trigger)
+            assert entry is not None
+            smooth = costs_of(weighted, table, 0, switch.first_trigger)
+            found.append(f"{times:g} w: stays {entry.stay_source + entry.stay_hop} frames, blends cost "
+                         f"{smooth.total - weighted.weight * weighted.distance.unit * (entry.stay_source + entry.stay_hop):.4g} m²")  # fmt: skip
+            path = self.at(f"2019_11_{times:g}")
+            played = self.played(clips, table, switch, "one-hop")
+            first = max(switch.first_trigger - 24, 0)
+            draw_played(played, path, span=(first, min(first + 240, played.clip.frames - 1)), height=220)
+            paths.append(path)
+        return Entry("2019, Figure 11: the weight trades smoothness for responsiveness", "larger weights: shorter stays, less smooth",
+                     "; ".join(found), "segue one-hop build CLIPS --times 3 --out X.npz", "Other dances; rows from no weight to ten times Eq. 5's.",
+                     tuple(paths))  # fmt: skip
+
+    def beats(self, clips: list[Clip], problem: Problem) -> Entry:
+        """Figure 12: hops that share the beats."""
+        beats = {number: find_beats(clip) for number, clip in enumerate(clips)}
+        switch = Switch(0, 2, Alignment(0))
+        offsets = all_beat_offsets(beats, [0], range(len(clips)))
+        table = build_table(replace(problem, switches=(switch,), offsets=offsets))
+        usable = np.flatnonzero(table.entries[:, 0] >= 0)
+        through = usable[~np.isin(table.entries[usable, 0], [0, 2])]  # a third clip, where one is the best
+        at = through if len(through) else usable
+        trigger = int(at[len(at) // 2]) + table.rows[0].first_trigger
+        played = self.played(clips, table, replace(switch, first_trigger=trigger), "one-hop")
+        path = self.at("2019_12")
+        draw_played(played, path)
+        entry = table.look_up(0, 2, trigger)
+        assert entry is not None
+        own = set((beats[entry.hop] + entry.offset).tolist())
+        shared = sum(min((abs(beat - other) for other in own), default=99) <= 1 for beat in beats[0].tolist())
+        return Entry("2019, Figure 12: hops that keep the beat", "the hop has the beats of source and destination",
+                     f"hop {clips[entry.hop].name} at offset {entry.offset}: {shared} of {len(beats[0])} beats of the source lie on beats of the hop",
+                     "segue one-hop build CLIPS --on-beat --out X.npz",
+                     "Beats are estimated from the motions, which were not danced to one music as the paper's were.", (path,))  # fmt: skip
+
+
+PAGE = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>The figures of three papers</title>
+<style>body {{ font: 15px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1d2328 }}
+h2 {{ font-size: 1.1rem; margin-top: 2.5rem; border-top: 1px solid #dfe4e7; padding-top: 1rem }}
+table {{ border-spacing: 0 }} th {{ text-align: left; vertical-align: top; padding-right: 1rem; white-space: nowrap; color: #5b666e }}
+code {{ font-size: 12px; overflow-wrap: anywhere }} img {{ max-width: 100%; display: block; margin: .6rem 0 }}</style>
+<h1>Figures and tables of three papers</h1><p>{intro}</p>{entries}</html>
+"""
+
+
+def as_html(entries: list[Entry], intro: str) -> str:
+    """The page, with its pictures inside."""
+    parts = []
+    for one in entries:
+        rows = {"in the paper": one.printed, "here": one.found, "differs": one.differs}
+        cells = "".join(f"<tr><th>{name}</th><td>{html.escape(text)}</td></tr>" for name, text in rows.items() if text)
+        cells += f"<tr><th>command</th><td><code>{html.escape(one.command)}</code></td></tr>"
+        pictures = "".join(
+            f'<img alt="{html.escape(one.what)}" src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}">'
+            for path in one.pictures
+        )
+        parts.append(f"<h2>{html.escape(one.what)}</h2><table>{cells}</table>{pictures}")
+    return PAGE.format(intro=html.escape(intro), entries="".join(parts))
+
+
+def as_markdown(entries: list[Entry]) -> str:
+    """The same in short, for docs/papers.md."""
+    rows = ["| figure or table | in the paper | here | what differs |", "|---|---|---|---|"]
+    rows += [
+        "| " + " | ".join(text.replace("|", "\\|") for text in (one.what, one.printed, one.found, one.differs)) + " |"
+        for one in entries
+    ]
+    return "\n".join(rows) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--library", default="synthetic", help="a folder with the CMU's motions (default: synthetic)")
+    parser.add_argument("--out", type=Path, default=Path("results/papers"))
+    parser.add_argument("--only", default="2003,2004,2019", help="papers, with commas between")
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    papers = Papers(given.library, given.out)
+    (given.out / "figures").mkdir(parents=True, exist_ok=True)
+    entries: list[Entry] = []
+    for name, make in (("2003", papers.wang2003), ("2004", papers.wang2004), ("2019", papers.koyama2019)):
+        if name in given.only.split(","):
+            for entry in make():
+                print(f"{entry.what}\n    paper: {entry.printed}\n    here:  {entry.found}", flush=True)
+                entries.append(entry)
+    intro = f"Motions: {'synthetic' if papers.synthetic else given.library}. {papers.opened.acknowledgement or ''} Made by benchmarks/papers.py."
+    write_whole(given.out / "papers.html", as_html(entries, intro))
+    write_whole(given.out / "papers.md", as_markdown(entries))
+    print(given.out / "papers.html")
+
+
+if __name__ == "__main__":
+    main()
