@@ -182,8 +182,8 @@ class Papers:
         segue(command)
         said = segue(f"segue analyse {results}")
         segue(f"segue report {results}")
-        lengths = [one["statement"] for one in said["headline"] if one["unit"] == "frames"]
-        others = [one["statement"] for one in said["headline"] if one["unit"] != "frames"]
+        lengths = [one["statement"] for one in said["headline"] if one["unit"].startswith("frames")]
+        others = [one["statement"] for one in said["headline"] if not one["unit"].startswith("frames")]
         curves = sorted((results / "figures").glob("*curve.png"))
         yield Entry(
             "2004, Figure 6: the just noticeable difference of blend length",
