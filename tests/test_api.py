@@ -78,6 +78,14 @@ def test_what_does_not_fit_is_refused_with_what_does() -> None:
 
 
 @pytest.mark.gl
+def test_a_played_state_machine_is_drawn_in_as_many_poses(tmp_path: Path) -> None:
+    clips = [segue.trim(segue.read(name), 0, 60) for name in ("dance", "box")]
+    played = segue.play(clips, segue.one_hop(clips, weight=0.001), [(5, 1)])
+    wide, narrow = (segue.strip(played, poses=poses).save(tmp_path / f"{poses}.png") for poses in (8, 3))
+    widths = [int.from_bytes(file.read_bytes()[16:20], "big") for file in (wide, narrow)]
+    assert widths[0] > 2 * widths[1], "eight poses beside three"
+
+
 def test_a_view_holds_its_file(tmp_path: Path) -> None:
     shown = segue.strip(segue.trim(segue.read("walk"), 0, 30), poses=3)
     assert shown.save(tmp_path / "strip.png").read_bytes()[1:4] == b"PNG"

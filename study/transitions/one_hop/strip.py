@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 # The hop beside the strip's own colours for source, blend and destination.
 HOP_COLOUR = (196, 160, 0)
-_POSES, _MARGIN_S, _HEIGHT = 13, 0.4, 300
+_MARGIN_S, _HEIGHT = 0.4, 300
 
 
 def strip_segments(played: Played) -> list[Segment]:
@@ -28,8 +28,8 @@ def strip_segments(played: Played) -> list[Segment]:
     return parts
 
 
-def draw_played(played: Played, out: Path) -> None:
-    """A strip of poses, evenly spaced from shortly before the first blend to shortly after the last, as a PNG file."""
+def draw_played(played: Played, out: Path, *, poses: int = 13) -> None:
+    """A PNG file of so many poses, evenly spaced from shortly before the first blend to shortly after the last."""
     from renderer.strip import render_strip
     from study.motion.clip import joint_positions
     from study.motion.drawing import figure_for
@@ -42,7 +42,7 @@ def draw_played(played: Played, out: Path) -> None:
         out,
         joint_positions(clip, ends=True),
         figure_for(clip.skeleton),
-        frames=sorted({round(first + (last - first) * k / (_POSES - 1)) for k in range(_POSES)}),
+        frames=sorted({round(first + (last - first) * k / max(poses - 1, 1)) for k in range(poses)}),
         segments=strip_segments(played),
         height=_HEIGHT,
     )
