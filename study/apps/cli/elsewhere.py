@@ -22,7 +22,7 @@ from study.counting import counted
     show_default=True,
     help="csv, one table of trials for any program; jspsych, a timeline; psychopy, a table of conditions each.",
 )
-@click.option("--participants", type=click.IntRange(1, 9999), help="How many (default: the protocol's).")
+@click.option("--participants", type=click.IntRange(1, 9999), help="Number of participants (default: the protocol's).")
 @library_option
 @click.option("--out", type=FOLDER, required=True, help="Folder for films and trials; a results folder, too.")
 @WORKERS
