@@ -244,10 +244,10 @@ THRESHOLDS, CRITERIA, SLOPES, LAPSES = 41, 19, 9, 5
 WIDE, STRICTEST = 3.0, 5.0
 """`WIDE`: standard deviations of its prior that the threshold's grid goes on either side; `STRICTEST`: those that the
 criterion's goes up, since strict participants say little of theirs and an interval must not end where the grid does."""
-LOOSE = 4.0
-"""In intervals the prior of criterion or slope counts as if it were so many times as wide. As it is, it says more than
-most answers do: intervals of participants who are stricter than it says held 99% of the thresholds instead of 95%.
-Without it they would be too short of participants who never lapse."""
+LOOSE_CRITERION, LOOSE_SLOPE = 4.0, 2.0
+"""In intervals their priors count as if they were so many times as wide. As they are, they say more than most answers
+do: intervals of participants who are stricter than the prior says held 99% of the thresholds instead of 95%. Without
+them intervals would be too short of participants who never lapse."""
 
 
 @lru_cache(maxsize=64)
@@ -286,8 +286,9 @@ def _summary(rule: QuestRule, right: tuple[int, ...], wrong: tuple[int, ...]) ->
     told = np.round(quest.information_on(0, posterior)[1:], ROUNDED)
     mass, frames = quest.marginal(posterior, 0), np.exp(quest.axes[0])
     spread = float(np.sqrt(mass @ frames**2 - (mass @ frames) ** 2))
-    off = (_criteria if DECIDING[rule.task].has_criterion else _slopes)(rule)[1]
-    loose = np.repeat(-0.5 * (off / LOOSE) ** 2, len(quest.axes[2]))
+    criterion = DECIDING[rule.task].has_criterion
+    off = _criteria(rule)[1] / LOOSE_CRITERION if criterion else _slopes(rule)[1] / LOOSE_SLOPE
+    loose = np.repeat(-0.5 * off**2, len(quest.axes[2]))
     likely = quest.likelihood(*counts) + np.tile(loose, len(frames))
     ends = likelihood_interval(quest.axes[0], quest.profile(likely, 0))
     middle, low, high = map(float, np.exp([median(quest.axes[0], mass), *ends]))

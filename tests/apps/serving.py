@@ -22,6 +22,7 @@ from study.apps.server.web import make_app
 from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.stimuli.manifest import Manifest, read_manifest, record
 from study.experiment.stimuli.prepare import prepare
+from study.experiment.stimuli.rendering import RenderAhead, known_beforehand
 from study.experiment.store.responses import Responses, open_responses
 from study.motion.library import open_library
 
@@ -159,8 +160,15 @@ def served_manifest(folder: Path) -> Manifest:
     return replace(manifest, videos=videos)
 
 
-def make_host(manifest: Manifest, responses: Responses, text: str = PROTOCOL, **settings: Any) -> Host:
-    return Host(protocol_of(text), manifest, responses, Settings(researcher_token=TOKEN, **settings))
+def make_host(
+    manifest: Manifest,
+    responses: Responses,
+    text: str = PROTOCOL,
+    *,
+    ahead: RenderAhead | None = None,
+    **settings: Any,
+) -> Host:
+    return Host(protocol_of(text), manifest, responses, Settings(researcher_token=TOKEN, **settings), ahead)
 
 
 @dataclass
@@ -247,8 +255,13 @@ def answer_to(view: dict[str, Any], value: str | None = "", **more: Any) -> dict
 class Site:
     """A server on a port of this machine, in a thread; it can be stopped and started, and can be made to go wrong."""
 
-    def __init__(self, folder: Path, text: str = PROTOCOL, **settings: Any) -> None:
-        self.folder, self.text, self.settings = folder, text, settings
+    def __init__(self, folder: Path, text: str = PROTOCOL, *, on_demand: bool = False, **settings: Any) -> None:
+        """`on_demand` takes away the films of levels that depend on answers; they are rendered as they are due."""
+        self.folder, self.text, self.settings, self.on_demand = folder, text, settings, on_demand
+        if on_demand:
+            for film in (folder / "stimuli").glob("*.mp4"):
+                if film.stem not in known_beforehand(protocol_of(text), read_manifest(folder).pairs):
+                    film.unlink()
         self.port = free_port()
         self.address = f"http://127.0.0.1:{self.port}"
         self.film_fault: str | None = None
@@ -257,7 +270,8 @@ class Site:
 
     def start(self) -> None:
         self.responses = open_responses(self.folder)
-        self.host = make_host(read_manifest(self.folder), self.responses, self.text, **self.settings)
+        ahead = RenderAhead(prepared(self.text), self.folder, 1) if self.on_demand else None
+        self.host = make_host(read_manifest(self.folder), self.responses, self.text, ahead=ahead, **self.settings)
         app = make_app(self.host)
 
         async def faulty(scope: Any, receive: Any, send: Any) -> None:

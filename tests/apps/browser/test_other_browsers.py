@@ -10,7 +10,7 @@ import pytest
 import sqlalchemy as sa
 from bidi import FirefoxTab
 from serving import QUESTIONS, Site
-from walking import answers, check_frames, go_on, happened
+from walking import QUEST, answers, check_frames, go_on, happened
 from webdriver import WebKitTab
 
 from study.experiment.store.tables import presentations
@@ -41,6 +41,21 @@ def test_firefox_walks_through_every_task(make_site: Callable[..., Site], firefo
     site = make_site()
     check_frames(walk(site, firefox_tab, keys))
     assert "Firefox" in happened(site, "display")[0]["user_agent"]
+
+
+def test_firefox_walks_through_levels_that_are_rendered_on_demand(
+    make_site: Callable[..., Site], firefox_tab: FirefoxTab
+) -> None:
+    site = make_site(QUEST, on_demand=True)
+    before = len(list((site.folder / "stimuli").glob("*.mp4")))
+    firefox_tab.open(site.address)
+    go_on(firefox_tab, True)
+    assert happened(site, "finished") == [{}]
+    assert happened(site, "fault") == []
+    shown = set(answers(site)["difference_frames"])
+    assert len(shown) > 2
+    rendered = len(list((site.folder / "stimuli").glob("*.mp4"))) - before
+    assert len(shown - {0}) <= rendered <= 9
 
 
 def test_without_frame_callbacks_the_record_says_so(make_site: Callable[..., Site], firefox_tab: FirefoxTab) -> None:

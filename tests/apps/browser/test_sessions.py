@@ -14,6 +14,7 @@ from serving import PROTOCOL, QUESTIONS, TOKEN, Site
 from walking import (
     KEPT,
     LOOK,
+    QUEST,
     QUESTION,
     ROLES,
     SHORT,
@@ -88,11 +89,13 @@ def test_reloads_lose_nothing(make_site: Callable[..., Site], make_tab: Callable
     assert not table.duplicated(["trial", "item"]).any()
 
 
+@pytest.mark.parametrize("text", [STAIRCASES, QUEST], ids=["staircase", "quest-plus"])
 def test_staircases_go_on_with_the_trial_that_was_due(
-    make_site: Callable[..., Site], make_tab: Callable[..., Tab]
+    make_site: Callable[..., Site], make_tab: Callable[..., Tab], text: str
 ) -> None:
-    """The page is loaded again, the server started again; every trial is the one that the responses before led to."""
-    site, tab = make_site(STAIRCASES), make_tab()
+    """Levels are rendered as they are due; the page is loaded again, the server started again, and every trial is the
+    one that the responses before led to."""
+    site, tab = make_site(text, on_demand=True), make_tab()
     tab.open(site.address)
     for number in range(6):
         to_question(tab)

@@ -90,6 +90,20 @@ catch_every = 4
 """
 )
 
+QUEST = (
+    STAIRCASES[: STAIRCASES.index("[studies.procedure]")]
+    + """
+[studies.procedure]
+name = "quest-plus"
+most_frames = 9
+threshold_frames = 3.0
+side = "longer"
+least_trials = 6
+most_trials = 8
+catch_every = 4
+"""
+)
+
 # For what happens when the time to answer is over.
 HURRIED = SHORT.replace("answer_s = 20.0", "answer_s = 3.0")
 PATIENT = PROTOCOL.replace("answer_s = 3.0", "answer_s = 20.0")
