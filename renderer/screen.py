@@ -23,6 +23,9 @@ from renderer.shapes import Shapes, lay_out
 
 RGB = tuple[int, int, int]
 Place = tuple[int, int, int, int]
+Shares = tuple[float, float, float, float]
+"""Left, top, right and bottom of a part of the window, as shares of its width and height."""
+WHOLE: Shares = (0.0, 0.0, 1.0, 1.0)
 
 _KEPT_FLOORS = 2
 
@@ -43,9 +46,16 @@ class Drawing:
     """A motion laid out for a window, to be drawn frame by frame; made by `Screen.drawing`."""
 
     def __init__(
-        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, height: float
+        self,
+        positions: NDArray[np.float64],
+        figure: Figure,
+        camera: Camera,
+        fps: float,
+        height: float,
+        cell: Shares = WHOLE,
     ) -> None:
         self.positions, self.figure, self.fps, self._made_for, self._height = positions, figure, fps, camera, height
+        self._cell = cell
         self.frames = len(positions)
         self.path = camera_path(positions, camera, fps)
         self.size: Size | None = None
@@ -57,9 +67,10 @@ class Drawing:
         """Lay the motion out for a window of that size; False where that was done before."""
         if self.size == size:
             return False
-        self.camera = fitted_camera(self._made_for, size, self._height)
+        left, top, right, bottom = (round(share * edge) for share, edge in zip(self._cell, (*size, *size), strict=True))
+        self.camera = fitted_camera(self._made_for, (right - left, bottom - top), self._height)
         width, height = self.camera.size
-        self.place = ((size[0] - width) // 2, (size[1] - height) // 2, width, height)
+        self.place = ((left + right - width) // 2, (top + bottom - height) // 2, width, height)
         self.shapes = lay_out(self.positions, self.figure, self.camera, self.fps)
         self.shapes.data[..., 12:14] += np.array(self.place[:2], dtype=np.float32)
         self.size = size
@@ -97,10 +108,17 @@ class Screen:
         return Picture(_sharp(texture))
 
     def drawing(
-        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, size: Size, height: float
+        self,
+        positions: NDArray[np.float64],
+        figure: Figure,
+        camera: Camera,
+        fps: float,
+        size: Size,
+        height: float,
+        cell: Shares = WHOLE,
     ) -> Drawing:
-        """Lay out a motion for a window of that size, floor included."""
-        made = Drawing(check_positions(positions), figure, camera, fps, height)
+        """Lay out a motion for a part of a window of that size, floor included."""
+        made = Drawing(check_positions(positions), figure, camera, fps, height, cell)
         made.fit(size)
         if figure.floor_m is not None:
             self._floor_picture(made, 0)
@@ -124,12 +142,13 @@ class Screen:
         picture.texture.use(0)
         self._copy_array.render(self.gl.TRIANGLE_STRIP, vertices=4)
 
-    def paint_frame(self, drawing: Drawing, frame: int, size: Size) -> None:
-        """One frame of a motion on its figure's background."""
+    def paint_frame(self, drawing: Drawing, frame: int, size: Size, *, over: bool = False) -> None:
+        """One frame of a motion on its figure's background, or `over` what was painted before."""
         drawing.fit(size)
         assert drawing.shapes is not None, "fit lays it out"
         floor = None if drawing.figure.floor_m is None else self._floor_picture(drawing, frame)
-        self.clear(drawing.figure.background, size)
+        if not over:
+            self.clear(drawing.figure.background, size)
         left, top, wide, high = drawing.place
         place = (left, size[1] - top - high, wide, high)
         if floor is not None:

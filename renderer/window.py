@@ -29,7 +29,7 @@ from renderer.errors import RendererError
 from renderer.events import Click, CloseAsked, Event, Focus, Key, Resized, Size, Typed, key_name
 from renderer.monitors import Monitor, find_monitors, monitor_of
 from renderer.pacing import OWN_CLOCK_HZ, Pacing, find_pacing, next_flip
-from renderer.screen import RGB, Drawing, Picture, Screen
+from renderer.screen import RGB, WHOLE, Drawing, Picture, Screen, Shares
 from renderer.server_times import server_times
 from renderer.xlib import when_server_is_lost
 
@@ -175,13 +175,20 @@ class Window:
         return self._screen.picture(rgb)
 
     def drawing(
-        self, positions: NDArray[np.float64], figure: Figure, camera: Camera, fps: float, *, height: float = inf
+        self,
+        positions: NDArray[np.float64],
+        figure: Figure,
+        camera: Camera,
+        fps: float,
+        *,
+        height: float = inf,
+        cell: Shares = WHOLE,
     ) -> Drawing:
         """Lay out a motion `(frames, points, 3)` for this window, which takes a while; before the trial, that is.
 
-        `height` is that of the picture in pixels; it is no larger than the window allows.
+        `height` is that of the picture in pixels; it is no larger than the window allows, or the part `cell` of it.
         """
-        return self._screen.drawing(positions, figure, camera, fps, self.size, height)
+        return self._screen.drawing(positions, figure, camera, fps, self.size, height, cell)
 
     def clear(self, colour: RGB) -> None:
         """Make the whole window one colour."""
@@ -191,9 +198,9 @@ class Window:
         """Show a picture in the middle of the window, pixel for pixel."""
         self._screen.paint(picture, background, self.size)
 
-    def paint_frame(self, drawing: Drawing, frame: int) -> None:
-        """Draw one frame of a motion on its figure's background."""
-        self._screen.paint_frame(drawing, frame, self.size)
+    def paint_frame(self, drawing: Drawing, frame: int, *, over: bool = False) -> None:
+        """Draw one frame of a motion on its figure's background, or `over` what is drawn already."""
+        self._screen.paint_frame(drawing, frame, self.size, over=over)
 
     # What people do
 

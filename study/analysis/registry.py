@@ -7,7 +7,7 @@ from functools import partial
 
 from study.analysis.oddity.analyse import Oddity, TwoAlternatives, analyse_forced
 from study.analysis.preference.analyse import Preference, analyse_preference
-from study.analysis.ratings.analyse import PairRatings, Ratings, analyse_ratings
+from study.analysis.ratings.analyse import PairRatings, ParallelRatings, Ratings, analyse_parallel, analyse_ratings
 from study.analysis.same_different.analyse import SameDifferent, analyse_same_different
 from study.analysis.study_result import TaskAnalysis
 from study.errors import AnalysisError
@@ -16,6 +16,7 @@ ANALYSES: Mapping[str, TaskAnalysis] = {
     "same-different": TaskAnalysis(analyse_same_different, (SameDifferent,)),
     "preference": TaskAnalysis(analyse_preference, (Preference,)),
     "rating": TaskAnalysis(analyse_ratings, (Ratings, PairRatings)),
+    "parallel-rating": TaskAnalysis(analyse_parallel, (ParallelRatings,)),
     "oddity": TaskAnalysis(partial(analyse_forced, Oddity), (Oddity,)),
     "2afc": TaskAnalysis(partial(analyse_forced, TwoAlternatives), (TwoAlternatives,)),
 }

@@ -117,9 +117,9 @@ def respond(who: Person, trial: Trial, step: Step) -> tuple[str | None, float | 
     sure = step.item == CONFIDENCE  # of the very answer that they gave
     rng = generator(who.seed, "answer", who.name, trial.trial, "" if sure else step.item, step.attempt)
     if who.careless:
-        value, ease = str(rng.choice(step.legal)), 1.0
+        value, ease = " ".join(map(str, rng.choice(step.legal, max(step.sliders, 1)))), 1.0
     elif trial.role == "check":
-        value, ease = trial.expected, 1.0
+        value, ease = " ".join([trial.expected] * max(step.sliders, 1)), 1.0
     else:
         value, ease = task_of_trial(trial).judge(who, trial, step.legal, rng)
         if sure:

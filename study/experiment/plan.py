@@ -22,7 +22,7 @@ from study.experiment.procedures.procedure import Adaptive, Course, Draw, Proced
 from study.experiment.procedures.registry import course_from_json, course_to_json
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.sets import own_set
-from study.tasks.registry import task_of
+from study.tasks.registry import orders_of, stated_answers, task_of
 from study.tasks.trial import Pair, Trial, trial_from_json, trial_of
 
 PLAN_VERSION = 2
@@ -140,7 +140,7 @@ def draw_plan(
             )
         if study.sets:
             own = own_set(own, study.sets, group)
-        draw = Draw(study.name, tuple(own), task_of(study).orders, study.order, study.repeats, group)
+        draw = Draw(study.name, tuple(own), orders_of(study), study.order, study.repeats, group)
         shown = study.procedure.drawn(draw, rng)
         # Practice and checks draw from generators of their own, so that they leave the trials as they are.
         practice = _draw_practice(
@@ -171,8 +171,9 @@ def _draw_practice(study: StudySpec, pairs: Sequence[Pair], rng: np.random.Gener
     task = task_of(study)
     chosen = task.practice([pairs[i] for i in rng.permutation(len(pairs))], study.practice)
     order = rng.permutation(study.practice)
-    drawn = drawn_orders(len(task.orders), study.practice, "random", rng)
-    trials = [trial_of(chosen[i % len(chosen)], task.orders[drawn[i]], 0) for i in order]
+    orders = orders_of(study)
+    drawn = drawn_orders(len(orders), study.practice, "random", rng)
+    trials = [trial_of(chosen[i % len(chosen)], orders[drawn[i]], 0) for i in order]
     return [replace(trial, role="practice") for trial in trials]
 
 
@@ -181,7 +182,7 @@ def _with_checks(study: StudySpec, trials: Sequence[Trial], rng: np.random.Gener
     mixed = list(trials)
     for _ in range(study.attention_checks):
         model = trials[int(rng.integers(len(trials)))]
-        legal = task_of(study).legal(study)
+        legal = stated_answers(study)
         check = replace(model, role="check", expected=legal[int(rng.integers(len(legal)))])
         mixed.insert(int(rng.integers(1, len(mixed) + 1)), check)
     return mixed
@@ -193,7 +194,7 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
     for study in protocol.studies:
         if study.order == "by-group":
             own = len(_pairs_of(study, pairs)[0])
-            orders = len(task_of(study).orders)
+            orders = len(orders_of(study))
             groups = math.lcm(groups, orders if orders > 1 else max(own, 1))
         groups = math.lcm(groups, study.sets or 1)
     return groups

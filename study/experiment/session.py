@@ -185,8 +185,10 @@ def answered(session: Session, value: str, response_s: float, *, shown_well: boo
         Where nothing is asked now, for an answer that is not legal, and for one outside the answer window.
     """
     step = _asked(session)
-    if value not in step.legal:
-        raise SessionError(f"Expected one of {', '.join(step.legal)} in trial {step.trial}, found {value!r}.")
+    given = value.split(" ") if step.sliders else [value]
+    if len(given) != max(step.sliders, 1) or not set(given) <= set(step.legal):
+        legal = f"{step.sliders} of 0 to 100 with a space between two" if step.sliders else ", ".join(step.legal)
+        raise SessionError(f"Expected one of {legal} in trial {step.trial}, found {value!r}.")
     longest_s = math.inf if step.duration_s is None else step.duration_s
     if not (math.isfinite(response_s) and 0 <= response_s <= longest_s):
         raise SessionError(

@@ -74,6 +74,12 @@ OF_TASK: Mapping[str, Study] = {
         _METHODS + 'order = "balanced"  # half of the pairs in each order\n',
     ),
     "rating": Study("How natural do blends of the geodesic length look, and of ten frames?", _METHODS, tables=_ITEMS),
+    "parallel-rating": Study(
+        "How natural do three transitions look beside each other?",
+        _METHODS
+        + 'others = ["cut"]  # shown at once with the two\nreplays = 5  # times that all may be played again\n',
+        tables=_ITEMS,
+    ),
 }
 _MATCH = """# Both films of a pair take equally long, so that only the blend tells them apart.
 match = "duration"

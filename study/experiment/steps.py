@@ -13,12 +13,12 @@ from typing import Literal
 
 from study.experiment import wording
 from study.experiment.plan import Plan
-from study.experiment.protocol.whole import Protocol
+from study.experiment.protocol.whole import Protocol, StudySpec
 from study.tasks.answer import CONFIDENCE, Answer
-from study.tasks.registry import kind_of, right_answer, task_of
+from study.tasks.registry import kind_of, layout_of, right_answer, task_of
 from study.tasks.task import Kind as AnswerKind
 from study.tasks.task import scale
-from study.tasks.trial import PLACES, Trial
+from study.tasks.trial import PLACES, Pair, Trial
 
 Kind = Literal[
     "consent", "form", "instructions", "stimulus", "gap", "answer", "feedback", "pause", "break", "debrief", "done"
@@ -49,6 +49,8 @@ class Step:
     """The rating item that is asked, or `CONFIDENCE`."""
     answered_by: AnswerKind = "word"
     """What kind of answer is given."""
+    sliders: int = 0
+    """How many sliders there are, where the answer has a value for each, with a space between two."""
     legal: tuple[str, ...] = ()
     """The answers that count."""
     low: str = ""
@@ -81,9 +83,10 @@ def feedback_text(protocol: Protocol, trial: Trial, answer: Answer) -> str:
     return texts.practice_wrong.replace("{answer}", answer_words(protocol, right))
 
 
-def answer_words(protocol: Protocol, value: str) -> str:
-    """What stands on the button of an answer; points of a scale are their own words."""
-    return str(getattr(protocol.texts, value, value))
+def answer_words(protocol: Protocol, value: str, study: StudySpec | None = None) -> str:
+    """What stands on the button of an answer; points of a scale are their own words, slots side by side have places."""
+    beside = {"first": "left", "second": "right"} if study and study.side_by_side else {}
+    return str(getattr(protocol.texts, beside.get(value, value), value))
 
 
 def answer_keys(protocol: Protocol, legal: Sequence[str]) -> dict[str, str]:
@@ -92,10 +95,12 @@ def answer_keys(protocol: Protocol, legal: Sequence[str]) -> dict[str, str]:
     return {value: key for value, key in keys.items() if len(key) == 1}
 
 
-def answer_options(protocol: Protocol, legal: Sequence[str]) -> list[dict[str, str]]:
+def answer_options(protocol: Protocol, legal: Sequence[str], study: StudySpec | None = None) -> list[dict[str, str]]:
     """Answers, each with its word and its key."""
     keys = answer_keys(protocol, legal)
-    return [{"value": value, "label": answer_words(protocol, value), "key": keys.get(value, "")} for value in legal]
+    return [
+        {"value": value, "label": answer_words(protocol, value, study), "key": keys.get(value, "")} for value in legal
+    ]
 
 
 def film_times(protocol: Protocol, plan: Plan, frames: Mapping[str, int]) -> wording.Films:
@@ -106,14 +111,19 @@ def film_times(protocol: Protocol, plan: Plan, frames: Mapping[str, int]) -> wor
     shown: dict[str, dict[bool, list[int]]] = {}
     for trial in plan.trials:
         own = shown.setdefault(trial.study, {True: [], False: []})
-        own[trial.role == "practice"].append(sum(frames[name] for name in trial.stimuli))
+        own[trial.role == "practice"].append(_frames_of(protocol, trial, frames))
     for course in plan.courses:
         own = shown.setdefault(course.study, {True: [], False: []})
-        own[False] += [sum(frames[name] for name in pair.stimuli) for pair in course.pairs]
+        own[False] += [_frames_of(protocol, pair, frames) for pair in course.pairs]
     return {
         study: wording.FilmTimes(*(sum(own) / len(own) / protocol.fps if own else 0.0 for own in (of[False], of[True])))
         for study, of in shown.items()
     }
+
+
+def _frames_of(protocol: Protocol, shown: Trial | Pair, frames: Mapping[str, int]) -> int:
+    at_once = layout_of(protocol.study(shown.study)) == "side by side"
+    return (max if at_once else sum)(frames[name] for name in shown.stimuli)
 
 
 Earlier = Mapping[int, Sequence[tuple[int, Answer]]]
@@ -241,7 +251,7 @@ def trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset[
     base = Step("stimulus", trial.study, trial=trial.trial, attempt=attempt, role=trial.role)
     steps: list[Step] = []
     for slot, stimulus in enumerate(trial.stimuli, start=1):
-        if slot > 1:
+        if slot > 1 and layout_of(protocol.study(trial.study)) == "one after another":
             steps.append(replace(base, kind="gap", duration_s=timing.gap_s))
         steps.append(replace(base, stimulus=stimulus, slot=slot))
     steps += [step for step in _questions(protocol, trial, base) if step.item not in done]
@@ -254,9 +264,12 @@ def _questions(protocol: Protocol, trial: Trial, base: Step) -> list[Step]:
     study, texts = protocol.study(trial.study), protocol.texts
     task, question = task_of(study), wording.question_text(protocol, study)
     ask = replace(base, kind="answer", text=question, legal=task.legal(study), answered_by=kind_of(study))
-    ask = replace(ask, duration_s=protocol.timing.answer_s if task.timed else None)
+    sliders = (len(trial.stimuli) if layout_of(study) == "side by side" else 1) if kind_of(study) == "slider" else 0
+    ask = replace(ask, sliders=sliders, duration_s=protocol.timing.answer_s if task.timed else None)
     if trial.role == "check":
-        return [replace(ask, text=texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected)))]
+        return [
+            replace(ask, text=texts.attention_check.replace("{answer}", answer_words(protocol, trial.expected, study)))
+        ]
     if study.items:
         return [
             replace(ask, item=item.name, text=item.question, low=item.low, middle=item.middle, high=item.high)

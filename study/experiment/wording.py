@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from study.experiment.protocol.languages import words
 from study.experiment.protocol.whole import Protocol, StudySpec
-from study.tasks.registry import task_of
+from study.tasks.registry import layout_of, orders_of, task_of
 
 _ANSWER_S = 2.0
 _ITEM_S = 6.0
@@ -57,7 +57,10 @@ def welcome_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
 
 def _welcome_standard(protocol: Protocol) -> str:
     """The built-in welcome: by how many films a trial shows, or that it differs from part to part."""
-    kinds = {task_of(study).welcome for study in protocol.studies}
+    kinds = {
+        "welcome_together" if layout_of(study) == "side by side" else task_of(study).welcome
+        for study in protocol.studies
+    }
     name = "welcome_films_and_pairs" if kinds == {"welcome_films", "welcome_pairs"} else "welcome_mixed"
     name = kinds.pop() if len(kinds) == 1 else name
     parts = ["parts"] if len(protocol.studies) > 1 else []
@@ -71,13 +74,15 @@ def instructions_text(protocol: Protocol, study: StudySpec, films: Films = NO_FI
 
 def _instructions_standard(protocol: Protocol, study: StudySpec) -> str:
     besides = {"ties": study.ties, "confidence": study.confidence_points, "practice": study.practice}
-    named = (task_of(study).instructions, *(name for name, there in besides.items() if there))
+    own = "preference_together" if study.side_by_side else task_of(study).instructions
+    named = (own, *(name for name, there in besides.items() if there))
     return "\n\n".join(_standard(protocol, name) for name in named)
 
 
 def question_text(protocol: Protocol, study: StudySpec) -> str:
     """What is asked after each pair; the items of a rating study ask for themselves."""
-    return _filled(study.question, _standard(protocol, task_of(study).question), {})
+    own = "question_preference_together" if study.side_by_side else task_of(study).question
+    return _filled(study.question, _standard(protocol, own), {})
 
 
 def debrief_text(protocol: Protocol, films: Films = NO_FILMS) -> str:
@@ -145,7 +150,7 @@ def _estimated(protocol: Protocol, study: StudySpec) -> FilmTimes:
     stimuli = protocol.stimuli
     usual_s = (method.make.usual_s(method.length, protocol.fps) for method in protocol.methods_of(study).values())
     film_s = stimuli.entry_s + stimuli.exit_s + max(usual_s)
-    shown_s = task_of(study).slots * film_s
+    shown_s = film_s if layout_of(study) == "side by side" else len(orders_of(study)[0]) * film_s
     return FilmTimes(shown_s, shown_s)
 
 
@@ -153,7 +158,7 @@ def _besides_s(protocol: Protocol, study: StudySpec, at_most: bool) -> float:
     """What a trial takes in addition to its films."""
     timing = protocol.timing
     answer_s = timing.answer_s if at_most else min(_ANSWER_S, timing.answer_s)
-    gap_s = timing.gap_s * (task_of(study).slots - 1)
+    gap_s = timing.gap_s * (len(orders_of(study)[0]) - 1) if layout_of(study) == "one after another" else 0.0
     sure_s = _ANSWER_S if study.confidence_points else 0.0
     return gap_s + (_ITEM_S * len(study.items) or answer_s) + sure_s + timing.pause_s
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -20,7 +21,6 @@ from study.power.curve import Run
 from study.power.design import Design, Effect, kept_of, motions_of, times
 from study.tasks.observer import ObserverSettings, default_observer
 from study.tasks.registry import task_of
-from study.tasks.task import points_of
 
 
 def rating_effect(study: StudySpec, options: Mapping[str, float], decided: AnalysisSettings) -> Effect:
@@ -42,7 +42,9 @@ def rating_effect(study: StudySpec, options: Mapping[str, float], decided: Analy
 def rating_found(analysis: Analysis, study: StudySpec, difference: float, alpha: float) -> bool:
     """Return whether the test of the first question found the difference, in the right direction."""
     result = analysis.of(Ratings).get(study.name)
-    test = result.questions[0].difference if result and result.questions else None
+    both = {f"{one} minus {other}" for one, other in permutations((study.reference, study.comparison))}
+    found = result.questions[0].differences if result and result.questions else ()
+    test = next((one for one in found if one.of in both), None)
     if test is None or test.p_value is None or test.mean is None:
         return False
     # Differences are of the later method by name from the earlier; the effect is of the comparison.
@@ -64,7 +66,7 @@ def rating_observer(study: StudySpec, difference: float, correlation: float, mis
     typical = RatingObserver()
     spread = typical.noise_sd * np.sqrt(correlation / (1 - correlation))
     utility: dict[str, float] = {
-        study.comparison or "": difference / typical.utility_weight / stretch(points_of(study))
+        study.comparison or "": difference / typical.utility_weight / stretch(len(task_of(study).legal(study)))
     }
     return replace(
         default_observer(),
@@ -80,8 +82,12 @@ def rating_study(design: Design, alpha: float, difference: float) -> Run:
     Of each participant's own differences of the two methods' ratings; where pairs are rated, of the scores less the
     middle of the scale (whether a trial showed one or the other first changes nothing).
     """
-    rating, points, paired = design.settings.rating, points_of(design.study), task_of(design.study).slots > 1
+    task, study = task_of(design.study), design.study
+    rating, points, paired = design.settings.rating, len(task.legal(study)), task.slots > 1
     trials = design.trials()
+    if not task.slots:  # each trial shows both at once
+        both = (study.reference, study.comparison or "")
+        trials = [[replace(trial, methods=(name,)) for trial in own for name in both] for own in trials]
     raised = np.array([[paired or trial.methods[0] == design.study.comparison for trial in own] for own in trials])
     of_motion = motions_of(trials)
 

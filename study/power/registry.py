@@ -23,6 +23,7 @@ EFFECTS: Mapping[str, Make] = {
     "rating": rating_effect,
     "oddity": forced_effect,
     "2afc": forced_effect,
+    "parallel-rating": rating_effect,
 }
 
 OF_PROCEDURES: Mapping[str, Make] = {"staircase": staircase_effect, "quest-plus": staircase_effect}

@@ -41,6 +41,10 @@ AS_SAMPLES = (
     "with participants and motions as samples (Clark 1973) and Satterthwaite’s degrees of freedom (1946), made smaller "
     "for few motions"
 )
+JONELL_2021 = (
+    "Jonell, P., Yoon, Y., Wolfert, P., Kucherenko, T., & Henter, G. E. (2021). HEMVIP: Human evaluation of multiple "
+    "videos in parallel. Proceedings of the International Conference on Multimodal Interaction, 707–711."
+)
 DAVIDSON_1970 = (
     "Davidson, R. R. (1970). On extending the Bradley-Terry model to accommodate ties in paired comparison "
     "experiments. Journal of the American Statistical Association, 65, 317–328."

@@ -53,6 +53,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "percent": ("percent", "one"),
     "mean": ("mean", "two"),
     "median": ("median", "one"),
+    "rank": ("rank", "two"),
     "value": ("value", "two"),
     "standard_deviation": ("standard deviation", "two"),
     "standard_error": ("standard error", "two"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,20 @@ from study.models.choice import chance_of_first, chance_of_neither, lean, prefer
 from study.tasks.answer import Answer
 from study.tasks.methods import CHOICE, against, any_practice, both_methods, two_methods
 from study.tasks.observer import ObserverSettings, Person
-from study.tasks.task import Asked, Task
+from study.tasks.task import Asked, Problem, Task
 from study.tasks.trial import Trial
 
 
 def _columns(trial: Trial, answer: Answer) -> Mapping[str, Any]:
     counted = answer.value in ("first", "second") and trial.role != "check"
     return {"a_first": trial.a_first, "chose_a": (answer.value == "first") == trial.a_first if counted else None}
+
+
+def _problems(asked: Asked) -> Iterator[Problem]:
+    yield from two_methods(asked)
+    if asked.replays and not asked.side_by_side:
+        who = f"the {asked.task} study {asked.name!r}"
+        yield "replays", f"expected side_by_side = true with replays in {who}; write it, or remove replays"
 
 
 def _judge(who: Person, trial: Trial, legal: Sequence[str], rng: np.random.Generator) -> tuple[str, float]:
@@ -41,7 +48,7 @@ def _truth(settings: ObserverSettings, asked: Asked, _level: float, seen: Sequen
 
 
 def _in_words(asked: Asked, blends: Callable[[str], str]) -> str:
-    neither = ", or neither" if asked.ties else ""
+    neither = f"{', or neither' if asked.ties else ''}{', shown side by side' if asked.side_by_side else ''}"
     if not asked.others:
         return f"chose the more natural of two transitions{neither}, {against(asked, blends)}"
     named = [blends(name) for name in (asked.reference, asked.comparison or "", *asked.others)]
@@ -59,14 +66,14 @@ PREFERENCE = Task(
     orders=((0, 1), (1, 0)),
     timed=True,
     tested=True,
-    keys=frozenset({"others", "sets", "ties", "confidence_points"}),
+    keys=frozenset({"others", "sets", "ties", "confidence_points", "side_by_side", "replays"}),
     instructions="preference",
     question="question_preference",
     welcome="welcome_pairs",
     legal=lambda asked: ("first", "equal", "second") if asked.ties else ("first", "second"),
     right=lambda _: None,
     columns=_columns,
-    problems=two_methods,
+    problems=_problems,
     conditions=both_methods,
     practice=any_practice,
     judge=_judge,

@@ -10,13 +10,13 @@ from study.counting import counted
 from study.models.ordinal import stretch
 from study.tasks.methods import against, any_practice
 from study.tasks.observer import Person
-from study.tasks.task import Asked, Condition, Problem, Task, points_of, scale
+from study.tasks.task import SLIDER_POINTS, Asked, Condition, Problem, Task, scale
 from study.tasks.trial import Trial
 
 
 def points(asked: Asked) -> tuple[str, ...]:
     """The points of the scale, from 0."""
-    return scale(points_of(asked))
+    return scale(SLIDER_POINTS if asked.slider else asked.scale_points)
 
 
 def scale_problems(asked: Asked) -> Iterator[Problem]:
@@ -24,7 +24,7 @@ def scale_problems(asked: Asked) -> Iterator[Problem]:
     who = f"the {asked.task} study {asked.name!r}"
     if not asked.items:
         yield "", f"expected at least one [[studies.items]] in {who}, found none; add one"
-    if named := [item.name for item in asked.items if item.middle and points_of(asked) % 2 == 0]:
+    if named := [item.name for item in asked.items if item.middle and len(points(asked)) % 2 == 0]:
         yield (
             "scale_points",
             f"expected an odd number of scale_points in {who}, where {named[0]!r} has words for the middle, found "
@@ -43,7 +43,7 @@ def scale_in_words(asked: Asked, blends: Callable[[str], str]) -> str:
     """What is rated, on which scale."""
     asked_items = counted(len(asked.items), "question")
     drawn = f"slider{' with ticks' if asked.slider == 'ticks' else ''}" if asked.slider else "scale"
-    return f"{against(asked, blends)}, on a {drawn} of 0 to {points_of(asked) - 1} in {asked_items}"
+    return f"{against(asked, blends)}, on a {drawn} of 0 to {len(points(asked)) - 1} in {asked_items}"
 
 
 def _problems(asked: Asked) -> Iterator[Problem]:

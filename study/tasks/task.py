@@ -16,7 +16,7 @@ from study.tasks.answer import Answer
 from study.tasks.observer import ObserverSettings, Person
 from study.tasks.trial import Pair, Trial
 
-Layout = Literal["one after another"]
+Layout = Literal["one after another", "side by side"]
 """How the slots of a trial are shown."""
 
 Kind = Literal["word", "point", "slider"]
@@ -61,15 +61,17 @@ class Asked(Protocol):
     confidence_points: int | None
     slider: Slider | None
     scale_points: int
+    side_by_side: bool
+    replays: int
+    hidden_reference: str | None
 
     @property
     def items(self) -> Sequence[Item]:
         """Questions of a rating."""
 
-
-def points_of(asked: Asked) -> int:
-    """How many points the scale of a rating has."""
-    return SLIDER_POINTS if asked.slider else asked.scale_points
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """All methods that are shown."""
 
 
 Problem = tuple[str, str]
@@ -117,9 +119,10 @@ class Task:
     """What is decided, as a clause: "whether two transitions are the same"."""
     layout: Layout
     kind: Kind
-    """How its slots are shown, and what is answered; `kind_of` knows a study's sliders."""
+    """How its slots are shown, and what is answered; `layout_of` and `kind_of` know what a study changes."""
     orders: tuple[tuple[int, ...], ...]
-    """The orders in which a pair can be shown: for each slot, which of the pair's stimuli it shows."""
+    """The orders in which a pair can be shown: for each slot, which of the pair's stimuli it shows; empty where they
+    follow from how many methods a study has (`orders_of`)."""
     timed: bool
     """Whether the answer has a time limit."""
     tested: bool
@@ -155,5 +158,5 @@ class Task:
 
     @property
     def slots(self) -> int:
-        """How many stimuli a trial shows."""
-        return len(self.orders[0])
+        """How many stimuli a trial shows; 0 where the study decides."""
+        return len(self.orders[0]) if self.orders else 0

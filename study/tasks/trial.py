@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-PLACES = ("first", "second", "third")
+PLACES = ("first", "second", "third", "fourth", "fifth", "sixth")
 """What records call the slots of a trial, in their order."""
 
 

@@ -124,9 +124,9 @@ class ScriptedWindow:
         """Keeps the picture."""
         return Shown(rgb)
 
-    def drawing(self, positions: Any, figure: Any, camera: Any, fps: float, *, height: float) -> Shown:
+    def drawing(self, positions: Any, figure: Any, camera: Any, fps: float, *, height: float, cell: Any) -> Shown:
         """Keeps how many frames there are, and how large they are."""
-        del figure, fps
+        del figure, fps, cell
         shown = Shown(None, len(positions))
         wide, high = camera.size
         shown.place = (0, 0, round(height * wide / high), round(height))
@@ -143,11 +143,14 @@ class ScriptedWindow:
             raise SessionError("Expected a loaded image, found one that was released.")
         self._drawn = ("page", picture)
 
-    def paint_frame(self, drawing: Shown, frame: int) -> None:
-        """The next flip shows a frame of a motion."""
+    def paint_frame(self, drawing: Shown, frame: int, *, over: bool = False) -> None:
+        """The next flip shows a frame of a motion; one `over` others or a page is beside them."""
         if not 0 <= frame < drawing.frames:
             raise SessionError(f"Expected a frame from 0 to {drawing.frames - 1}, found {frame}.")
-        self._drawn = ("frame", (drawing, frame))
+        if not over:
+            self._drawn = ("frame", (drawing, frame))
+        elif self._drawn[0] == "frame":
+            self._drawn = ("frame", (*self._drawn[1], drawing, frame))
 
     def poll(self) -> tuple[Event, ...]:
         """Events that have arrived by now."""

@@ -235,7 +235,8 @@ class Serving:
 
 def answer_to(view: dict[str, Any], value: str | None = "", **more: Any) -> dict[str, Any]:
     """A message that answers a trial's view; the first legal answer unless given."""
-    first, *_ = [option["value"] for option in view["question"]["options"]] or ["0"]
+    sliders = len(view["films"]) if view.get("layout") == "side by side" else 1
+    first, *_ = [option["value"] for option in view["question"]["options"]] or [" ".join(["0"] * sliders)]
     return {
         "trial": view["trial"],
         "attempt": view["attempt"],

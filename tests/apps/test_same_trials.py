@@ -61,7 +61,32 @@ kind = "free-text"
 """,
     )
 )
-"""Every kind of answer."""
+TEXT += """
+[[studies]]
+name = "page"
+task = "parallel-rating"
+reference = "geodesic"
+comparison = "fixed"
+others = ["cut"]
+hidden_reference = "inertialize"
+replays = 2
+practice = 1
+attention_checks = 1
+
+[[studies.items]]
+name = "natural"
+question = "How natural are they?"
+low = "not at all"
+high = "very"
+
+[[studies]]
+name = "beside"
+task = "preference"
+reference = "geodesic"
+comparison = "fixed"
+side_by_side = true
+"""
+"""Every kind of answer and layout."""
 
 Read = list[tuple[str, str]]
 
@@ -81,12 +106,14 @@ def script(protocol: Protocol, plan: Plan) -> Iterator[Act]:
             continue
         elif step.kind == "answer":
             key = answer_keys(protocol, step.legal)[step.legal[0]]
-            if step.answered_by == "slider":
-                yield Act((Key(key, 0.4), Key("space", 0.5)))
-                yield Act()  # the page is drawn anew as the slider moves
+            if step.sliders:
+                keys = [pressed for _ in range(step.sliders) for pressed in (key, "tab")]
+                moves = [Key(pressed, 0.3) for pressed in (keys if step.sliders > 1 else [key])]
+                yield Act((*moves, Key("space", 0.5)))
+                yield from [Act()] * len(moves)  # the page is drawn anew as sliders move
             else:
                 yield press(key, 0.5)
-            state, _ = answered(state, step.legal[0], 0.5)
+            state, _ = answered(state, " ".join([step.legal[0]] * max(step.sliders, 1)), 0.5)
             continue
         elif step.kind in READ:
             yield press("space")
@@ -172,7 +199,7 @@ def test_window_browser_and_simulation_have_the_same_trials(
     assert plans["window"] == plans["browser"] == plans["simulation"]
     assert [group for group, _ in plans["window"]] == [0, 1]
     tasks = {trial.task for _, trials in plans["window"] for trial in trials}
-    assert tasks == {"same-different", "preference", "rating"}
+    assert tasks == {"same-different", "preference", "rating", "parallel-rating"}
     # A pair is rated after both its films, in the order of the group.
     compared = [trial for _, trials in plans["window"] for trial in trials if trial.study == "compared"]
     assert [trial.a_first for trial in compared] == [True, False]

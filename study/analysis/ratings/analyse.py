@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from study.analysis.estimates import Interval
 from study.analysis.headline import Headline, holds_for
-from study.analysis.ratings.answers import of_pairs
+from study.analysis.ratings.answers import of_pairs, rated
 from study.analysis.ratings.comparisons import MethodDifference, Question, rating_anova
 from study.analysis.ratings.pairs import PairQuestion, pair_ratings, pair_sentences
 from study.analysis.ratings.table import MethodRating, rating_table
@@ -73,6 +73,29 @@ class Ratings:
 
 
 @dataclass(frozen=True)
+class OwnRating:
+    """How one participant rated a method that was shown among others: the mean value, and the mean rank on its pages.
+
+    Rank 1 is the highest; equal values share the mean of their ranks.
+    """
+
+    participant: str
+    method: str
+    answers: int
+    mean: float
+    rank: float
+
+
+@dataclass(frozen=True)
+class ParallelRatings(Ratings):
+    """The result of a study in which several methods were rated at once: `Ratings`, and those of each participant."""
+
+    keys: ClassVar[Mapping[str, str]] = {"parallel_ratings": "participants"}
+
+    participants: tuple[OwnRating, ...] = ()
+
+
+@dataclass(frozen=True)
 class PairRatings:
     """The result of a study in which one method was rated beside another."""
 
@@ -101,6 +124,25 @@ class PairRatings:
             )
             for question, sentence in zip(self.questions, pair_sentences(self.questions, alpha), strict=True)
         ]
+
+
+def analyse_parallel(answers: pd.DataFrame, name: str, settings: Settings) -> ParallelRatings:
+    """Analyse one parallel rating study: a row a film, with the trial whose page it was on.
+
+    Raises
+    ------
+    AnalysisError
+        When the answers can't be read.
+    """
+    del name
+    part = rated(answers)
+    part["rank"] = part["rating"].groupby([part["participant"].astype(str), part["trial"]]).rank(ascending=False)
+    own = tuple(
+        OwnRating(str(who), str(method), len(rows), float(rows["rating"].mean()), float(rows["rank"].mean()))
+        for (who, method), rows in part.groupby([part["participant"].astype(str), "method_a"], sort=True)
+    )
+    confidence = settings.confidence
+    return ParallelRatings(rating_table(answers, confidence), rating_anova(answers, confidence), own)
 
 
 def analyse_ratings(answers: pd.DataFrame, name: str, settings: Settings) -> Ratings | PairRatings:

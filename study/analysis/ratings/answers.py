@@ -21,7 +21,7 @@ def rated(answers: pd.DataFrame) -> pd.DataFrame:
     """
     import pandas as pd
 
-    part = answers[answers["task"] == "rating"] if "task" in answers.columns else answers
+    part = answers[answers["task"].isin(("rating", "parallel-rating"))] if "task" in answers.columns else answers
     part = part[part["answer"].notna()].copy()
     part["rating"] = pd.to_numeric(part["answer"].astype(str).str.strip(), errors="coerce").astype(float)
     strange = ~(part["rating"].abs() <= estimates.LARGEST)

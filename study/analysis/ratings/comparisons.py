@@ -83,7 +83,7 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[Quest
     ----------
     answers
         Answers of one rating study: `participant`, `method_a`, `answer`, `trial`, and `item` where there are several
-        questions. The order is the method that a participant saw first.
+        questions. The order is the method that a participant saw first; methods that are shown at once have none.
     confidence
         Of intervals; of effect sizes they are of 1 - 2 alpha (see `effect_sizes`).
 
@@ -96,7 +96,8 @@ def rating_anova(answers: pd.DataFrame, confidence: float = 0.95) -> tuple[Quest
     if part.empty or "method_a" not in part.columns or part["method_a"].nunique() < 2:
         return ()
     part["participant"], part["method_a"] = part["participant"].astype(str), part["method_a"].astype(str)
-    part["order"] = part["participant"].map(first_seen(answers)) + " first"
+    at_once = "slot" in part.columns and bool(part["slot"].notna().all())
+    part["order"] = "" if at_once else part["participant"].map(first_seen(answers)) + " first"
     return tuple(_question(str(name), group, confidence) for name, group in part.groupby("item", sort=False))
 
 
@@ -117,7 +118,9 @@ def _question(name: str, part: pd.DataFrame, confidence: float) -> Question:
 
 
 def _as_published(part: pd.DataFrame, alpha: float) -> tuple[TwoWay | tuple[()], str]:
-    """The analysis of variance between subjects, and why there is none, or no F."""
+    """The analysis of variance between subjects, and why there is none, or no F; nothing of methods shown at once."""
+    if not part["order"].any():
+        return (), ""
     try:
         table = two_way(part["rating"], part["method_a"], part["order"], ("method", "order"), alpha)
     except AnalysisError as error:

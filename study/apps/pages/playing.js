@@ -69,6 +69,14 @@ export class Frames {
   }
 }
 
+// Back to the first frame, and there before anything is played.
+export function rewind(video) {
+  return new Promise((resolve) => {
+    video.addEventListener("seeked", resolve, { once: true });
+    video.currentTime = 0;
+  });
+}
+
 // Plays a loaded film once; resolves with how it was shown.
 export function play(video, film, fps) {
   return new Promise((resolve, reject) => {

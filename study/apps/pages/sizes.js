@@ -41,6 +41,30 @@ export function pictureSize(study) {
   };
 }
 
+// Pixels of the page beside films that are shown at once: the question and buttons, and what is under each film.
+const BESIDES = { slider: [210, 96], others: [310, 12], narrow: [440, 12] };
+
+// How large films are that are shown at once: in as many columns as make them largest, and no larger than a single one.
+export function cellSize(study, count, slider) {
+  const size = pictureSize(study);
+  const ratio = window.devicePixelRatio || 1;
+  const { innerWidth, innerHeight } = window;
+  const [room, under] = BESIDES[slider ? "slider" : innerWidth < 640 ? "narrow" : "others"];
+  const scaleOf = (columns) => {
+    const rows = Math.ceil(count / columns);
+    const high = ((innerHeight - room) / rows - under) * ratio;
+    const wide = ((innerWidth - 24) / columns - 16) * ratio;
+    return Math.min(high / size.height_px, wide / size.width_px, 1);
+  };
+  // Left and right stay left and right, however narrow the page is.
+  const possible = Array.from({ length: count }, (_, at) => at + 1).filter((columns) => slider || columns === count);
+  const best = possible.reduce((one, other) => (scaleOf(other) > scaleOf(one) ? other : one));
+  const scale = Math.max(scaleOf(best), 0.05);
+  const [width, height] = [even(size.width_px * scale), even(size.height_px * scale)];
+  const degrees = size.height_degrees === null ? null : Math.round(size.height_degrees * (height / size.height_px) * 1000) / 1000;
+  return { ...size, columns: best, width_px: width, height_px: height, width_css: width / ratio, height_css: height / ratio, height_degrees: degrees };
+}
+
 // Where a film is shown: in the middle of the page, from pixel to pixel of the screen, so that none is blurred.
 export function stage(study) {
   const size = pictureSize(study);

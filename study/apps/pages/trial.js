@@ -4,9 +4,9 @@ import { attend, faults, filmsOn, unseen, visible } from "./attention.js";
 import { fromHex, surround } from "./colours.js";
 import { ask, element, heading, secondClick, show, sleep, status } from "./dom.js";
 import { FilmFault, forget, load, loadAhead, release } from "./film.js";
-import { play } from "./playing.js";
+import { play, rewind } from "./playing.js";
 import { tell } from "./server.js";
-import { stage } from "./sizes.js";
+import { cellSize, stage } from "./sizes.js";
 
 const MOST_RESTARTS = 3;
 
@@ -23,16 +23,15 @@ export function matchBackground(video, study) {
   if (colour.every((value, i) => Math.abs(value - stated[i]) <= NEAR)) surround(colour.slice(0, 3));
 }
 
-async function loadAll(view, study, onFault) {
-  const place = stage(study);
-  place.setAttribute("aria-label", study.texts.wait);
+async function loadAll(view, study, layout, onFault) {
+  const place = layout.place(view, study);
   show([place], { trial: true });
   const timer = setTimeout(() => status(study.texts.wait), 600);
   const videos = [];
   try {
     for (const film of view.films) {
       const video = await load(film, view.fps, (why, attempt) => onFault(film, why, attempt));
-      place.append(video);
+      place.hold(video);
       videos.push(video);
     }
   } catch (error) {
@@ -47,8 +46,16 @@ async function loadAll(view, study, onFault) {
 
 class Unseen extends Error {} // films that were played to nobody
 
-// How the films of a trial are shown, by its layout: resolves with how each was shown, and when the last one ended.
-const LAYOUTS = { "one after another": inTurn };
+// How the films of a trial are shown, by its layout: the place for them, and how they are played, which resolves with how
+// each was shown and when the last one ended. Those that `stay` are there while the question is asked.
+const LAYOUTS = { "one after another": { place: single, play: inTurn, stay: false }, "side by side": { place: cells, play: together, stay: true } };
+
+function single(view, study) {
+  const place = stage(study);
+  place.setAttribute("aria-label", study.texts.wait);
+  place.hold = (video) => place.append(video);
+  return place;
+}
 
 async function inTurn(view, videos, restarts) {
   const shown = [];
@@ -65,21 +72,81 @@ async function inTurn(view, videos, restarts) {
   return { shown, last };
 }
 
+// A grid of films, under each its letter and room for a slider; where both are compared there is neither.
+function cells(view, study) {
+  const slider = view.question.kind === "slider";
+  const films = view.films.map(() => element("div", { class: "film" }));
+  const made = films.map((film, at) => element("div", { class: "cell" }, film, slider ? element("b", {}, "ABCDEF"[at]) : null));
+  const grid = element("div", { class: "grid" }, ...made);
+  const place = element("div", { class: "together", "data-focus": true, tabindex: "-1" }, grid);
+  const fit = () => {
+    const { columns, ...size } = cellSize(study, films.length, slider);
+    grid.style.gridTemplateColumns = `repeat(${columns}, auto)`;
+    for (const film of films) Object.assign(film.style, { width: `${size.width_css}px`, height: `${size.height_css}px` });
+    place.size = size;
+  };
+  window.addEventListener("resize", fit);
+  fit();
+  let next = 0;
+  return Object.assign(place, { cells: made, hold: (video) => films[next++].append(video), gone: () => window.removeEventListener("resize", fit) });
+}
+
+const MOST_APART = 1; // frames between films that start together
+
+// All films at once. Each one's frames tell when its first one was due; how far that is from the earliest is kept.
+async function together(view, videos, restarts) {
+  for (const video of videos) video.classList.add("now");
+  if (videos.some((video) => video.currentTime > 0)) await Promise.all(videos.map(rewind));
+  const all = await Promise.all(videos.map((video, at) => play(video, view.films[at], view.fps)));
+  if (restarts && unseen()) throw new Unseen();
+  const began = all.map(({ times_ms, frames }) => median(times_ms.map((time, at) => time - (frames[at] * 1000) / view.fps).slice(1)));
+  const first = Math.min(...began);
+  const apart = began.map((one) => (Number.isFinite(one) ? Math.round(((one - first) * view.fps) / 10) / 100 : null));
+  const close = apart.every((frames) => frames === null || frames <= MOST_APART);
+  const shown = all.map(({ last, ...how }, at) => ({ slot: view.films[at].slot, ...how, apart_frames: apart[at], shown_well: how.shown_well && close }));
+  return { shown, last: Math.max(...all.map((one) => one.last)) };
+}
+
+function median(values) {
+  return values.length ? [...values].sort((one, other) => one - other)[Math.floor(values.length / 2)] : NaN;
+}
+
 async function showFilms(view, study, { restarts, pauseOver, onFault }) {
-  const { place, videos } = await loadAll(view, study, onFault);
+  const layout = LAYOUTS[view.layout];
+  const { place, videos } = await loadAll(view, study, layout, onFault);
+  const away = () => {
+    videos.forEach(release);
+    place.gone?.();
+    place.remove();
+  };
   // `scale` is that of the film's own pixels in pixels of the page.
   const size = { ...place.size, scale: place.size.width_css / study.size[0] };
   matchBackground(videos[0], study);
   await pauseOver;
   await visible();
   if (restarts === MOST_RESTARTS) attend();
-  filmsOn(true);
+  let plays = 0;
+  const once = async (left) => {
+    filmsOn(true);
+    try {
+      plays += 1;
+      const { shown, last } = await layout.play(view, videos, left);
+      // Of a film that is seen again, what its frames amount to is kept, not each of them.
+      const kept = plays > 1 ? { times_ms: [], frames: [] } : {};
+      return { shown: shown.map((one) => ({ ...one, ...kept, play: plays })), last };
+    } finally {
+      filmsOn(false);
+    }
+  };
   try {
-    return { ...(await LAYOUTS[view.layout](view, videos, restarts)), size };
+    const films = { ...(await once(restarts)), size, away: () => {} };
+    if (!layout.stay) return films;
+    return { ...films, place, away, again: () => once(0) };
+  } catch (error) {
+    away();
+    throw error;
   } finally {
-    filmsOn(false);
-    videos.forEach(release);
-    place.remove();
+    if (!layout.stay) away();
   }
 }
 
@@ -118,36 +185,82 @@ function track(label, ticks, moved) {
   return element("div", { class: "track" }, input, marks);
 }
 
-function slider(question, study, chosen) {
-  const made = track(question.text, question.slider === "ticks", () => (button.disabled = false));
-  const value = () => made.querySelector("input").value;
+// One slider, or one under each film that is on the page.
+function slider(question, study, chosen, place) {
+  const cells = place?.cells ?? [null];
+  const left = () => tracks.some((one) => one.querySelector(".untouched"));
+  const label = (at) => (cells[at] ? `${"ABCDEF"[at]}: ${question.text}` : question.text);
+  const tracks = cells.map((_, at) => track(label(at), question.slider === "ticks", () => (button.disabled = left())));
+  const value = () => tracks.map((one) => one.querySelector("input").value).join(" ");
   const button = element("button", { type: "button", disabled: true, onclick: (event) => secondClick(event) || chosen(value(), event.timeStamp) }, study.texts.go_on);
-  return [made, element("div", { class: "buttons centre" }, button)];
+  if (place) cells.forEach((cell, at) => cell.append(tracks[at], ends(question) ?? ""));
+  return [place ? "" : tracks[0], button];
+}
+
+function ends({ low, middle, high }) {
+  const named = middle ? [low, middle, high] : [low, high];
+  return named.some(Boolean) ? element("div", { class: middle ? "ends thirds" : "ends" }, ...named.map((words) => element("span", {}, words))) : null;
 }
 
 // Asks; resolves with the value (null where the window closed first) and the time of the key or button. The window is
-// open for its time from `from` on, which is also where the answer's time begins (null: from when it is asked).
-function question(asked, study, from) {
+// open for its time from where films ended, which is also where the answer's time begins (without them from when it is
+// asked). Films that are still on the page can be played again, as often as the protocol allows.
+function question(asked, study, films) {
   return new Promise((resolve) => {
     const controller = new AbortController();
     const keys = new Map(asked.options.filter((option) => option.key).map((option) => [option.key, option.value]));
-    let timer = 0;
+    let [timer, busy, left, shown] = [0, false, asked.replays, []];
+    const held = new Map();
+    const lock = (locked) => {
+      busy = locked;
+      for (const one of document.querySelectorAll("main button, main input")) {
+        if (locked) held.set(one, one.disabled);
+        one.disabled = locked || held.get(one);
+      }
+    };
     const finish = (value, at) => {
-      if (controller.signal.aborted) return;
+      if (controller.signal.aborted || busy) return;
       controller.abort();
       clearTimeout(timer);
       for (const button of document.querySelectorAll("main button, main input")) {
         button.disabled = true;
         button.setAttribute("aria-pressed", String(button.dataset.value === value));
       }
-      resolve({ value, at, began });
+      resolve({ value, at, began, shown });
     };
-    const [scale, below = ""] = ANSWERS[asked.kind](asked, study, finish);
-    const named = asked.middle ? [asked.low, asked.middle, asked.high] : [asked.low, asked.high];
-    const ends = named.some(Boolean) ? element("div", { class: asked.middle ? "ends thirds" : "ends" }, ...named.map((words) => element("span", {}, words))) : null;
-    show([heading(asked.text, { class: "question" }), element("div", { class: "scale" }, scale, ends), below], { trial: true });
+    const [scale, go = null] = ANSWERS[asked.kind](asked, study, finish, films?.place);
+    const again = films?.again && left > 0 ? element("button", { type: "button", class: "quiet", onclick: (event) => secondClick(event) || replay() }, "") : null;
+    const named = () => again && (again.textContent = `${study.texts.play_again} (${left})`);
+    const buttons = again || go ? element("div", { class: "buttons centre" }, again, go) : "";
+    const scaled = element("div", { class: "scale" }, scale, films?.place && asked.kind === "slider" ? null : ends(asked));
+    named();
+    if (films?.place) films.place.append(heading(asked.text, { class: "question" }), scaled, buttons);
+    else show([heading(asked.text, { class: "question" }), scaled, buttons], { trial: true });
+    if (films?.place) films.place.prepend(films.place.querySelector("h1"));
     const asks = performance.now();
-    const began = from ?? asks;
+    let began = films?.last ?? asks;
+    const opens = () => {
+      const rest = asked.window_s === null ? null : began + asked.window_s * 1000 - performance.now();
+      if (rest !== null) timer = setTimeout(() => finish(null, performance.now()), rest);
+    };
+    const replay = async () => {
+      clearTimeout(timer);
+      lock(true);
+      left -= 1;
+      try {
+        const played = await films.again();
+        shown.push(...played.shown);
+        began = played.last;
+      } catch (error) {
+        if (!(error instanceof FilmFault)) throw error;
+        tell("fault", { what: error.why, play: asked.replays - left + 1 });
+        began = performance.now();
+      }
+      named();
+      lock(false);
+      if (again && left === 0) again.disabled = true;
+      opens();
+    };
     document.addEventListener(
       "keydown",
       (event) => {
@@ -160,8 +273,7 @@ function question(asked, study, from) {
       },
       { signal: controller.signal },
     );
-    const left = asked.window_s === null ? null : began + asked.window_s * 1000 - asks;
-    if (left !== null) timer = setTimeout(() => finish(null, performance.now()), left);
+    opens();
   });
 }
 
@@ -206,14 +318,16 @@ export async function trial(view, study, pauseOver, earlier) {
   }
   loadAhead(view.ahead);
   // The last film's last frame is when the participant has seen everything; a further question begins with itself.
-  const { value, at, began } = await question(view.question, study, withFilms ? films.last : null);
+  const { value, at, began, shown } = await question(view.question, study, withFilms ? films : null);
+  films?.away();
   const why = faults().join(", ");
+  const every = withFilms ? [...films.shown, ...shown] : [];
   const message = {
     ...base,
     value,
     response_s: value === null ? null : Math.max(0, (at - began) / 1000),
     shown_well: why === "" && (films?.shown ?? []).every((one) => one.shown_well),
-    shown: withFilms ? films.shown : [],
+    shown: every,
     timing: { last_frame_ms: began, answer_ms: at, time_origin_ms: performance.timeOrigin, faults: why, ...(films?.size ?? {}) },
   };
   return { message, films };

@@ -35,7 +35,11 @@ class Stopped(Exception):  # noqa: N818 - not an error: the participant leaves
 
 
 class Desk:
-    """A window with pages on it, and what was shown and went wrong in the present trial."""
+    """A window with pages on it, and what was shown and went wrong in the present trial.
+
+    `stills` are films that stay on a page with cells, each with the frame that it stands at; `standing` is the page as
+    it was when its last button was chosen.
+    """
 
     def __init__(self, window: Window, session: Session, store: ResponsesStore, look: Look) -> None:
         self.window, self.session, self.store, self.look = window, session, store, look
@@ -44,6 +48,8 @@ class Desk:
         self.showings: list[Showing] = []
         self.faults: list[str] = []
         self.size = window.size
+        self.stills: list[tuple[Any, int]] = []
+        self.standing: Page | None = None
 
     def drawn(self, page: Page) -> tuple[DrawnPage, Any]:
         """A page's picture, in the window's memory; the latest few are kept."""
@@ -59,13 +65,14 @@ class Desk:
         """Put a page up; with it comes when it was presented."""
         drawn, picture = self.drawn(page)
         self.window.paint(picture, self.look.ground)
+        for drawing, frame in self.stills if page.cells else ():
+            self.window.paint_frame(drawing, frame, over=True)
         return drawn, self.flip_away()
 
     def flip_away(self) -> float:
         """Flip to something that is no stimulus: the last frame of the stimulus before ends here."""
         at = self.window.flip()
-        if self.showings and self.showings[-1].ended_s is None:
-            self.showings[-1] = replace(self.showings[-1], ended_s=at)
+        self.showings = [one if one.ended_s is not None else replace(one, ended_s=at) for one in self.showings]
         return at
 
     def ask(self, page: Page, deadline_s: float | None = None) -> tuple[Button | None, float]:
@@ -83,6 +90,7 @@ class Desk:
                 button = chosen(drawn, event)
                 in_time = shown_s <= event.time_s and (deadline_s is None or event.time_s <= deadline_s)
                 if button is not None and in_time:
+                    self.standing = drawn.page
                     self.notice(events[number + 1 :])  # a second key counts for nothing; a lost focus is logged
                     return button, event.time_s
                 if (turned := changed(drawn, event)) is not None:

@@ -10,15 +10,16 @@ sleeps until something happens, so a key is timed when it arrives, not at the ne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from renderer.events import Focus, Resized
+from renderer.screen import WHOLE, Shares
 from study.apps.player import screens
 from study.apps.player.calm import calm, settled
 from study.apps.player.desk import Desk, Stopped
-from study.apps.player.pages import Look
+from study.apps.player.pages import AGAIN, Look, cells_of
 from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, find_rate, frame_at
 from study.experiment.picture_size import Sight, seen_degrees, wanted_px
@@ -26,7 +27,7 @@ from study.experiment.session import Session, advanced, answered, current, fille
 from study.experiment.steps import Kind, Step
 from study.experiment.stimuli.stimulus import Stimulus
 from study.experiment.store.answers import Presentation
-from study.tasks.registry import task_of
+from study.tasks.registry import layout_of
 from study.tasks.task import Layout
 from study.tasks.trial import PLACES
 
@@ -106,7 +107,8 @@ class _Player(Desk):
     ) -> None:
         super().__init__(window, session, store, look)
         self._stimulus, self._setting, self._say = stimulus, setting, say
-        self._drawings: dict[str, Any] = {}
+        self._drawings: dict[tuple[str, Shares], Any] = {}
+        self.plays = 0
         self._rate = find_rate(self.protocol.fps, window.pacing.refresh_hz)
         self._monitor = window.monitor
         self._answers = self._dropped = self._faulty = 0
@@ -152,7 +154,7 @@ class _Player(Desk):
     def _read(self, step: Step) -> None:
         page = screens.reading_page(self.protocol, step, progress(self.session))
         while self.read_until(page) == "example":
-            self._show(step.stimulus)
+            self._show([step.stimulus], [self._drawing(step.stimulus)])
             self._blank_for(0.3)
         self.session = advanced(self.session)
 
@@ -183,7 +185,7 @@ class _Player(Desk):
 
     def _stimulus_step(self, step: Step) -> None:
         if step.slot == 1:
-            self.showings, self.faults = [], []
+            self.showings, self.faults, self.plays = [], [], 0
             if self.window.settle(self.look.ground):
                 self._note_display()
             self._monitor = self.window.monitor
@@ -191,15 +193,38 @@ class _Player(Desk):
             if not self.window.focused:
                 self.read_until(screens.away_page(self.protocol))
                 self._blank_for(0.3)
-        LAYOUTS[task_of(self.protocol.study(step.study)).layout](self, step)
+        LAYOUTS[layout_of(self.protocol.study(step.study))](self, step)
+
+    def together(self, step: Step) -> None:
+        """Show the stimuli of all slots at once, and go past all of them."""
+        slots = [one for one in self.session.steps[self.session.position :] if (one.trial, one.attempt) ==
+                 (step.trial, step.attempt) and one.slot]  # fmt: skip
+        if not self._play_together([one.stimulus for one in slots]):
+            self._start_again()
+            return
+        for _ in slots:
+            self.session = advanced(self.session)
+
+    def _play_together(self, identifiers: Sequence[str]) -> bool:
+        """Play stimuli side by side, over the page that asks about them; whether nobody interrupted it."""
+        drawings = [
+            self._drawing(name, cell) for name, cell in zip(identifiers, cells_of(len(identifiers)), strict=True)
+        ]
+        found = self._show(list(identifiers), drawings)
+        if found is None:
+            return False
+        self.plays += 1
+        self.showings += found
+        self.stills = [(drawing, drawing.frames - 1) for drawing in drawings]
+        return True
 
     def in_turn(self, step: Step) -> None:
         """Show the stimulus of one slot by itself; the steps between two slots are gaps."""
-        showing = self._show(step.stimulus)
-        if showing is None:
+        found = self._show([step.stimulus], [self._drawing(step.stimulus)])
+        if found is None:
             self._start_again()
             return
-        self.showings.append(showing)
+        self.showings += found
         self.session = advanced(self.session)
 
     def _prepare(self, session: Session) -> None:
@@ -207,21 +232,23 @@ class _Player(Desk):
         step, steps = current(session), session.steps[session.position :]
         own = [one for one in steps if (one.trial, one.attempt) == (step.trial, step.attempt)]
         wanted = [one.stimulus for one in own if one.stimulus]
-        for identifier in [name for name in self._drawings if name not in wanted]:
-            del self._drawings[identifier]
-        for identifier in wanted:
-            self._drawing(identifier)
+        at_once = layout_of(self.protocol.study(step.study)) == "side by side"
+        cells = cells_of(len(wanted)) if at_once else [WHOLE] * len(wanted)
+        for key in [key for key in self._drawings if key not in set(zip(wanted, cells, strict=True))]:
+            del self._drawings[key]
+        for identifier, cell in zip(wanted, cells, strict=True):
+            self._drawing(identifier, cell)
         asked = next(one for one in own if one.kind == "answer")
         self.drawn(screens.answer_page(self.protocol, asked, progress(session)))
 
-    def _drawing(self, identifier: str) -> Any:
-        if identifier not in self._drawings:
+    def _drawing(self, identifier: str, cell: Shares = WHOLE) -> Any:
+        if (identifier, cell) not in self._drawings:
             one = self._stimulus(identifier)
             high = one.camera.size[1] if self._setting.actual_size else wanted_px(self.protocol.screen, self._sight())
-            self._drawings[identifier] = self.window.drawing(
-                one.positions, one.figure, one.camera, self.protocol.fps, height=high
+            self._drawings[identifier, cell] = self.window.drawing(
+                one.positions, one.figure, one.camera, self.protocol.fps, height=high, cell=cell
             )
-        return self._drawings[identifier]
+        return self._drawings[identifier, cell]
 
     def _sight(self) -> Sight:
         """The screen that the window is on; its millimetres are what it says itself, unless somebody measured it."""
@@ -231,9 +258,9 @@ class _Player(Desk):
         distance_cm = setting.distance_cm or self.protocol.screen.distance_cm
         return Sight(high_px, wide_px / wide_cm if wide_cm else None, distance_cm)
 
-    def _size_shown(self, identifier: str) -> dict[str, Any]:
+    def _size_shown(self, identifier: str, cell: Shares) -> dict[str, Any]:
         """How large a stimulus is shown, for the record."""
-        _, _, wide, high = self._drawing(identifier).place
+        _, _, wide, high = self._drawing(identifier, cell).place
         sight = self._sight()
         degrees = seen_degrees(high, sight)
         return {
@@ -245,9 +272,12 @@ class _Player(Desk):
             "distance_cm": sight.distance_cm,
         }
 
-    def _show(self, identifier: str) -> Showing | None:
-        """Play a stimulus to its end; None where the participant interrupted it and stays."""
-        window, drawing = self.window, self._drawing(identifier)
+    def _show(self, identifiers: Sequence[str], drawings: Sequence[Any]) -> list[Showing] | None:
+        """Play stimuli at once to the end of the longest; None where the participant interrupted it and stays.
+
+        All are drawn in one flip, so that they are together to the frame; a shorter one stays at its last.
+        """
+        window, longest = self.window, max(drawing.frames for drawing in drawings)
         fps, period_s = self._rate.fps, window.pacing.period_s
         frames: list[int] = []
         flips: list[float] = []
@@ -257,9 +287,10 @@ class _Player(Desk):
             while True:
                 onset_s = flips[0] if flips else window.next_flip_s()
                 frame = frame_at(window.next_flip_s(), onset_s, fps, period_s) if flips else 0
-                if frame >= drawing.frames:
+                if frame >= longest:
                     break
-                window.paint_frame(drawing, frame)
+                for number, drawing in enumerate(drawings):
+                    window.paint_frame(drawing, min(frame, drawing.frames - 1), over=number > 0)
                 flips.append(window.flip())
                 frames.append(frame)
                 events = window.poll()
@@ -271,9 +302,14 @@ class _Player(Desk):
                 if self.notice(events):
                     self.ask_to_stop()
                     return None
-        shown = Showing(identifier, fps, period_s, tuple(frames), tuple(flips), drawing.frames, None, tuple(wrong))
-        self._dropped += shown.dropped_flips
-        return shown
+        found = []
+        for name, drawing in zip(identifiers, drawings, strict=True):
+            own = sum(frame < drawing.frames for frame in frames)
+            ended_s = flips[own] if own < len(flips) else None  # it then stood at its last frame
+            shown = tuple(frames[:own]), tuple(flips[:own])
+            found.append(Showing(name, fps, period_s, *shown, drawing.frames, ended_s, tuple(wrong)))
+        self._dropped += found[0].dropped_flips
+        return found
 
     def _start_again(self) -> None:
         """After an interruption the trial starts from its first stimulus; it has no answer yet."""
@@ -311,13 +347,18 @@ class _Player(Desk):
     def _answer(self, step: Step) -> None:
         """Ask, and store the answer with how its stimuli were shown before anything else."""
         page = screens.answer_page(self.protocol, step, progress(self.session))
-        zero_s = self.showings[-1].last_frame_s
-        deadline_s = None if step.duration_s is None else zero_s + step.duration_s
-        with calm():
-            button, at = self.ask(page, deadline_s)
+        while True:
+            zero_s = max(showing.last_frame_s for showing in self.showings[-max(len(page.cells), 1) :])
+            deadline_s = None if step.duration_s is None else zero_s + step.duration_s
+            with calm():
+                button, at = self.ask(page, deadline_s)
+            if button is None or button.name != AGAIN or self.standing is None:
+                break
+            self._play_together([showing.stimulus for showing in self.showings[: len(page.cells)]])
+            page = screens.fewer_replays(self.protocol, step, self.standing, self.plays)
         if self.window.monitor != self._monitor:  # asked after the answer, since asking takes time
             self.fault("moved to another display")
-        shown_well = not self.faults and all(showing.shown_well for showing in self.showings)
+        shown_well = not self.faults and all(showing.shown_well for showing in self.showings[: len(page.cells) or None])
         before = self.session
         if button is None:
             self.session, answer = missed(before, shown_well=shown_well)
@@ -341,10 +382,14 @@ class _Player(Desk):
     def _presentations(self, step: Step) -> list[Presentation]:
         method = "own clock" if self.window.pacing.own_clock else "swap"
         rows = []
-        for place, showing in zip(PLACES, self.showings, strict=False):
+        at_once = len(self.stills) if self.plays else 0
+        cells = cells_of(at_once) if at_once else [WHOLE] * len(self.showings)
+        for number, showing in enumerate(self.showings):
+            place = PLACES[number % len(cells)]
             detail: Mapping[str, Any] = {
                 **showing.detail(),
-                **self._size_shown(showing.stimulus),
+                **self._size_shown(showing.stimulus, cells[number % len(cells)]),
+                **({"play": 1 + number // at_once, "apart_frames": 0.0} if at_once else {}),
                 "faults": [*showing.faults, *self.faults],
             }
             rows.append(
@@ -374,5 +419,8 @@ STEPS: Mapping[Kind, Callable[[_Player, Step], None]] = {
 }
 """What is done at each kind of step; all others are read."""
 
-LAYOUTS: Mapping[Layout, Callable[[_Player, Step], None]] = {"one after another": _Player.in_turn}
+LAYOUTS: Mapping[Layout, Callable[[_Player, Step], None]] = {
+    "one after another": _Player.in_turn,
+    "side by side": _Player.together,
+}
 """How the slots of a trial are shown: from a slot's step on, past all that it showed."""

@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.events import Click, Event, Key
+from renderer.screen import Shares
 from study.apps.player.lettering import Fonts
+
+FILM = 0.74
+"""Share of a cell's height that is the film's; its slider has the rest."""
+
+AGAIN = "again"
+"""The button that plays films again."""
 
 RGB = tuple[int, int, int]
 Box = tuple[float, float, float, float]
@@ -72,6 +79,9 @@ class Page:
     """What was typed so far into a field; None where there is none."""
     hint: str = ""
     """Small print under the field or the question."""
+    cells: tuple[Shares, ...] = ()
+    """Where films stand that are shown at once, which stay while the question is asked; with sliders each has its own
+    under it."""
     sliders: tuple[int | None, ...] = ()
     """Where sliders of 0 to 100 stand, None for one that was not moved; with them the buttons count once all were."""
     slider: int = 0
@@ -156,7 +166,7 @@ def chosen(drawn: DrawnPage, event: Event) -> Button | None:
         button = drawn.pressed(event.name)
     else:
         button = drawn.clicked(event.x, event.y) if isinstance(event, Click) else None
-    if button is None or not drawn.page.sliders:
+    if button is None or button.name == AGAIN or not drawn.page.sliders:
         return button
     values = [str(value) for value in drawn.page.sliders if value is not None]
     return replace(button, name=" ".join(values)) if len(values) == len(drawn.page.sliders) else None
@@ -196,3 +206,11 @@ def _slid(drawn: DrawnPage, event: Event) -> Page | None:
 def _set(page: Page, number: int, value: int) -> Page:
     sliders = [*page.sliders[:number], min(max(value, 0), 100), *page.sliders[number + 1 :]]
     return replace(page, sliders=tuple(sliders), slider=number)
+
+
+def cells_of(count: int) -> tuple[Shares, ...]:
+    """Where so many films stand that are shown at once: up to three in a row, with room for a slider under each."""
+    columns = count if count <= 3 else -(-count // 2)
+    wide, high = 0.94 / columns, 0.65 / -(-count // columns)
+    places = [(0.03 + wide * (at % columns), 0.125 + high * (at // columns)) for at in range(count)]
+    return tuple((left + 0.005, top, left + wide - 0.005, top + FILM * high) for left, top in places)

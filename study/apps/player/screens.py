@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from study.apps.player.pages import POINTS, Button, Page
+from study.apps.player.pages import AGAIN, POINTS, Button, Page, cells_of
 from study.experiment.protocol.texts import FormField
 from study.experiment.protocol.whole import Protocol
 from study.experiment.steps import Step, answer_keys, answer_words
+from study.tasks.registry import layout_of, orders_of
 from study.tasks.task import Kind
 
 
@@ -41,14 +42,32 @@ def answer_page(protocol: Protocol, step: Step, progress: tuple[int, int]) -> Pa
     """The question after the stimuli, a button for each legal answer."""
     page = ANSWERS[step.answered_by](protocol, step)
     note = protocol.texts.practice if step.role == "practice" else ""
-    return _with_progress(protocol, replace(page, note=note), progress, step.role != "practice")
+    page = _beside(protocol, step, replace(page, note=note))
+    return _with_progress(protocol, page, progress, step.role != "practice")
+
+
+def _beside(protocol: Protocol, step: Step, page: Page) -> Page:
+    """Films that are shown at once stay over the question, and may be played again."""
+    study = protocol.study(step.study)
+    if layout_of(study) != "side by side":
+        return page
+    return fewer_replays(protocol, step, replace(page, cells=cells_of(step.sliders or len(orders_of(study)[0]))), 1)
+
+
+def fewer_replays(protocol: Protocol, step: Step, page: Page, plays: int) -> Page:
+    """The same page after films were played so many times."""
+    study, texts = protocol.study(step.study), protocol.texts
+    left = study.replays + 1 - plays
+    others = tuple(button for button in page.buttons if button.name != AGAIN)
+    again = (Button(AGAIN, f"{texts.play_again} ({left})", "r", "R"),) if left > 0 else ()
+    return replace(page, buttons=(*others, *again), chosen=-1)
 
 
 def _buttons(protocol: Protocol, step: Step) -> tuple[Button, ...]:
     keys = answer_keys(protocol, step.legal)
     buttons = []
     for value in step.legal:
-        words, key = answer_words(protocol, value), keys.get(value, "")
+        words, key = answer_words(protocol, value, protocol.study(step.study)), keys.get(value, "")
         # A digit on its own button says which key it is.
         buttons.append(Button(value, words, key, "" if words == key else key.upper()))
     return tuple(buttons)
@@ -66,7 +85,7 @@ def _points(protocol: Protocol, step: Step) -> Page:
 def _slider(protocol: Protocol, step: Step) -> Page:
     texts, ticks = protocol.texts, protocol.study(step.study).slider == "ticks"
     button = Button("go-on", texts.go_on, "space", texts.space_key)
-    scale = Page(question=step.text, buttons=(button,), sliders=(None,), ticks=ticks)
+    scale = Page(question=step.text, buttons=(button,), sliders=(None,) * step.sliders, ticks=ticks)
     return replace(scale, low=step.low, middle=step.middle, high=step.high)
 
 

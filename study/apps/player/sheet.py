@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from study.apps.player.lettering import Face, balanced, leftwards, wrapped
-from study.apps.player.pages import Box, Button, DrawnPage, Look, Page
+from study.apps.player.pages import FILM, Box, Button, DrawnPage, Look, Page
 from study.errors import SessionError
 
 if TYPE_CHECKING:
@@ -82,7 +82,8 @@ class _Sheet:
         self.stacked = False
         self.rows = self._button_rows(size[0] * 0.92)
         self.parts = self._parts()
-        self.height = sum(part.high for part in self.parts) + em * sum(part.gap for part in self.parts[1:])
+        gaps = sum(part.gap for part in self.parts[1:])
+        self.height = 0.0 if page.cells else sum(part.high for part in self.parts) + em * gaps
         self.boxes: list[Box] = []
         self.tracks: list[Box] = []
 
@@ -151,6 +152,9 @@ class _Sheet:
         """Draw it all; returns the places of the buttons."""
         self._draw_note(pen)
         self._draw_progress(pen)
+        if self.page.cells:
+            self._draw_around_films(pen)
+            return self.boxes
         top = max(self.size[1] * 0.08, (self.size[1] - self.height) * 0.46)
         for index, part in enumerate(self.parts):
             top += self.em * part.gap if index else 0.0
@@ -203,16 +207,19 @@ class _Sheet:
         if not button.key_words:
             self._middle(pen, button.words, y, 1.0, 1.0, middle)
         elif self.stacked:
-            self._draw_cap(pen, button.key_words, left + 1.3 * em, y)
-            self._font(1.0).draw(pen, (left + 2.6 * em, y), button.words, self.look.mix(1.0), "l")
+            half = self._cap_half(button.key_words)
+            self._draw_cap(pen, button.key_words, left + half + 0.55 * em, y)
+            self._font(1.0).draw(pen, (left + 2 * half + 1.1 * em, y), button.words, self.look.mix(1.0), "l")
         else:
             self._middle(pen, button.words, top + 1.3 * em, 1.0, 1.0, middle)
             self._draw_cap(pen, button.key_words, middle, top + 2.55 * em)
 
+    def _cap_half(self, words: str) -> float:
+        return max(0.75 * self.em, self._font(0.68).getlength(words) / 2 + 0.35 * self.em)
+
     def _draw_cap(self, pen: ImageDraw, words: str, x: float, y: float) -> None:
         """A key as it looks on a keyboard."""
-        em = self.em
-        half = max(0.75 * em, self._font(0.68).getlength(words) / 2 + 0.35 * em)
+        em, half = self.em, self._cap_half(words)
         cap = (x - half, y - 0.52 * em, x + half, y + 0.52 * em)
         pen.rounded_rectangle(cap, radius=0.2 * em, outline=self.look.mix(0.32), width=max(1, round(em * 0.05)))
         self._middle(pen, words, y, 0.68, 0.66, x)
@@ -231,6 +238,27 @@ class _Sheet:
         font.draw(pen, (left - spread, y), self.page.low, ink, "l")
         font.draw(pen, (right + spread, y), self.page.high, ink, "r")
         font.draw(pen, ((left + right) / 2, y), self.page.middle, ink, "m")
+
+    def _draw_around_films(self, pen: ImageDraw) -> None:
+        """The question over films that are shown at once, a slider under each, and the buttons below."""
+        (width, height), em, font = self.size, self.em, self._font(0.8)
+        lead = 1.5 * em
+        for number, words in enumerate(self.question):
+            middle = 0.085 * height + (number - (len(self.question) - 1) / 2) * lead
+            self._middle(pen, words, middle, 1.15, 1.0)
+        cells = self.page.cells if self.page.sliders else ()
+        for number, (left, top, right, bottom) in enumerate(cells):
+            under = (bottom - top) * (1 / FILM - 1) * height
+            y, from_x, to_x = bottom * height + 0.3 * under, left * width + 2 * em, right * width - 1.2 * em
+            self._middle(pen, "ABCDEF"[number], y, 1.0, 0.9, left * width + 0.7 * em)
+            self.tracks.append((from_x, y - 0.5 * em, to_x, y + 0.5 * em))
+            value, stands = self.page.sliders[number], number == self.page.slider
+            self._draw_slider(pen, self.tracks[-1], value, stands=stands)
+            for x, words, anchor in ((from_x, self.page.low, "l"), (to_x, self.page.high, "r")):
+                font.draw(pen, (x, y + 1.1 * em), words, self.look.mix(0.75), anchor)
+        self.stacked = True  # the key's cap beside the words
+        self.rows = [[(number, wide + 2.8 * em) for number, wide in row] for row in self.rows]
+        self._draw_buttons(pen, 0.79 * height)
 
     def _draw_sliders(self, pen: ImageDraw, top: float) -> None:
         em, half = self.em, min(14 * self.em, 0.4 * self.size[0])
@@ -266,7 +294,9 @@ class _Sheet:
 
     def _draw_note(self, pen: ImageDraw) -> None:
         if self.page.note:
-            self._middle(pen, self.page.note, 1.8 * self.base, 0.9 * self.base / self.em, 0.6)
+            self._middle(
+                pen, self.page.note, (0.9 if self.page.cells else 1.8) * self.base, 0.9 * self.base / self.em, 0.6
+            )
 
     def _draw_back(self, pen: ImageDraw) -> Box:
         """The back button, small and in the corner, so that it is not mistaken for an answer."""

@@ -15,8 +15,8 @@ from study.tasks.trial import PLACES
 LONGEST_FILM_FRAMES = 40_000
 """Far above the longest stimulus (120 s at 240 frames a second); a page can't fill the database."""
 
-MOST_SLOTS = 20
-"""Above the films of any trial."""
+MOST_SLOTS = 200
+"""Above the films of any trial, each time that they are played."""
 
 SHORTEST_PAGE, LONGEST_PAGE = 8, 64
 """Characters of the name that a page gives itself."""
@@ -72,6 +72,8 @@ class Shown(Message):
     frames_presented: Annotated[int, Field(ge=0, lt=LONGEST_FILM_FRAMES)] | None = None
     longest_gap_frames: Annotated[float, Field(ge=0, lt=1e9)] | None = None
     shown_well: bool
+    play: Annotated[int, Field(ge=1, le=100)] = 1
+    apart_frames: Annotated[float, Field(ge=0, lt=1e6)] | None = None
     times_ms: Annotated[tuple[Milliseconds, ...], Field(max_length=LONGEST_FILM_FRAMES)] = ()
     frames: Annotated[tuple[int, ...], Field(max_length=LONGEST_FILM_FRAMES)] = ()
 
@@ -143,5 +145,11 @@ def presented(message: Answered, shown: Shown, stimuli: Sequence[str], frames: M
         frames_presented=shown.frames_presented,
         longest_gap_frames=shown.longest_gap_frames,
         shown_well=shown.shown_well,
-        detail={"times_ms": shown.times_ms, "frames": shown.frames, **message.timing},
+        detail={
+            "times_ms": shown.times_ms,
+            "frames": shown.frames,
+            "play": shown.play,
+            "apart_frames": shown.apart_frames,
+            **message.timing,
+        },
     )

@@ -15,7 +15,7 @@ from study.experiment.protocol.whole import Protocol
 from study.experiment.session import Session, advanced, current, near, progress
 from study.experiment.steps import Step, answer_options
 from study.experiment.store.participants import Participant
-from study.tasks.registry import task_of
+from study.tasks.registry import layout_of, task_of
 
 FILMS = "films"
 """Relative to the page, which a proxy may show under any path."""
@@ -79,7 +79,7 @@ def view(session: Session, participant: Participant, film_bytes: int) -> dict[st
         shown["fps"] = protocol.fps
         shown["example"] = _film(step, participant, film_bytes) if step.stimulus else None
         words = study is not None and task_of(study).kind == "word"
-        shown["keys"] = answer_options(protocol, task_of(study).legal(study)) if study and words else []
+        shown["keys"] = answer_options(protocol, task_of(study).legal(study), study) if study and words else []
     return shown
 
 
@@ -89,7 +89,7 @@ def _trial(session: Session, participant: Participant, film_bytes: int) -> dict[
     return {
         **_asking(session, question),
         "films": [_film(other, participant, film_bytes) for other in own if other.slot],
-        "layout": task_of(session.protocol.study(question.study)).layout,
+        "layout": layout_of(session.protocol.study(question.study)),
         "gap_s": next((other.duration_s for other in own if other.kind == "gap"), 0),
         "ahead": list({(film := _film(other, participant, film_bytes))["url"]: film for other in ahead}.values()),
     }
@@ -112,6 +112,7 @@ def _film(step: Step, participant: Participant, film_bytes: int) -> dict[str, An
 
 
 def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
+    study = protocol.study(step.study)
     return {
         "item": step.item,
         "text": step.text,
@@ -119,7 +120,8 @@ def _question(protocol: Protocol, step: Step) -> dict[str, Any]:
         "middle": step.middle,
         "high": step.high,
         "window_s": step.duration_s,
-        "options": [] if step.answered_by == "slider" else answer_options(protocol, step.legal),
-        "slider": protocol.study(step.study).slider,
+        "options": [] if step.sliders else answer_options(protocol, step.legal, study),
+        "slider": study.slider,
+        "replays": study.replays,
         "kind": step.answered_by,
     }

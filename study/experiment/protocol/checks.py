@@ -67,7 +67,7 @@ def _check_study(protocol: Content, study: StudySpec, index: int, known: Sequenc
 def _check_methods(protocol: Content, study: StudySpec, index: int) -> None:
     """Refuse unknown methods, methods that do not suit the task, and pairs that cannot be compared."""
     where, who = ("studies", index), f"the {study.task} study {study.name!r}"
-    named = [*((key, name) for key in ("reference", "comparison") if (name := getattr(study, key)))]
+    named = [*((key, name) for key in ("reference", "comparison", "hidden_reference") if (name := getattr(study, key)))]
     named += [("others", name) for name in study.others]
     for key, name in named:
         _check_known([name], protocol.method_names, "methods", *where, key)

@@ -16,8 +16,7 @@ from study.experiment.protocol.stimuli import Points, Screen, StimulusSettings, 
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Listed, Part, Slug, Texts
 from study.models.tracks import Rule
-from study.tasks.registry import kind_of, task_of
-from study.tasks.task import points_of
+from study.tasks.registry import kind_of, orders_of, task_of
 from study.transitions.methods.method import Method
 from study.transitions.methods.registry import METHODS
 
@@ -78,7 +77,7 @@ class Content(Part):
         task, shown = task_of(study), len(self.transitions_of(study))
         if (own := study.procedure.trials(shown, study.repeats)) is not None:
             return own[1]
-        orders = len(task.orders) if study.order == "both" else 1
+        orders = len(orders_of(study)) if study.order == "both" else 1
         return shown * len(task.conditions(study, False)) // (study.sets or 1) * study.repeats * orders
 
     def fewest_trials_of(self, study: StudySpec) -> int:
@@ -125,7 +124,7 @@ class Content(Part):
     @property
     def scale_points(self) -> dict[str, int]:
         """Points of the scale of each rating study, by its name."""
-        return {study.name: points_of(study) for study in self.studies if kind_of(study) != "word"}
+        return {study.name: len(task_of(study).legal(study)) for study in self.studies if kind_of(study) != "word"}
 
     def practice_of(self, study: StudySpec) -> tuple[TransitionSpec, ...]:
         """The transitions that a study's practice alone shows."""

@@ -18,7 +18,7 @@ from study.experiment.protocol.errors import KeyMismatchError, refuse_all
 from study.experiment.protocol.settings import member_of, settings_in
 from study.experiment.protocol.stimuli import Points
 from study.experiment.protocol.texts import FormField, Listed, Part, Slug, known_slots
-from study.tasks.registry import DECIDES, NAMES, problems_of
+from study.tasks.registry import DECIDES, NAMES, kind_of, problems_of
 from study.tasks.task import Order, Show, Slider
 from study.transitions.methods.registry import METHODS
 
@@ -85,7 +85,8 @@ class StudySpec(Part):
     )
     others: Listed[str] = Field(
         default=(),
-        description="Preference: further methods; every pair of `reference`, `comparison` and these is compared.",
+        description="Preference: further methods; every pair of `reference`, `comparison` and these is compared. "
+        "Parallel rating: further methods that are shown beside them.",
     )
     sets: int | None = Field(
         default=None,
@@ -107,6 +108,19 @@ class StudySpec(Part):
         default=None,
         description="Rating: a slider from 0 to 100 in place of the points of a scale, `plain` or with `ticks` at "
         "every tenth.",
+    )
+    side_by_side: bool = Field(
+        default=False, description="Preference: whether both films are shown at once, one beside the other."
+    )
+    replays: int = Field(
+        default=0,
+        ge=0,
+        le=20,
+        description="Films shown at once: how often participants may play those of a trial again.",
+    )
+    hidden_reference: str | None = Field(
+        default=None,
+        description="Parallel rating: a further method, shown among the others, that a report compares them with.",
     )
     show: Show | None = Field(
         default=None,
@@ -193,8 +207,8 @@ class StudySpec(Part):
     @model_validator(mode="after")
     def _fits_task(self) -> Self:
         _check_task(self)
-        if self.slider and "scale_points" in self.model_fields_set:
-            message = "expected no scale_points with slider, which goes from 0 to 100; remove one"
+        if kind_of(self) == "slider" and "scale_points" in self.model_fields_set:
+            message = "expected no scale_points where sliders go from 0 to 100; remove it"
             raise KeyMismatchError(message, "scale_points")
         for key in ("question", "instructions"):
             known_slots(getattr(self, key), key)
@@ -203,7 +217,7 @@ class StudySpec(Part):
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods that this study shows."""
-        return (self.reference, *((self.comparison,) if self.comparison else ()), *self.others)
+        return (self.reference, *filter(None, (self.comparison, *self.others, self.hidden_reference)))
 
 
 def _check_task(study: StudySpec) -> None:

@@ -74,7 +74,7 @@ def audit(pairs: Sequence[Pair], moving: Mapping[str, Moving], fps: float) -> tu
     for one in dict.fromkeys(one for pair in pairs for one in pair.stimuli):
         positions, figure, camera = moving[one]
         seen[one] = view(first_and_last(positions, figure), camera, fps)
-    return tuple(compared(pair.name, *(seen[one] for one in pair.stimuli)) for pair in pairs if len(pair.stimuli) > 1)
+    return tuple(compared(pair.name, *(seen[one] for one in pair.stimuli)) for pair in pairs if len(pair.stimuli) == 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from study.experiment.stimuli.supply import Supply
 from study.experiment.stimuli.ways import Ways
 from study.experiment.wording import Films, FilmTimes, duration_s, minutes
 from study.motion.clip import file_frame
-from study.tasks.registry import task_of
+from study.tasks.registry import orders_of
 from study.transitions.advice import JND_LONGER_S, JND_SHORTER_S, just_noticeable
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def _times(study: StudySpec, protocol: Protocol, planned: Sequence[Planned]) -> 
     for each in planned:
         if each.study is study:
             own = practice if each.for_practice else trials
-            shown = task_of(study).orders[0]
+            shown = orders_of(study)[0]
             own += [sum(one.films[i].frames(protocol) for i in shown) / protocol.fps for one in each.showings]
     if not trials:
         return None

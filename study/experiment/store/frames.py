@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
@@ -54,7 +54,7 @@ def answers_frame(
     query = sa.select(answers, sessions.c.participant, sessions.c.simulated, sessions.c.protocol_sha256).join(
         sessions, answers.c.session_id == sessions.c.id
     )
-    for slot, place in enumerate(PLACES[2:], start=3):  # the table of answers itself has two
+    for slot, place in enumerate(PLACES[2:3], start=3):  # the table of answers itself has two
         own = answer_stimuli.alias(place)
         same = [own.c[name] == answers.c[name] for name in ("session_id", "trial", "item", "attempt")]
         query = query.outerjoin(own, sa.and_(*same, own.c.slot == slot))
@@ -69,7 +69,7 @@ def answers_frame(
             f"{responses.place}: expected answers under one protocol, found {len(hashes)}: "
             f"{', '.join(sha256[:12] for sha256 in hashes)}. Say which one by its sha256."
         )
-    table = pd.DataFrame([dict(row) for row in rows], columns=[*ANSWER_COLUMNS, "session_id"])
+    table = pd.DataFrame(_by_slider(responses, rows), columns=[*ANSWER_COLUMNS, "session_id"])
     # How sure somebody was stands beside the answer that it is about.
     showing = pd.MultiIndex.from_frame(table[["session_id", "trial", "attempt"]])
     about = table["item"] == CONFIDENCE
@@ -77,17 +77,36 @@ def answers_frame(
     table["confidence"] = sure.reindex(showing).to_numpy()
     table = table[~about]
     if not all_attempts:
-        table = table.drop_duplicates(["session_id", "trial", "item"], keep="last")
+        table = table.drop_duplicates(["session_id", "trial", "item", "slot"], keep="last")
     table["answered_at"] = [at.isoformat() for at in table["answered_at"]]
     # Answers without a meaning (missed, another task) stay empty rather than false.
     for column in ("reference_first", "a_first", "correct", "chose_a"):
         table[column] = table[column].astype("boolean")
     for column in ("simulated", "missed", "shown_well"):
         table[column] = table[column].astype(bool)
-    for column in ("difference_frames", "confidence"):
+    for column in ("difference_frames", "confidence", "slot"):
         table[column] = table[column].astype("Int64")
     table["response_s"] = table["response_s"].astype(float)
     return table[list(ANSWER_COLUMNS)].reset_index(drop=True)
+
+
+def _by_slider(responses: Responses, rows: Sequence[sa.RowMapping]) -> list[dict[str, Any]]:
+    """A row for each slider of a trial that has several, with the method and the film that were rated there."""
+    key = ("session_id", "trial", "item", "attempt")
+    films: dict[tuple[Any, ...], list[Any]] = {}
+    if any(" " in (row["answer"] or "") for row in rows):
+        for film in rows_of(responses, sa.select(answer_stimuli).order_by(answer_stimuli.c.slot)):
+            films.setdefault(tuple(film[name] for name in key), []).append(film)
+    found: list[dict[str, Any]] = []
+    for row in rows:
+        values = (row["answer"] or "").split(" ")
+        if len(values) < 2:
+            found.append(dict(row))
+            continue
+        for value, film in zip(values, films[tuple(row[name] for name in key)], strict=True):
+            own = {"answer": value, "slot": film["slot"], "method_a": film["method"], "first": film["stimulus"]}
+            found.append({**row, **own, "method_b": "", "second": "", "third": ""})
+    return found
 
 
 def answers_csv(responses: Responses) -> str:

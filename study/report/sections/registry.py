@@ -7,7 +7,7 @@ from typing import Any
 
 from study.analysis.oddity.analyse import Oddity, TwoAlternatives
 from study.analysis.preference.analyse import Preference
-from study.analysis.ratings.analyse import PairRatings, Ratings
+from study.analysis.ratings.analyse import PairRatings, ParallelRatings, Ratings
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.study_result import StudyResult
 from study.report.sections.oddity import section as oddity
@@ -21,6 +21,7 @@ SECTIONS: Mapping[type[StudyResult], SectionKind[Any]] = {
     SameDifferent: same_different.KIND,
     Preference: preference.KIND,
     Ratings: ratings.KIND,
+    ParallelRatings: ratings.PARALLEL,
     PairRatings: pair_ratings.KIND,
     Oddity: oddity.KIND,
     TwoAlternatives: oddity.KIND,

@@ -73,6 +73,8 @@ def looked_at(tab: Any, name: str) -> None:
         unnamed = f"{fields}.filter((one) => !one.labels?.length && !one.ariaLabel).length"
         assert tab.run(unnamed) == 0
     tab.size(*LAPTOP)
+    tab.wait(f"window.innerWidth === {LAPTOP[0]}")
+    tab.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def to(tab: Any, script: str) -> None:

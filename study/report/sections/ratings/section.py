@@ -7,18 +7,19 @@ difference between the methods, the mixed design, and ranks.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from study.analysis.analyse import Analysis
 from study.analysis.crossed import OVER_BOTH
-from study.analysis.ratings.analyse import Ratings
+from study.analysis.ratings.analyse import ParallelRatings, Ratings
 from study.analysis.ratings.comparisons import MethodDifference, Question
 from study.analysis.ratings.table import MeanRating, MethodRating
 from study.analysis.variance.repeated_measures import WithinEffect
 from study.analysis.variance.two_way import VarianceEffect
 from study.counting import counted
 from study.report import tables, words
-from study.report.references import AS_SAMPLES, CLARK_1973, SATTERTHWAITE_1946
+from study.report.references import AS_SAMPLES, CLARK_1973, HOLM_1979, JONELL_2021, SATTERTHWAITE_1946
 from study.report.sections.ratings import figures
 from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
 from study.report.tables import Table
@@ -37,7 +38,8 @@ def ratings_section(result: Ratings, about: About) -> Section | None:
         drawings=tuple(_drawings(result, about)),
         tables=(
             means_table(name, result.table),
-            *((variance_table(name, questions), difference_table(name, questions)) if questions else ()),
+            *([variance_table(name, questions)] if any(question.anova for question in questions) else []),
+            *([difference_table(name, questions)] if questions else []),
         ),
         notes=tuple(dict.fromkeys(note for question in questions for note in _notes(question))),
         folded=tuple(_folded(name, result)),
@@ -273,3 +275,34 @@ def _methods(found: Collection[Ratings], analysis: Analysis) -> str:
 
 
 KIND = SectionKind(ratings_section, _methods, lambda _: {WANG_2003, CLARK_1973, SATTERTHWAITE_1946})
+
+
+def parallel_section(result: ParallelRatings, about: About) -> Section | None:
+    """Return the section of ratings on one page: as of any rating study, with each participant's values and ranks."""
+    section = ratings_section(result, about)
+    if section is None:
+        return None
+    rows = [vars(row) | {"method": words.readable(row.method)} for row in result.participants]
+    own = tables.make(
+        f"{about.name}_participants",
+        "Each participant’s mean value of a method, and its mean rank among those on one page; 1 is the highest.",
+        "participant method answers mean rank",
+        rows,
+    )
+    return replace(section, folded=(*section.folded, own))
+
+
+def _parallel_methods(found: Collection[ParallelRatings], analysis: Analysis) -> str:
+    del analysis
+    rows = [row for result in found for question in result.questions for row in question.differences]
+    several = f", {AS_SAMPLES}" if any(row.test == OVER_BOTH for row in rows) else ""
+    return (
+        "Values that were given beside each other (Jonell et al. 2021) were compared by Student’s t of each "
+        f"participant’s differences between two methods{several}; p-values of the pairs were adjusted by Holm’s "
+        "method. Ranks of the methods over participants were compared by Friedman’s test."
+    )
+
+
+PARALLEL = SectionKind(
+    parallel_section, _parallel_methods, lambda _: {JONELL_2021, HOLM_1979, CLARK_1973, SATTERTHWAITE_1946}
+)
