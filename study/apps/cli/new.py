@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from study.tasks.registry import NAMES
+
 from study.apps.cli.console import FOLDER, columns, emit, json_option, library_option, say
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 @click.option(
     "--study",
     metavar="TASK",
-    help="What participants decide: preference, same-different, oddity or rating (default: asks).",
+    help=f"What participants decide: {', '.join(NAMES)} (default: asks).",
 )
 @click.option(
     "--from",

@@ -24,7 +24,7 @@ from study.experiment.steps import Step, answer_options, feedback_text
 from study.experiment.stimuli.manifest import Manifest
 from study.files import write_whole
 from study.tasks.answer import Answer
-from study.tasks.registry import right_answer
+from study.tasks.registry import layout_of, right_answer
 
 KEY = ("segue_participant", "segue_trial", "segue_item")
 """The columns by which an answer is known again: whose, to which trial, and to which of its questions."""
@@ -75,6 +75,11 @@ def sent_plan(protocol: Protocol, manifest: Manifest, participant: str) -> Plan:
     SessionError
         For another name.
     """
+    if at_once := [study.name for study in protocol.studies if layout_of(study) == "side by side"]:
+        raise SessionError(
+            f"Expected studies whose films are shown one after another, as other programs get them, found "
+            f"{', '.join(map(repr, at_once))} with films at once; run it with `segue serve` or `segue play`."
+        )
     if not re.fullmatch(r"p\d{3,}", participant) or int(participant[1:]) < 1:
         raise SessionError(
             f"Expected a participant as `segue export-stimuli` names them (p001, p002, ...), found {participant!r}."

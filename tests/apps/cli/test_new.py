@@ -182,7 +182,7 @@ def test_clips_that_are_too_short_are_refused(capsys: pytest.CaptureFixture[str]
     ("arguments", "words"),
     [
         (("walk.bvh", "run.bvh"), "expected --study, found none; name one: same-different, whether two"),
-        (("walk.bvh", "run.bvh", "--study", "2afc"), "found 2afc; name one: same-different, whether two"),
+        (("walk.bvh", "run.bvh", "--study", "triads"), "found triads; name one: same-different, whether two"),
         (("--study", "rating"), "expected two clips or more, found 0; name files, as in segue new walk.bvh run.bvh"),
         (("walk.bvh", "--study", "rating"), "expected two clips or more, found 1"),
         (("walk.bvh", "./walk.bvh", "--study", "rating"), "expected each clip once, found walk, walk"),
@@ -205,7 +205,7 @@ def test_refusals(capsys: pytest.CaptureFixture[str], folder: Path, arguments: t
 def test_a_terminal_is_asked_for_what_is_not_given(
     capsys: pytest.CaptureFixture[str], at_terminal: Callable[..., None]
 ) -> None:
-    at_terminal("2afc", "preference", ".", "run walk")
+    at_terminal("triads", "preference", ".", "run walk")
     assert run(["new"]) == 0
     asked = capsys.readouterr().err
     assert re.search(r"^preference +which of two transitions is more natural$", asked, re.MULTILINE)
