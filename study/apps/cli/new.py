@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study.tasks.registry import NAMES
-
 from study.apps.cli.console import FOLDER, columns, emit, json_option, library_option, say
 
 if TYPE_CHECKING:
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
 @click.option(
     "--study",
     metavar="TASK",
-    help=f"What participants decide: {', '.join(NAMES)} (default: asks).",
+    help="What participants decide: preference, same-different, oddity, 2afc, rating or parallel-rating (default: asks).",
 )
 @click.option(
     "--from",
