@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 # The hop beside the strip's own colours for source, blend and destination.
 HOP_COLOUR = (196, 160, 0)
-_MARGIN_S, _HEIGHT = 0.4, 300
+_MARGIN_S = 0.4
 
 
 def strip_segments(played: Played) -> list[Segment]:
@@ -28,8 +28,14 @@ def strip_segments(played: Played) -> list[Segment]:
     return parts
 
 
-def draw_played(played: Played, out: Path, *, poses: int = 13) -> None:
-    """A PNG file of so many poses, evenly spaced from shortly before the first blend to shortly after the last."""
+def draw_played(
+    played: Played, out: Path, *, poses: int = 13, span: tuple[int, int] | None = None, height: int = 300
+) -> None:
+    """A PNG file, so many pixels high, of so many poses, evenly spaced.
+
+    They go from shortly before the first blend to shortly after the last, or from frame to frame of a `span`, so that
+    several strips show the same times.
+    """
     from renderer.strip import render_strip
     from study.motion.clip import joint_positions
     from study.motion.drawing import figure_for
@@ -38,11 +44,12 @@ def draw_played(played: Played, out: Path, *, poses: int = 13) -> None:
     blends = [part for part in played.segments if part.kind == "blend"]
     first = max(blends[0].start - margin, 0) if blends else 0
     last = min(blends[-1].stop + margin, clip.frames) - 1 if blends else clip.frames - 1
+    first, last = span or (first, last)
     render_strip(
         out,
         joint_positions(clip, ends=True),
         figure_for(clip.skeleton),
         frames=sorted({round(first + (last - first) * k / max(poses - 1, 1)) for k in range(poses)}),
         segments=strip_segments(played),
-        height=_HEIGHT,
+        height=height,
     )
