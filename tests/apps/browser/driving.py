@@ -80,7 +80,7 @@ def ended(process: subprocess.Popen[bytes]) -> None:
     """End a browser that was started here."""
     process.terminate()
     try:
-        process.wait(10)
+        process.wait(3)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
