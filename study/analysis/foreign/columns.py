@@ -41,7 +41,9 @@ class Columns:
     """Rating: the method that was rated."""
     motion: str | None = None
     item: str | None = None
-    """`motion`, `item`: the motion, and the question of a rating; not known where None."""
+    condition: str | None = None
+    """`motion`, `item`, `condition`: the motion, the question of a rating, and what is compared (tasks with a stimulus
+    level); not known where None."""
     yes: tuple[str, ...] = ()
     """What counts as right, yes, different or the first; the usual words where empty."""
     tie: tuple[str, ...] = ()

@@ -59,6 +59,8 @@ def read_trials(table: pd.DataFrame, columns: Columns, task: str) -> Foreign:
         result["order"] = column(table, columns.order, "order of a pair")[given]
     if columns.motion:
         result["motion"] = column(table, columns.motion, "motion")[given]
+    if columns.condition:
+        result["condition"] = column(table, columns.condition, "condition")[given]
     missed = int((placed & ~given).sum())
     return Foreign(result.reset_index(drop=True), rows, len(result), int((~placed).sum()), missed)
 

@@ -7,12 +7,14 @@ group, since answers of one participant are not independent of each other.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from study.analysis import estimates
+from study.analysis.conditions import SLOPE, OwnEstimate
 from study.analysis.estimates import Interval, NotFitted
 from study.analysis.headline import NO_TEST, Headline, holds_for
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
@@ -185,6 +187,21 @@ def typical_threshold(trials: pd.DataFrame, model: Model, confidence: float) -> 
     """Return the threshold of a typical participant as `analyse_psychometric` finds it, alone; or why there is none."""
     levels, yes, shown = (trials[column].to_numpy(dtype=np.float64) for column in ("level", "yes", "shown"))
     return _typical(trials, model, fit_likelihood(levels, yes, shown, model, confidence=confidence), confidence)
+
+
+def own_functions(trials: pd.DataFrame, condition: str, model: Model, confidence: float) -> Iterator[OwnEstimate]:
+    """Return each participant's threshold and slope in one condition, with their errors, to compare conditions."""
+    reach = 2 * estimates.normal_quantile(confidence)
+    for name, part in trials.groupby(trials["participant"].astype(str), sort=True):
+        found = function_of(part, model, confidence)
+        if found.threshold is None or found.threshold.value is None or found.width is None or not found.width.value:
+            continue
+        low, high = found.threshold.interval.low, found.threshold.interval.high
+        error = None if low is None or high is None else (high - low) / reach
+        yield OwnEstimate(str(name), condition, "threshold", found.threshold.value, error)
+        low, high = found.width.interval.low, found.width.interval.high
+        error = None if low is None or high is None else math.log(high / low) / reach
+        yield OwnEstimate(str(name), condition, SLOPE, -math.log(found.width.value), error)
 
 
 def function_of(trials: pd.DataFrame, model: Model, confidence: float) -> Function:

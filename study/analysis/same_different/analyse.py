@@ -29,6 +29,7 @@ from study.analysis.same_different.interpolation import crossings
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.analysis.same_different.order import OrderTest, order_test
+from study.analysis.same_different.own import OwnThresholds, own_thresholds
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.study_result import Settings
 
@@ -100,6 +101,8 @@ class SameDifferent(Thresholds):
     clustering: estimates.Clustering
     """How alike the answers of a participant are, at the pairs with a difference."""
     motions: tuple[MotionThresholds, ...]
+    own: tuple[OwnThresholds, ...]
+    """What each participant's responses give by themselves."""
     order_test: OrderTest
     answer: str
     """The thresholds in sentences."""
@@ -186,6 +189,7 @@ def analyse_jnd(
         d_prime=d_prime_table(counts, confidence),
         clustering=estimates.clustering(counts.different[:, moved].sum(axis=1), counts.shown[:, moved].sum(axis=1)),
         motions=_by_motion(given, level, confidence, resamples, rng),
+        own=own_thresholds(counts, level, lapse),
         order_test=order_test(given),
         answer=in_words(found, _believed(found.model, among, len(counts.participants)), level),
     )

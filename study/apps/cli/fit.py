@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from study.errors import AnalysisError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from study.analysis.conditions import OwnEstimate
     from study.analysis.foreign.columns import Columns, Foreign
     from study.analysis.psychometric.analyse import PsychometricStudy
     from study.analysis.same_different.analyse import SameDifferent
@@ -24,13 +25,35 @@ Read = tuple["Foreign", Callable[[], dict[str, Any]]]
 
 # The options of each task, in addition to the common ones; others are refused.
 OWN = {
-    "2afc": ("level", "motion", "shown", "yes", "sigmoid", "choices", "lapse"),
-    "yes-no": ("level", "motion", "shown", "yes", "sigmoid", "guess", "lapse"),
-    "same-different": ("level", "motion", "shown", "yes", "order", "reference_first", "threshold", "lapse"),
+    "2afc": ("level", "motion", "condition", "shown", "yes", "sigmoid", "choices", "lapse"),
+    "yes-no": ("level", "motion", "condition", "shown", "yes", "sigmoid", "guess", "lapse"),
+    "same-different": (
+        "level",
+        "motion",
+        "condition",
+        "shown",
+        "yes",
+        "order",
+        "reference_first",
+        "threshold",
+        "lapse",
+    ),
     "preference": ("first", "second", "motion", "yes", "tie", "alpha"),
     "rating": ("method", "motion", "item", "scale", "ends", "alpha"),
 }
-COLUMNS = ("level", "answer", "participant", "shown", "order", "first", "second", "method", "motion", "item")
+COLUMNS = (
+    "level",
+    "answer",
+    "participant",
+    "shown",
+    "order",
+    "first",
+    "second",
+    "method",
+    "motion",
+    "item",
+    "condition",
+)
 
 
 def read_table(path: Path, needed: tuple[str, ...], delimiter: str | None = None) -> pd.DataFrame:
@@ -79,7 +102,7 @@ def _where(options: dict[str, Any]) -> tuple[tuple[str, str], ...]:
 
 def _function(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     """2AFC or yes-no."""
-    from study.analysis.psychometric.analyse import analyse_psychometric
+    from study.analysis.psychometric.analyse import analyse_psychometric, own_functions
     from study.analysis.psychometric.model import make_model
 
     trials = _trials(table, options)
@@ -88,21 +111,60 @@ def _function(table: pd.DataFrame, options: dict[str, Any]) -> Read:
         options["task"], sigmoid=options["sigmoid"] or "normal", choices=options["choices"] or 2, **settings
     )
     confidence = options["confidence"]
-    return trials, lambda: _told(
-        analyse_psychometric(trials.table, model, confidence=confidence, simulations=500), options
-    )
+
+    def analysed(part: pd.DataFrame) -> PsychometricStudy:
+        return analyse_psychometric(part, model, confidence=confidence, simulations=500)
+
+    def own(part: pd.DataFrame, name: str) -> Iterable[OwnEstimate]:
+        return own_functions(part, name, model, confidence)
+
+    return trials, lambda: _by_condition(trials.table, analysed, own, options)
 
 
 def _same_different(table: pd.DataFrame, options: dict[str, Any]) -> Read:
     """Same-different, through the analysis of our own studies."""
     from study.analysis.same_different.analyse import analyse_jnd
+    from study.analysis.same_different.counts import count_answers
+    from study.analysis.same_different.own import own_estimates
 
     trials = _trials(table, options)
-    level, confidence = options["threshold"] or 0.75, options["confidence"]
-    return trials, lambda: _told(
-        analyse_jnd(_pairs_answered(trials.table, options), level=level, confidence=confidence, lapse=options["lapse"]),
-        options,
-    )
+    level, confidence, lapse = options["threshold"] or 0.75, options["confidence"], options["lapse"]
+
+    def analysed(part: pd.DataFrame) -> SameDifferent:
+        return analyse_jnd(_pairs_answered(part, options), level=level, confidence=confidence, lapse=lapse)
+
+    def own(part: pd.DataFrame, name: str) -> Iterable[OwnEstimate]:
+        return own_estimates(count_answers(_pairs_answered(part, options)), name, level, lapse)
+
+    return trials, lambda: _by_condition(trials.table, analysed, own, options)
+
+
+def _by_condition(
+    table: pd.DataFrame,
+    analysed: Callable[[pd.DataFrame], PsychometricStudy | SameDifferent],
+    own: Callable[[pd.DataFrame, str], Iterable[OwnEstimate]],
+    options: dict[str, Any],
+) -> dict[str, Any]:
+    """The analysis of all trials; where they have conditions, of each condition, and the differences between them."""
+    from study.analysis.conditions import compare_conditions, headlines_of
+    from study.analysis.to_json import to_json
+
+    if not options["condition"]:
+        return _told(analysed(table), options)
+    parts = {str(name): part.reset_index(drop=True) for name, part in table.groupby("condition", sort=True)}
+    studies = {name: _told(analysed(part), options | {"study": name}) for name, part in parts.items()}
+    estimates = [one for name, part in parts.items() for one in own(part, name)]
+    differences = compare_conditions(estimates, options["confidence"])
+    lines = [f"{name}: {study['answer']}" for name, study in studies.items()]
+    lines += [f"{one.of}: {one.in_words()} ({one.test})." for one in differences]
+    headlines = [line for study in studies.values() for line in study["headline"]]
+    compared = to_json(headlines_of(differences, options["study"], options["confidence"]))
+    return {
+        "conditions": studies,
+        "differences": to_json(differences),
+        "headline": [*headlines, *compared],
+        "answer": "\n".join(lines),
+    }
 
 
 def _told(result: PsychometricStudy | SameDifferent, options: dict[str, Any]) -> dict[str, Any]:
@@ -222,6 +284,10 @@ FITS: Mapping[str, Callable[[pd.DataFrame, dict[str, Any]], Read]] = {
 @click.option("--second", help="Preference: column of the method shown second.")
 @click.option("--method", help="Rating: column of the method.")
 @click.option("--motion", help="Column of the motion (or other item) that was shown (default: not considered).")
+@click.option(
+    "--condition",
+    help="Column of a condition or group to compare: each is analysed by itself (default: no comparison).",
+)
 @click.option("--item", help="Rating: column of the question (default: one question).")
 @click.option("--scale", multiple=True, help="Rating: WORD=POINT, if the scale has words; once for each word.")
 @click.option(

@@ -29,6 +29,7 @@ from study.report.sections.same_different import figures
 from study.report.sections.same_different.tables import (
     d_prime_table,
     motion_table,
+    own_table,
     percent_table,
     recovery_table,
     threshold_tables,
@@ -70,6 +71,7 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
             percent_table(name, result),
             *([motion_table(name, result, about)] if several else []),
             d_prime_table(name, result),
+            *([own_table(name, result)] if len(result.own) > 1 else []),
             *([staircase_table(name, result.staircases)] if result.staircases else []),
         ),
         readings=tuple(_readings(result)),

@@ -97,6 +97,17 @@ def motion_table(name: str, result: SameDifferent, about: About) -> Table:
     )
 
 
+def own_table(name: str, result: SameDifferent) -> Table:
+    """Return what each participant's responses give by themselves."""
+    return make(
+        f"{name}_participants",
+        "Every participant by themselves. Thresholds in frames, criterion in standard deviations of an impression, and "
+        "lapse rate in percent, by a differencing model of their own responses.",
+        "participant answers shorter longer criterion lapse_percent remark",
+        [vars(own) | {"lapse_percent": own.lapse and 100 * own.lapse, "remark": own.note} for own in result.own],
+    )
+
+
 def percent_table(name: str, result: SameDifferent) -> Table:
     """Return the percentages of Figure 6."""
     return make(
