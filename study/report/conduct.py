@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -207,14 +206,3 @@ def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Tabl
         rows,
         files_only=" ".join(keys for keys, hide in hidden.items() if hide),
     )
-
-
-def known_truth(sessions: pd.DataFrame) -> dict[str, Any]:
-    """Return the true values of the simulated observers by study; empty where sessions disagree or people took part."""
-    if not len(sessions) or "truth_json" not in sessions or not sessions["simulated"].astype(bool).all():
-        return {}
-    texts = set(sessions["truth_json"].dropna())
-    if len(texts) != 1 or sessions["truth_json"].isna().any():
-        return {}
-    studies = json.loads(texts.pop()).get("studies", {})
-    return dict(studies)

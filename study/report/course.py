@@ -1,90 +1,15 @@
-"""How participants answered over the course of a study: answers in, a table and figures out."""
+"""Response times over the course of a session: answers in, a figure out."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from study.analysis.analyse import Results
-from study.report import tables, words
 from study.report.drawing import BLUE, FAINT, RULE, Picture, new_figure, picture_of, quiet_grid
-from study.report.sections.registry import SECTIONS
-from study.report.sections.section import Course
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-PARTS = 6
-FEWEST_ANSWERS = 12
-
-
-def learning_table(answers: pd.DataFrame, results: Results) -> tables.Table:
-    """Return, for sixths of each study's trials, how participants answered: right (same-different), or the first."""
-    rows = []
-    for study, part in answers.groupby("study", sort=False):
-        result = results.studies.get(str(study))
-        if result is not None and (course := SECTIONS[type(result)].course):
-            rows += _by_sixths(str(study), course, part)
-    return tables.make(
-        "learning",
-        "Over the course of each study. By sixths of its trials: right answers (same-different) or answers for the one "
-        "shown first (preference), means over participants with standard errors.",
-        "study part what percent standard_error:one answers",
-        rows,
-    )
-
-
-def _by_sixths(study: str, course: Course, part: pd.DataFrame) -> list[dict[str, Any]]:
-    """Percentages by sixth of one study; none where there are too few trials to part."""
-    given = part[part["answer"].notna()]
-    if len(given) < FEWEST_ANSWERS:
-        return []
-    place = part.groupby("participant")["trial"].rank(method="first")
-    most = place.groupby(part["participant"]).transform("max")
-    if most.max() < PARTS:
-        return []
-    sixth = np.ceil(place / most * PARTS).loc[given.index]
-    what, counts_of = course
-    counts = counts_of(given).astype(float)
-    shares = counts.groupby([given["participant"].astype(str), sixth]).mean().unstack()
-    sizes = counts.groupby(sixth).size()
-    rows = []
-    for number in shares.columns:
-        column = shares[number].dropna()
-        error = 100 * float(column.std(ddof=1)) / len(column) ** 0.5 if len(column) > 1 else None
-        row = {"study": study, "part": int(number), "what": what, "percent": 100 * float(column.mean())}
-        rows.append(row | {"standard_error": error, "answers": int(sizes[number])})
-    return rows
-
-
-def learning_figure(table: tables.Table, name: str, mark: str) -> Picture | None:
-    """Draw the table, one panel a study; None where there is nothing to draw."""
-    if not table.rows:
-        return None
-    studies = list(dict.fromkeys(str(row["study"]) for row in table.rows))
-    columns = 4  # also for fewer: panels keep their size
-    lines = -(-len(studies) // columns)
-    with new_figure(7.2, 2.0 * lines + 0.5, lines, columns, sharex=True, sharey=True, squeeze=False) as (figure, grid):
-        spoken = []
-        for axes, study in zip(grid.flat, studies, strict=False):
-            own = [row for row in table.rows if row["study"] == study]
-            across, up = [row["part"] for row in own], [row["percent"] for row in own]
-            errors = [row["standard_error"] or 0.0 for row in own]
-            axes.axhline(50, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
-            axes.errorbar(across, up, yerr=errors, color=BLUE, marker="o", markersize=3.5, linewidth=1.3, elinewidth=1)
-            axes.set_title(f"{words.readable(study)}:\n{own[0]['what']}", fontsize=8.5)
-            axes.set_ylim(-3, 103)
-            axes.set_yticks([0, 50, 100], ["0", "50", "100%"])
-            axes.set_xticks(range(1, PARTS + 1))
-            quiet_grid(axes)
-            spoken.append(f"{words.readable(study)}, {own[0]['what']}: " + ", ".join(f"{value:.0f}%" for value in up))
-        for axes in grid.flat[len(studies) :]:
-            axes.set_axis_off()
-        for axes in grid[-1]:
-            axes.set_xlabel("sixth of the study")
-        return picture_of(figure, name, "Answers over the course of each study", "; ".join(spoken), mark)
 
 
 def response_figure(answers: pd.DataFrame, name: str, mark: str) -> Picture | None:

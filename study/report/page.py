@@ -15,7 +15,7 @@ from study.report.material import Material
 from study.report.media import Pictures
 from study.report.sections.preference.section import confirmatory_table
 from study.report.sections.registry import SECTIONS
-from study.report.sections.section import About, Drawing, Headline, Section, readings_table
+from study.report.sections.section import About, Drawing, Headline, Section, headline_table
 from study.report.tables import Table
 
 
@@ -39,7 +39,7 @@ class Page:
     warnings: tuple[str, ...]
     """`title`, `source`, `facts`, `warnings`: at the head of the page."""
     comparison: Part
-    """Results as published and corrected, side by side, and the confirmatory tests."""
+    """Headlines in numbers, and the confirmatory tests."""
     sections: tuple[Section, ...]
     """One a study, in the protocol's order."""
     power: Part
@@ -90,7 +90,7 @@ def compose(material: Material, analysis: Analysis) -> Page:
         source=words.sentence(protocol.source),
         facts=facts.facts(material, analysis),
         warnings=tuple(words.warnings_of(analysis.data, manifest.synthetic, *asked)),
-        comparison=_comparison(sections, analysis),
+        comparison=_comparison(analysis),
         sections=sections,
         power=_power(material, quality.participants),
         conduct=_conduct(material, analysis, mark, people),
@@ -120,7 +120,7 @@ def compose(material: Material, analysis: Analysis) -> Page:
 
 def _sections(material: Material, analysis: Analysis, mark: str) -> Iterator[Section]:
     """One section a study, in the protocol's order; studies without answers say so."""
-    protocol, known = material.protocol, conduct.known_truth(material.sessions)
+    protocol = material.protocol
     for study in protocol.studies:
         about = About(
             name=study.name,
@@ -138,7 +138,6 @@ def _sections(material: Material, analysis: Analysis, mark: str) -> Iterator[Sec
                 for pair in material.manifest.pairs
                 if pair.study == study.name
             },
-            known=known.get(study.name, {}),
         )
         result = analysis.studies.get(study.name)
         made = None if result is None else SECTIONS[type(result)].section(result, about)
@@ -164,8 +163,8 @@ def _without_answers(material: Material, about: About) -> Section:
     )
 
 
-def _comparison(sections: Sequence[Section], analysis: Analysis) -> Part:
-    made = (readings_table(sections), confirmatory_table(analysis.confirmatory))
+def _comparison(analysis: Analysis) -> Part:
+    made = (headline_table(analysis) if analysis.headline else None, confirmatory_table(analysis.confirmatory))
     return Part(tables=tuple(table for table in made if table is not None))
 
 
@@ -179,11 +178,9 @@ def _power(material: Material, asked: int) -> Part:
 
 def _conduct(material: Material, analysis: Analysis, mark: str, people: Sequence[Mapping[str, Any]]) -> Part:
     answers, presented = material.answers, material.presentations
-    learned = course.learning_table(answers, analysis.without_exclusions or analysis)
     drawings = [
         ("response_times", course.response_figure(answers, "response-times", mark),
          "Response times: all answers with the median, and the median and middle half over the session."),
-        ("learning", course.learning_figure(learned, "learning", mark), learned.caption),
         ("presentation", conduct.presentation_figure(presented, "presentation", mark),
          "The longest time between two frames of every presentation; 1 is perfect, display failures are orange."),
     ]  # fmt: skip
@@ -197,5 +194,5 @@ def _conduct(material: Material, analysis: Analysis, mark: str, people: Sequence
             *([conduct.presentation_table(presented)] if len(presented) else []),
             *conduct.exclusion_tables(analysis),
         ),
-        folded=(conduct.participant_table(analysis, material.sessions), learned),
+        folded=(conduct.participant_table(analysis, material.sessions),),
     )

@@ -21,10 +21,6 @@ SCHUIRMANN_1987 = (
     "Schuirmann, D. J. (1987). A comparison of the two one-sided tests procedure and the power approach. Journal of "
     "Pharmacokinetics and Biopharmaceutics, 15, 657–680."
 )
-ROUDER_2009 = (
-    "Rouder, J. N., Speckman, P. L., Sun, D., Morey, R. D., & Iverson, G. (2009). Bayesian t tests for accepting and "
-    "rejecting the null hypothesis. Psychonomic Bulletin & Review, 16, 225–237."
-)
 CAMERON_2011 = (
     "Cameron, A. C., Gelbach, J. B., & Miller, D. L. (2011). Robust inference with multiway clustering. Journal of "
     "Business & Economic Statistics, 29, 238–249."

@@ -60,6 +60,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "low": ("interval from", "two"),
     "high": ("to", "two"),
     "test": ("test", "text"),
+    "generalises_to": ("holds for", "text"),
     "statistic": ("statistic", "two"),
     "t": ("t", "two"),
     "chi_square": ("chi-square", "two"),
@@ -102,13 +103,11 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "known": ("known", "two"),
     "found": ("found", "two"),
     "distance": ("off by", "two"),
-    "standard_errors": ("in standard errors", "two"),
     # Preferences.
     "spread": ("spread of participants, logits", "two"),
     "narrow": ("upper end, times the lower", "two"),
     "margin": ("counts as none", "text"),
     "equivalence_p_value": ("equivalence p", "p"),
-    "bayes_factor_null": ("Bayes factor for none", "short"),
     # How the study went.
     "part": ("sixth", "count"),
     "what": ("percent of", "text"),

@@ -1,18 +1,18 @@
-"""What the page shows of one study: a headline, figures, tables, and one line of the table that compares readings."""
+"""What the page shows of one study: a headline, figures and tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from study.analysis.analyse import Analysis, Data
-from study.report import tables
+from study.report import tables, words
 from study.report.drawing import Picture
 from study.report.tables import Table
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,6 @@ class Headline:
 
 
 @dataclass(frozen=True)
-class Reading:
-    """A line of the table that sets published and corrected results side by side."""
-
-    result: str
-    published: str
-    corrected: str
-
-
-@dataclass(frozen=True)
 class Section:
     """One study on the page."""
 
@@ -56,8 +47,6 @@ class Section:
     """`drawings`, `tables`, `notes`: in this order; the tables follow the first drawing."""
     folded: tuple[Table, ...] = ()
     """Tables to open."""
-    readings: tuple[Reading, ...] = ()
-    """Its lines of the table that compares readings."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +72,6 @@ class About:
     """Names of the transitions in the protocol's order."""
     lengths: Mapping[str, int] = field(default_factory=dict)
     """Blend length in frames of the first stimulus of each transition's pairs: k in a same-different study."""
-    known: Mapping[str, Any] = field(default_factory=dict)
-    """What is known of simulated observers; empty where people took part."""
 
     @property
     def interval(self) -> str:
@@ -99,10 +86,6 @@ class About:
 Result = TypeVar("Result")
 
 
-Course = tuple[str, Callable[["pd.DataFrame"], "pd.Series[bool]"]]
-"""What the course of a study is told by: a percentage in words, and which answers count towards it."""
-
-
 @dataclass(frozen=True)
 class SectionKind(Generic[Result]):
     """How a kind of result is shown."""
@@ -113,24 +96,21 @@ class SectionKind(Generic[Result]):
     """How studies of this kind were analysed, for a Methods section: from the results and the whole analysis."""
     references: Callable[[Collection[Result]], set[str]]
     """Keys of the works that this rests on."""
-    course: Course | None = None
-    """None where answers do not change over a study in any way that is told."""
 
 
-def readings_table(sections: Sequence[Section]) -> Table | None:
-    """Return every result as published and corrected, side by side; None where there is no result."""
-    rows = [vars(row) for section in sections for row in section.readings]
-    if not rows:
-        return None
-    if len({row["result"] for row in rows}) < len(rows):
-        rows = [
-            vars(row) | {"result": f"{section.title}: {row.result}"} for section in sections for row in section.readings
-        ]
+def headline_table(analysis: Analysis) -> Table:
+    """Return every headline in numbers."""
+    rows = [
+        vars(one) | {"study": words.readable(one.study), "result": words.readable(one.unit), "value": one.estimate}
+        | {"low": one.interval.low, "high": one.interval.high, "p_value": one.p, "holm_p_value": one.p_adjusted}
+        for one in analysis.headline
+    ]  # fmt: skip
     return tables.make(
         "results",
-        "Every result as published and corrected, with confidence intervals in brackets. Published: the statistics of "
-        "the papers, which treat all responses as independent or interpolate thresholds linearly. Corrected: the "
-        "participant is the unit, and thresholds come from a model of the task.",
-        "result published corrected",
+        "Results in numbers. Confidence intervals and tests hold for what the last column names; p is also adjusted "
+        "for the other tests of its family (Holm). What the papers’ own statistics give is in the section of each "
+        "study.",
+        "study result value low high p_value holm_p_value generalises_to",
         rows,
+        headings={"value": "estimate"},
     )

@@ -57,4 +57,3 @@ def test_many_methods_have_their_strengths_and_a_row_for_each_pair() -> None:
     assert len(pairs.rows) == 6
     assert section.headlines[0].statement.startswith("Strengths in logits beside ")
     assert section.headlines[0].detail == "95% intervals over 9 participants and 4 motions."
-    assert not section.readings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from study.analysis.analyse import Analysis
@@ -10,15 +10,15 @@ from study.analysis.oddity.analyse import ForcedChoice
 from study.analysis.psychometric.analyse import BelievedThreshold
 from study.analysis.same_different.counts import SIGNS
 from study.counting import counted
-from study.report import tables, words
+from study.report import tables
 from study.report.drawing import BLUE, INK, SOFT, Picture, new_figure, percent_axis, picture_of
 from study.report.references import MACMILLAN_2005
-from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.report.tables import Table
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 def oddity_section(result: ForcedChoice, about: About) -> Section | None:
@@ -26,7 +26,6 @@ def oddity_section(result: ForcedChoice, about: About) -> Section | None:
     if not result.levels:
         return None
     name = about.name
-    known = [_recovered(name, result, about)] if about.known else []
     caption = (
         "Right answers by difference in blend length: means over participants with confidence intervals (Student’s t), "
         "and psychometric functions of all answers. The dashed line is chance; the dotted one, at "
@@ -40,13 +39,12 @@ def oddity_section(result: ForcedChoice, about: About) -> Section | None:
             Drawing(f"{name}_right", oddity_figure(result, f"study-{name}-right", about.mark), caption),
             *([tracks_drawing(name, result.staircases, about.mark)] if result.staircases else []),
         ),
-        tables=(_levels_table(name, result), _threshold_table(name, result, about.fps), *known),
+        tables=(_levels_table(name, result), _threshold_table(name, result, about.fps)),
         notes=(
             *([result.staircases.in_words()] if result.staircases else []),
             *(f"Blends that are {side}: {found.answer}" for side, found in result.functions.items()),
         ),
         folded=(staircase_table(name, result.staircases),) if result.staircases else (),
-        readings=tuple(_readings(result)),
     )
 
 
@@ -110,23 +108,6 @@ def _threshold_table(name: str, result: ForcedChoice, fps: float) -> Table:
     return tables.make(f"{name}_thresholds", caption, "side frames seconds low high remark", rows)
 
 
-def _recovered(name: str, result: ForcedChoice, about: About) -> Table:
-    """What is known of simulated observers beside what was found."""
-    rows = []
-    for side, found in result.thresholds.items():
-        known = abs(float(about.known[f"threshold_{side}_frames"]))
-        rows.append({"side": side, "known": known, "found": found.value, "low": found.low, "high": found.high})
-    caption = "Thresholds of the simulated observers, and as found, in frames."
-    return tables.make(f"{name}_recovery", caption, "side known found low high", rows)
-
-
-def _readings(result: ForcedChoice) -> Iterator[Reading]:
-    for side, found in result.thresholds.items():
-        if found.value is not None:
-            told = f"{found.value:.1f} [{words.bare_interval(found.low, found.high)}]"
-            yield Reading(f"threshold, {side} [frames]", "", told)
-
-
 def _methods(found: Collection[ForcedChoice], analysis: Analysis) -> str:
     del analysis
     named = {3: "three percepts of which the one farthest from the others", 2: "two percepts of which the larger one"}
@@ -139,8 +120,4 @@ def _methods(found: Collection[ForcedChoice], analysis: Analysis) -> str:
     )
 
 
-def _right(given: pd.DataFrame) -> pd.Series[bool]:
-    return given["correct"].astype(bool)
-
-
-KIND = SectionKind(oddity_section, _methods, lambda _: {MACMILLAN_2005}, ("right answers", _right))
+KIND = SectionKind(oddity_section, _methods, lambda _: {MACMILLAN_2005})

@@ -5,17 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 
 from study.analysis.analyse import Analysis
 from study.analysis.crossed import OVER_BOTH
 from study.analysis.ratings.analyse import PairRatings
-from study.analysis.ratings.pairs import AllAnswers, PairQuestion, ScoreTest
+from study.analysis.ratings.pairs import PairQuestion, ScoreTest
 from study.counting import counted
 from study.report import tables, words
 from study.report.references import AS_SAMPLES, CLARK_1973, SATTERTHWAITE_1946
 from study.report.sections.pair_ratings.figures import likert_figure
-from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Section, SectionKind
 from study.report.tables import Table
 from study.transitions.methods.method import WANG_2003
 
@@ -41,7 +41,6 @@ def pair_ratings_section(result: PairRatings, about: About) -> Section | None:
         tables=(published_table(name, questions), corrected_table(name, questions)),
         notes=tuple(dict.fromkeys(note for question in questions for note in _notes(question))),
         folded=(points_table(name, questions),),
-        readings=tuple(_readings(questions)),
     )
 
 
@@ -111,20 +110,10 @@ def _corrected(test: ScoreTest) -> str:
     )
 
 
-def _published(found: AllAnswers) -> str:
-    return f"{words.decimals(found.mean, 2)} (SD {words.decimals(found.standard_deviation, 2)})"
-
-
 def _notes(question: PairQuestion) -> list[str]:
     """Why something could not be had."""
     notes = (question.participants.note, question.order_note)
     return [f"{words.sentence(note)}." for note in notes if note]
-
-
-def _readings(questions: Sequence[PairQuestion]) -> Iterator[Reading]:
-    for question in questions:
-        result = f"{_item(question)}: {words.readable(question.of)}"
-        yield Reading(result, _published(question.published), _corrected(question.participants))
 
 
 # Tables

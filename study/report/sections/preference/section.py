@@ -25,13 +25,12 @@ from study.report.references import (
     CLARK_1973,
     DAVIDSON_1970,
     HOLM_1979,
-    ROUDER_2009,
     SATTERTHWAITE_1946,
     SCHUIRMANN_1987,
     WILSON_1927,
 )
 from study.report.sections.preference.figures import preference_figure, strengths_figure
-from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Section, SectionKind
 from study.report.tables import Table
 
 MOST_PAIRS = 3
@@ -65,7 +64,6 @@ def preference_section(result: Preference, about: About) -> Section | None:
         tables=tuple(shown),
         notes=tuple(notes),
         folded=tuple(folded),
-        readings=tuple(_reading(comparison) for comparison in comparisons),
     )
 
 
@@ -85,7 +83,6 @@ def _section_of_many(result: Preference, found: BradleyTerry, about: About) -> S
         tables=(strengths_table(about.name, found), pairs_table(about.name, result.comparisons)),
         notes=tuple([f"Strengths of the methods: {found.note}."] if found.note else []),
         folded=(),
-        readings=(),
     )
 
 
@@ -134,27 +131,6 @@ def headline(comparison: Comparison, about: About) -> Headline:
     return Headline(words.readable(comparison.answer), " ".join(parts))
 
 
-def _reading(comparison: Comparison) -> Reading:
-    published, people, both = comparison.published, comparison.participants, comparison.motions_as_sample.both
-    found = comparison.default
-    first, second = methods_of(comparison)
-    pooled, corrected = "no answers", "no answers"
-    if published.percent is not None and published.chi_square is not None and published.p_value is not None:
-        low, high = _percents(published.interval)
-        pooled = (
-            f"{published.percent:.1f}% [{words.bare_interval(low, high)}]; chi-square(1, N = {published.answers}) = "
-            f"{published.chi_square:.2f}, {words.p(published.p_value)}"
-        )
-    if found.percent is not None:
-        corrected = f"{found.percent:.1f}% [{words.bare_interval(found.low, found.high)}]"
-        test = both if both is not None and found.test == OVER_BOTH else people
-        if test.t is not None:
-            corrected += f"; t({test.degrees_of_freedom:.3g}) = {words.decimals(test.t, 2)}"
-        if found.p_value is not None:
-            corrected += f"{', ' if test.t is not None else '; sign test '}{words.p(found.p_value)}"
-    return Reading(f"{first} over {second}", pooled, corrected)
-
-
 def _percents(interval: Interval) -> list[float | None]:
     """The ends of an interval of a share, in percent."""
     return [None if end is None else 100 * end for end in (interval.low, interval.high)]
@@ -197,12 +173,7 @@ def _no_preference(found: NoEffect) -> list[str]:
         f"Evidence for no preference: two one-sided tests over participants for a share within {_margin(found)} give "
         f"{words.p(found.equivalence_p_value)}"
     )
-    factor = found.bayes_factor_null
-    if factor is None:
-        return [f"{text}."]
-    weight, side = (factor, "without") if factor >= 1 else (1 / factor, "with")
-    times = tables.short_number(weight)
-    return [f"{text}; the data are {times} times likelier {side} a preference (Bayes factor, Cauchy prior of 0.71)."]
+    return [f"{text}."]
 
 
 def _margin(found: NoEffect) -> str:
@@ -277,15 +248,12 @@ def no_preference_table(name: str, comparison: Comparison) -> Table:
         "low": low,
         "high": high,
         "equivalence_p_value": found.equivalence_p_value,
-        "bayes_factor_null": found.bayes_factor_null,
     }
     return tables.make(
         f"{name}_no_preference",
         "Evidence for no preference. Two one-sided t tests over participants (Schuirmann) that the share lies within "
-        f"{_margin(found)}, whose {100 * found.interval.confidence:g}% interval then lies in it; and how many times "
-        "likelier the data are without a preference than with one (Bayes factor of Rouder et al. 2009, Cauchy prior "
-        "of 0.71).",
-        "margin percent low:one high:one equivalence_p_value bayes_factor_null",
+        f"{_margin(found)}, whose {100 * found.interval.confidence:g}% interval then lies in it.",
+        "margin percent low:one high:one equivalence_p_value",
         [row],
     )
 
@@ -376,7 +344,7 @@ def _methods(found: Collection[Preference], analysis: Analysis) -> str:
     return (
         f"Preferences were tested by {test}.{neither}{family} Chi-square and exact binomial tests of all responses are "
         "given as published, with Wilson’s intervals. Evidence for no preference is an equivalence test "
-        f"(Schuirmann 1987) and a Bayes factor (Rouder et al. 2009).{strengths}"
+        f"(Schuirmann 1987).{strengths}"
     )
 
 
@@ -386,12 +354,11 @@ def _references(found: Collection[Preference]) -> set[str]:
     several |= {DAVIDSON_1970} if any(one.ties for one in fitted) else set()
     several |= {CAMERON_2011} if any(one.motions for one in fitted) else set()
     several |= {CLARK_1973, SATTERTHWAITE_1946}
-    return {WILSON_1927, HOLM_1979, SCHUIRMANN_1987, ROUDER_2009} | several
+    return {WILSON_1927, HOLM_1979, SCHUIRMANN_1987} | several
 
 
 KIND = SectionKind(
     preference_section,
     _methods,
     _references,
-    ("answers for the first", lambda given: given["answer"] == "first"),
 )

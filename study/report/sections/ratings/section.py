@@ -6,7 +6,7 @@ difference between the methods, the mixed design, and ranks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from study.counting import counted
 from study.report import tables, words
 from study.report.references import AS_SAMPLES, CLARK_1973, HOLM_1979, JONELL_2021, SATTERTHWAITE_1946
 from study.report.sections.ratings import figures
-from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Section, SectionKind
 from study.report.tables import Table
 from study.transitions.methods.method import WANG_2003
 
@@ -43,7 +43,6 @@ def ratings_section(result: Ratings, about: About) -> Section | None:
         ),
         notes=tuple(dict.fromkeys(note for question in questions for note in _notes(question))),
         folded=tuple(_folded(name, result)),
-        readings=tuple(_readings(questions)),
     )
 
 
@@ -179,15 +178,6 @@ def _notes(question: Question) -> list[str]:
     """Why something could not be had."""
     parts = [question.note, question.mixed_design.note, question.ranks.note]
     return [f"{words.sentence(note)}." for note in parts if note]
-
-
-def _readings(questions: Sequence[Question]) -> Iterator[Reading]:
-    for question in questions:
-        published = _f(question.anova[0], question.anova[0].p_value) if question.anova else "–"
-        name = words.readable(question.item) or "rating"
-        for difference in question.differences:
-            corrected = _difference(difference) if difference.mean is not None else "–"
-            yield Reading(f"{name}: {words.readable(difference.of)}", published, corrected)
 
 
 # Tables

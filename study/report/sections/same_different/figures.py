@@ -14,7 +14,6 @@ from study.report.drawing import (
     BLUE,
     FAINT,
     INK,
-    ORANGE,
     RULE,
     SOFT,
     Picture,
@@ -133,7 +132,7 @@ def motions_figure(result: SameDifferent, name: str, mark: str) -> Picture:
         return picture_of(figure, name, "Percent “different” for every motion", spoken, mark)
 
 
-def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mapping[Side, float]) -> Picture:
+def thresholds_figure(result: SameDifferent, name: str, mark: str) -> Picture:
     """Thresholds with intervals: all motions and each one, linear interpolation and model, shorter and longer."""
     entries: list[tuple[str, SameDifferent | MotionThresholds]] = [("all motions", result)]
     entries += [(readable(motion.motion), motion) for motion in result.motions if len(result.motions) > 1]
@@ -144,8 +143,6 @@ def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mappin
                 _bar(axes, entry.published[side], -row + 0.14, INK, "o")
                 if side in (own := _own(entry)):
                     _bar(axes, own[side], -row - 0.14, BLUE, "s")
-        for side, place in known.items():
-            axes.axvline(SIGNS[side] * place, color=ORANGE, linewidth=1.0, linestyle=(0, (2, 2)), zorder=0)
         named_rows(axes, [-row for row in range(len(entries))], [label for label, _ in entries])
         axes.set_ylim(-len(entries) + 0.5, 0.5)
         ticks = sorted({row.difference_frames for row in result.percent_different})
@@ -153,7 +150,7 @@ def thresholds_figure(result: SameDifferent, name: str, mark: str, known: Mappin
             axes.set_xlim(min(*ticks, -1) * 1.02, max(*ticks, 1) * 1.02)
             _level_ticks(axes, ticks)
         axes.set_xlabel(f"{100 * result.level:.0f}% “different”, frames from k")
-        _threshold_key(axes, bool(known))
+        _threshold_key(axes)
         return picture_of(figure, name, "Thresholds with their intervals", _spoken_thresholds(entries), mark)
 
 
@@ -175,17 +172,13 @@ def _bar(axes: Axes, threshold: Threshold, height: float, colour: str, marker: s
     axes.plot([sign * threshold.frames], [height], marker=marker, color=colour, markersize=5)
 
 
-def _threshold_key(axes: Axes, known: bool) -> None:
+def _threshold_key(axes: Axes) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4.5, label="linear interpolation (as published)"),
         Line2D([], [], color=BLUE, marker="s", markersize=4.5, label="differencing model"),
     ]
-    if known:
-        handles.append(
-            Line2D([], [], color=ORANGE, linestyle=(0, (2, 2)), label="true values of the simulated observers")
-        )
     axes.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8.5, labelcolor=SOFT)
 
 

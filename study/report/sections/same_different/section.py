@@ -31,15 +31,14 @@ from study.report.sections.same_different.tables import (
     motion_table,
     own_table,
     percent_table,
-    recovery_table,
     threshold_tables,
 )
-from study.report.sections.section import About, Drawing, Headline, Reading, Section, SectionKind
+from study.report.sections.section import About, Drawing, Headline, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.transitions.methods.method import WANG_2004
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 SUBJECTS: Mapping[str, Callable[[int], str]] = {
@@ -61,10 +60,7 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
         title=about.title,
         headlines=(headline(result, about),),
         drawings=tuple(_drawings(result, about)),
-        tables=(
-            used,
-            *([recovery_table(name, result, about.known)] if about.known else []),
-        ),
+        tables=(used,),
         notes=(*_notes(result), *_weber(result, about.lengths)),
         folded=(
             *([others] if others.rows else []),
@@ -74,13 +70,11 @@ def same_different_section(result: SameDifferent, about: About) -> Section:
             *([own_table(name, result)] if len(result.own) > 1 else []),
             *([staircase_table(name, result.staircases)] if result.staircases else []),
         ),
-        readings=tuple(_readings(result)),
     )
 
 
 def _drawings(result: SameDifferent, about: About) -> Iterator[Drawing]:
     name, mark = about.name, about.mark
-    truth = {side: abs(known) for side in PRINTED if (known := about.known.get(f"threshold_{side}_frames")) is not None}
     yield Drawing(
         f"{name}_curve",
         figures.same_different_figure(result, f"study-{name}-curve", mark),
@@ -91,7 +85,7 @@ def _drawings(result: SameDifferent, about: About) -> Iterator[Drawing]:
     )
     yield Drawing(
         f"{name}_thresholds",
-        figures.thresholds_figure(result, f"study-{name}-thresholds", mark, truth),
+        figures.thresholds_figure(result, f"study-{name}-thresholds", mark),
         "The just noticeable difference with confidence intervals. All motions: of the median observer, as in the "
         "headline, and by linear interpolation (Fieller’s, over participants); each motion: one model of all answers "
         "(jackknife over participants). Without a bar, the interval reaches beyond the levels shown.",
@@ -189,24 +183,6 @@ def _ends(threshold: Threshold) -> str:
 
 def _frames(threshold: Threshold) -> str:
     return f"{threshold.frames:.1f}" if threshold.frames is not None else f"({threshold.note})"
-
-
-def _readings(result: SameDifferent) -> Iterator[Reading]:
-    found = result.believed
-    for side, sign in PRINTED.items():
-        published, own = result.published.get(side), found.jnd.get(side) if found else None
-        yield Reading(
-            f"just noticeable difference, {side}",
-            f"{_with_interval(published, sign)}; linear interpolation" if published else "–",
-            f"{_with_interval(own, sign)}; {found.whose}" if found and own else "no model was fitted",
-        )
-
-
-def _with_interval(threshold: Threshold, sign: str) -> str:
-    if threshold.frames is None:
-        return threshold.note
-    ends = words.bare_interval(threshold.interval.low, threshold.interval.high, 2)
-    return f"k {sign} {threshold.frames:.2f} frames [{ends}]"
 
 
 def _staircase_note(found: Staircases) -> str:
@@ -309,13 +285,8 @@ def _methods(found: Collection[SameDifferent], analysis: Analysis) -> str:
     )
 
 
-def _right(given: pd.DataFrame) -> pd.Series[bool]:
-    return (given["answer"] == "different") == (given["difference_frames"] != 0)
-
-
 KIND = SectionKind(
     same_different_section,
     _methods,
     lambda _: {WANG_2004, FIELLER_1954, MACMILLAN_2005, WILSON_1927, CLARK_1973, SATTERTHWAITE_1946},
-    ("right answers", _right),
 )

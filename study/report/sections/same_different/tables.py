@@ -129,37 +129,3 @@ def d_prime_table(name: str, result: SameDifferent) -> Table:
         "difference_frames d_prime standard_error low high criterion d_prime_independent",
         [vars(row) for row in result.d_prime],
     )
-
-
-def recovery_table(name: str, result: SameDifferent, known: Mapping[str, Any]) -> Table:
-    """Return the thresholds that the simulated observers had beside those that were found."""
-    rows = []
-    for side in PRINTED:
-        own = result.staircases.thresholds if result.staircases else {}
-        for label, thresholds, truths, key in (
-            ("differencing model", result.model.jnd if result.model else {}, known, f"threshold_{side}_frames"),
-            ("linear interpolation", result.published, known, f"interpolated_{side}_frames"),
-            ("staircases", own, known.get("staircase", {}), f"threshold_{side}_frames"),
-        ):
-            truth, found = truths.get(key), thresholds.get(side)
-            if truth is None or found is None or found.frames is None:
-                continue
-            error, away = found.standard_error, found.frames - abs(truth)
-            rows.append(
-                {
-                    "estimate": label,
-                    "side": side,
-                    "known": abs(truth),
-                    "found": found.frames,
-                    "standard_error": error,
-                    "distance": away,
-                    "standard_errors": away / error if error else None,
-                }
-            )
-    return make(
-        f"{name}_recovery",
-        "What the simulated observers had and what was found, in frames. For linear interpolation the known value is "
-        "the crossing with infinite data; for staircases it is where the observers reach their target.",
-        "estimate side known found standard_error distance standard_errors",
-        rows,
-    )
