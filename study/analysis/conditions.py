@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from study.analysis import estimates
-from study.analysis.estimates import Interval, MeanTest, mean_test
-from study.analysis.headline import Headline, holds_for
+from study.analysis.estimates import MeanTest, mean_test
+from study.analysis.headline import Headline, headline_of, holds_for
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,17 +113,7 @@ def _welch(one: pd.Series[float], other: pd.Series[float], confidence: float) ->
 def headlines_of(differences: Iterable[ConditionDifference], study: str, confidence: float) -> list[Headline]:
     """Return a headline for each difference."""
     return [
-        Headline(
-            study=study,
-            statement=f"{one.of}: {one.in_words()}.",
-            estimate=one.mean,
-            unit=f"{one.quantity}, {one.of}",
-            interval=Interval(one.low, one.high, confidence),
-            p=one.p_value,
-            p_adjusted=one.holm_p_value,
-            test=one.test,
-            generalises_to=holds_for(one.participants),
-            note=one.note,
-        )
+        headline_of(one, study, f"{one.of}: {one.in_words()}.", f"{one.quantity}, {one.of}", confidence, test=one.test,
+                    generalises_to=holds_for(one.participants), adjusted=one.holm_p_value)
         for one in differences
-    ]
+    ]  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from study.analysis.estimates import Interval
+from study.analysis.estimates import Interval, Mean, MeanTest
 
 NO_TEST = "a threshold is estimated, and no hypothesis tested"
 
@@ -39,3 +39,23 @@ class Headline:
 def holds_for(participants: int) -> str:
     """What an interval over so many participants holds for."""
     return "participants, for these motions" if participants > 1 else "further responses of this participant"
+
+
+def headline_of(
+    found: Mean, study: str, statement: str, unit: str, confidence: float, *, test: str, generalises_to: str,
+    adjusted: float | None = None, note: str | None = None,
+) -> Headline:  # fmt: skip
+    """Return the headline of a mean: its estimate, interval and p-value, `adjusted` where it has a family."""
+    p_value = found.p_value if isinstance(found, MeanTest) else None
+    return Headline(
+        study=study,
+        statement=statement,
+        estimate=found.mean,
+        unit=unit,
+        interval=Interval(found.low, found.high, confidence),
+        p=p_value,
+        p_adjusted=p_value if adjusted is None else adjusted,
+        test=test,
+        generalises_to=generalises_to,
+        note=found.note if note is None else note,
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from study.analysis.estimates import Interval
-from study.analysis.headline import Headline, holds_for
+from study.analysis.headline import Headline, headline_of, holds_for
 from study.analysis.ratings.answers import of_pairs, rated
 from study.analysis.ratings.comparisons import MethodDifference, Question, rating_anova
 from study.analysis.ratings.pairs import PairQuestion, pair_ratings, pair_sentences
@@ -38,38 +38,19 @@ class Ratings:
         """Return each difference of two methods over participants, in each question; the means where there is none."""
         if not self.questions:
             return [
-                Headline(
-                    study=study,
-                    statement=f"{_mean_in_words(row)}.",
-                    estimate=row.mean,
-                    unit=f"points of the scale, {_what(row.item, row.method)}",
-                    interval=Interval(row.low, row.high, confidence),
-                    p=None,
-                    p_adjusted=None,
-                    test="none",
-                    generalises_to=holds_for(row.participants),
-                    note="; ".join(filter(None, (row.note, "one method: nothing to compare"))),
-                )
+                headline_of(row, study, f"{_mean_in_words(row)}.",
+                            f"points of the scale, {_what(row.item, row.method)}", confidence, test="none",
+                            generalises_to=holds_for(row.participants),
+                            note="; ".join(filter(None, (row.note, "one method: nothing to compare"))))
                 for row in self.table
-            ]
+            ]  # fmt: skip
         omnibus = [_omnibus_headline(question, study, alpha, confidence) for question in self.questions]
         return [one for one in omnibus if one] + [
-            Headline(
-                study=study,
-                statement=f"{question.item or 'rating'}: {_difference(row, alpha)}.",
-                estimate=row.mean,
-                unit=f"points of the scale, {_what(question.item, row.of)}",
-                interval=Interval(row.low, row.high, confidence),
-                p=row.p_value,
-                p_adjusted=row.p_value if row.holm_p_value is None else row.holm_p_value,
-                test=row.test,
-                generalises_to=row.generalises_to,
-                note=row.note,
-            )
-            for question in self.questions
-            for row in question.differences
-            if row.participants
-        ]
+            headline_of(row, study, f"{question.item or 'rating'}: {_difference(row, alpha)}.",
+                        f"points of the scale, {_what(question.item, row.of)}", confidence, test=row.test,
+                        generalises_to=row.generalises_to, adjusted=row.holm_p_value)
+            for question in self.questions for row in question.differences if row.participants
+        ]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -110,20 +91,11 @@ class PairRatings:
     def headlines(self, study: str, alpha: float, confidence: float) -> list[Headline]:
         """Return the mean score of each question over participants."""
         return [
-            Headline(
-                study=study,
-                statement=f"{sentence}.",
-                estimate=question.participants.mean,
-                unit=f"points of the scale, {_what(question.item, question.of)} ({question.middle:g} is the same)",
-                interval=Interval(question.participants.low, question.participants.high, confidence),
-                p=question.participants.p_value,
-                p_adjusted=question.participants.p_value,
-                test=question.participants.test,
-                generalises_to=question.participants.generalises_to,
-                note=question.participants.note,
-            )
-            for question, sentence in zip(self.questions, pair_sentences(self.questions, alpha), strict=True)
-        ]
+            headline_of(one.participants, study, f"{sentence}.",
+                        f"points of the scale, {_what(one.item, one.of)} ({one.middle:g} is the same)", confidence,
+                        test=one.participants.test, generalises_to=one.participants.generalises_to)
+            for one, sentence in zip(self.questions, pair_sentences(self.questions, alpha), strict=True)
+        ]  # fmt: skip
 
 
 def analyse_parallel(answers: pd.DataFrame, name: str, settings: Settings) -> ParallelRatings:

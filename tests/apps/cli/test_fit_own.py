@@ -32,7 +32,8 @@ def test_an_export_is_known_by_its_columns(exported: tuple[Path, Path], capsys: 
     folder, table = exported
     rows = pd.read_csv(table)
     assert (rows["role"] != "trial").any(), "practice or checks are there to be left out"
-    found, known = printed(capsys, "fit", str(table)), printed(capsys, "analyse", str(folder))
+    decided = ("--alpha", "0.01", "--confidence", "0.99")  # as the protocol's alpha has it
+    found, known = printed(capsys, "fit", str(table), *decided), printed(capsys, "analyse", str(folder))
     for key in ("jnd", "preference", "ratings"):
         assert found[key].keys() == known[key].keys()
     assert [one["estimate"] for one in found["headline"]] == [one["estimate"] for one in known["headline"]]
