@@ -173,10 +173,10 @@ def test_a_simulated_study_finds_the_known_thresholds(protocol: Protocol, tmp_pa
     assert level.percent == pytest.approx(100 * (observer.lapse / 3 + (1 - observer.lapse) * right), abs=4)
     assert level.d_prime == pytest.approx(ODD.d_prime_of(level.percent / 100))
     assert level.answers == pytest.approx(24 * 2 * 3 * 4, rel=0.02)
-    section = KIND.section(found, About("odd", "Odd", known=known))
+    section = KIND.section(found, About("odd", "Odd"))
     assert section is not None
     assert "67% right" in section.headlines[0].statement
-    assert [table.name for table in section.tables] == ["odd_right", "odd_thresholds", "odd_recovery"]
+    assert [table.name for table in section.tables] == ["odd_right", "odd_thresholds"]
     assert "<svg" in section.drawings[0].picture.svg
 
 
@@ -252,7 +252,7 @@ def test_a_simulated_study_of_two_finds_the_known_thresholds(tmp_path: Path) -> 
     known = truth(protocol, default_observer())["studies"]["odd"]
     for side, threshold in found.thresholds.items():
         assert threshold.value == pytest.approx(abs(known[f"threshold_{side}_frames"]), rel=0.15)
-    section = KIND.section(found, About("odd", "Odd", known=known))
+    section = KIND.section(found, About("odd", "Odd"))
     assert section is not None
     assert "finding the longer one of two, 75% right" in section.headlines[0].statement
     assert "chance gives 50% right" in section.headlines[0].detail

@@ -47,13 +47,13 @@ def quasi_f(rng: np.random.Generator, people: int, studies: int, alpha: float) -
     squares = np.stack([8 * (rows**2).sum(axis=1), people * (columns**2).sum(axis=1), (rest**2).sum(axis=(1, 2))])
     freedom = np.array([people - 1, 7, 7 * (people - 1)])
     middle = squares / freedom[:, None]
-    keep = np.stack([f.sf(middle[k] / middle[2], freedom[k], freedom[2]) < 0.5 for k in range(2)])
+    keep = np.stack([f.sf(middle[k] / middle[2], freedom[k], freedom[2]) < 0.25 for k in range(2)])
     joined = np.stack([*~keep, np.ones(studies, dtype=bool)])
     pool_freedom = (joined * freedom[:, None]).sum(axis=0)
     pool = (joined * squares).sum(axis=0) / pool_freedom
     times = 1.0 - keep.sum(axis=0)
     variance = (keep * middle[:2]).sum(axis=0) + times * pool
-    wide = (1 + 0.6 / freedom[:2, None] * np.sqrt(np.minimum(pool / middle[:2], 1))) * middle[:2]
+    wide = (1 + 0.9 / freedom[:2, None] * np.sqrt(np.minimum(pool / middle[:2], 1))) * middle[:2]
     spread = (keep * wide**2 / freedom[:2, None]).sum(axis=0) + (times * pool) ** 2 / pool_freedom
     variance = np.maximum(variance, pool)
     statistic = (mean - 0.5) / np.sqrt(variance / (8 * people))
