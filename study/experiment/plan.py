@@ -22,6 +22,7 @@ from study.experiment.procedures.procedure import Adaptive, Course, Draw, Proced
 from study.experiment.procedures.registry import course_from_json, course_to_json
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.sets import own_set
+from study.models.latin_square import latin_square
 from study.tasks.registry import orders_of, stated_answers, task_of
 from study.tasks.trial import Pair, Trial, trial_from_json, trial_of
 
@@ -116,7 +117,8 @@ def draw_plan(
     seed
         Instead of the protocol's own.
     group
-        For studies whose order is `by-group`, and for those whose pairs are divided into sets.
+        For studies whose order is `by-group`, for those whose pairs are divided into sets, and for their own order by a
+        Latin square.
     """
     if not participant.strip():
         raise SessionError("Expected a participant's name, found none; write one, such as p01.")
@@ -125,6 +127,9 @@ def draw_plan(
     studies = list(protocol.studies)
     if protocol.study_order == "random":
         studies = [studies[i] for i in rng.permutation(len(studies))]
+    if protocol.study_order == "latin-square":
+        rows = latin_square(len(studies))
+        studies = [studies[i] for i in rows[group % len(rows)]]
     trials: list[Trial] = []
     courses: list[Course] = []
     examples: dict[str, str] = {}
@@ -140,7 +145,7 @@ def draw_plan(
             )
         if study.sets:
             own = own_set(own, study.sets, group)
-        draw = Draw(study.name, tuple(own), orders_of(study), study.order, study.repeats, group)
+        draw = Draw(study.name, tuple(own), orders_of(study), study.order, study.repeats, group, study.blocks)
         shown = study.procedure.drawn(draw, rng)
         # Practice and checks draw from generators of their own, so that they leave the trials as they are.
         practice = _draw_practice(
@@ -189,8 +194,8 @@ def _with_checks(study: StudySpec, trials: Sequence[Trial], rng: np.random.Gener
 
 
 def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
-    """How many groups of participants orders `by-group` and sets tell apart; 1 where there are none."""
-    groups = 1
+    """How many groups of participants orders `by-group`, sets and a Latin square tell apart; 1 without any."""
+    groups = len(latin_square(len(protocol.studies))) if protocol.study_order == "latin-square" else 1
     for study in protocol.studies:
         if study.order == "by-group":
             own = len(_pairs_of(study, pairs)[0])

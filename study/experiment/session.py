@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
+from typing import Literal
 
 from study.errors import SessionError
 from study.experiment import wording
@@ -30,7 +31,10 @@ from study.experiment.steps import (
     trial_steps,
 )
 from study.tasks.answer import CONFIDENCE, Answer
+from study.tasks.registry import is_right
 from study.tasks.trial import Trial
+
+Outcome = Literal["finished", "failed-checks"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class Session:
     next trial are added after it. `trials_left` has for each step how many trials have steps from there on: an answer
     then costs the same however long the plan is. `badly_shown` are the showings (trial and attempt) of which an answer
     says that they were faulty: a trial with several items comes again where any of them does. `chosen` is the last
-    answer that is not about how sure the one before it was.
+    answer that is not about how sure the one before it was; `failed` counts the attention checks that were failed.
     """
 
     plan: Plan
@@ -52,6 +56,7 @@ class Session:
     position: int = 0
     badly_shown: frozenset[tuple[int, int]] = frozenset()
     chosen: Answer | None = None
+    failed: int = 0
 
     def trial(self, number: int) -> Trial:
         """A trial by its number: one that is known beforehand, or that the answers so far led to."""
@@ -86,8 +91,10 @@ def open_session(
     breaks = breaks_of(protocol, plan) - folded.breaks
     steps = steps_left(protocol, folded.trials.values(), before, passed, breaks, films, plan.examples)
     badly_shown = frozenset((answer.trial, answer.attempt) for answer in before if not answer.shown_well)
+    failed = sum(_failed(folded.trial(answer.trial), answer) for answer in before)
     chosen = next((answer for answer in reversed(before) if answer.item != CONFIDENCE), None)
-    return Session(plan, protocol, steps, _trials_left(steps), folded, badly_shown=badly_shown, chosen=chosen)
+    known = Session(plan, protocol, steps, _trials_left(steps), folded, badly_shown=badly_shown, chosen=chosen)
+    return _unless_failed(replace(known, failed=failed), "debrief" in passed)
 
 
 def current(session: Session) -> Step:
@@ -120,10 +127,31 @@ def advanced(session: Session) -> Session:
     return _at(session, session.position + 1)
 
 
+def outcome(session: Session) -> Outcome:
+    """How a session ends: `failed-checks` where more attention checks were failed than the protocol allows."""
+    most = session.protocol.failed_checks.most
+    return "finished" if most is None or session.failed <= most else "failed-checks"
+
+
+def _failed(trial: Trial, answer: Answer) -> bool:
+    """Whether an attention check was failed; one that was badly shown counts for nothing."""
+    return trial.role == "check" and answer.shown_well and not is_right(trial, answer.value or "", trial.expected)
+
+
+def _unless_failed(session: Session, read: bool = False) -> Session:
+    """The session, or where it ends early the one that goes to its end, past a page that says so unless it was read."""
+    if outcome(session) == "finished" or session.protocol.failed_checks.then == "flag":
+        return session
+    last = [] if read else [Step("debrief", text=session.protocol.texts.checks_failed)]
+    steps = (*session.steps[: session.position], *last, Step("done"))
+    return replace(session, steps=steps, trials_left=_trials_left(steps))
+
+
 def _at(session: Session, position: int, badly_shown: frozenset[tuple[int, int]] | None = None) -> Session:
     # Not `replace`, which takes as long as the rest of an answer.
     known = session.plan, session.protocol, session.steps, session.trials_left, session.folded
-    return Session(*known, position, session.badly_shown if badly_shown is None else badly_shown, session.chosen)
+    badly_shown = session.badly_shown if badly_shown is None else badly_shown
+    return Session(*known, position, badly_shown, session.chosen, session.failed)
 
 
 def near(session: Session) -> tuple[list[Step], list[Step]]:
@@ -252,6 +280,10 @@ def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     following = current(session)
     trial_goes_on = following.kind == "answer" and following.trial == answer.trial
     trial = session.trial(answer.trial)
+    if _failed(trial, answer):
+        session = _unless_failed(replace(session, failed=session.failed + 1))
+        if current(session).kind == "done" or session.steps[session.position + 1].kind == "done":
+            return session, answer
     if trial.role == "practice" and not trial_goes_on:
         feedback = Step("feedback", here.study, feedback_text(session.protocol, trial, chosen), role=trial.role)
         session = _with_steps(session, session.position, [feedback])

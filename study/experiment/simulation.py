@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
 from study.errors import SessionError
@@ -20,6 +21,7 @@ from study.experiment.steps import form_event
 from study.experiment.store.answers import has_event, record_answer, record_event, stored_answers
 from study.experiment.store.responses import Responses
 from study.experiment.store.sessions import SessionRecord, begin_session, find_session
+from study.tasks.answer import Answer
 from study.tasks.observer import ObserverSettings, default_observer
 
 if TYPE_CHECKING:
@@ -84,8 +86,7 @@ def simulate(
         if has_event(responses, record, "finished"):
             continue
         who = person(settings, plan.participant, seed, apart)
-        forms = (form_event(name) for name in ("", *(study.name for study in protocol.studies)))
-        state = open_session(protocol, plan, before, passed=("consent", *forms))
+        state = open_session(protocol, plan, before, passed=before_trials(protocol))
         for trial, answer in walk(state, partial(respond, who), partial(shown_well, who)):
             record_answer(responses, record, trial, answer)
             made += 1
@@ -94,6 +95,27 @@ def simulate(
                 progress(found + made, max(total, found + made))
         record_event(responses, record, "finished")
     return SimulationSummary(participants, made, found, known)
+
+
+def answers_before(protocol: Protocol, plan: Plan, number: int) -> tuple[Answer, ...]:
+    """The answers of a simulated participant to all trials before one, for a preview that jumps to it.
+
+    Raises
+    ------
+    SessionError
+        For a trial that the plan does not have.
+    """
+    if not 1 <= number <= plan.last:
+        raise SessionError(f"Expected a trial from 1 to {plan.last}, found {number}.")
+    who = person(knowing(default_observer(), protocol), plan.participant, protocol.seed)
+    state = open_session(protocol, plan, passed=before_trials(protocol))
+    given = walk(state, partial(respond, who))
+    return tuple(answer for trial, answer in takewhile(lambda one: one[0].trial < number, given))
+
+
+def before_trials(protocol: Protocol) -> tuple[str, ...]:
+    """What is behind simulated participants: consent, and every form."""
+    return ("consent", *(form_event(name) for name in ("", *(study.name for study in protocol.studies))))
 
 
 def _open(

@@ -69,7 +69,8 @@ NEAR = 5
 """How far from the end that an attention check asks for a slider may stand."""
 
 
-def _is_right(trial: Trial, value: str, right: str) -> bool:
+def is_right(trial: Trial, value: str, right: str) -> bool:
+    """Whether an answer is the right one; a slider that was asked to an end may stand near it."""
     if trial.role != "check" or value == right or not (right.isdigit() and value.replace(" ", "").isdigit()):
         return value == right
     return int(right) in (0, SLIDER_POINTS - 1) and all(abs(int(one) - int(right)) <= NEAR for one in value.split())
@@ -114,7 +115,7 @@ def answer_columns(trial: Trial, answer: Answer) -> dict[str, Any]:
         "a_first": None,
         "answer": answer.value,
         "missed": answer.missed,
-        "correct": None if answer.missed or right is None else _is_right(trial, answer.value or "", right),
+        "correct": None if answer.missed or right is None else is_right(trial, answer.value or "", right),
         "chose_a": None,
         "response_s": answer.response_s,
         "shown_well": answer.shown_well,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from functools import partial
 from pathlib import Path
 
@@ -60,6 +61,16 @@ from study.apps.cli.shared import (
     help="Where the last button leads, such as https://app.prolific.com/submissions/complete?cc=CODE "
     "(default: nowhere).",
 )
+@click.option("--failed-code", default="", help="Code shown instead after failed attention checks (default: the same).")
+@click.option(
+    "--failed-url", default="", metavar="URL", help="Where the last button leads after these (default: the same)."
+)
+@click.option(
+    "--dry-run", is_flag=True, help="Walk one simulated participant through the real server, keep nothing, and stop."
+)
+@click.option(
+    "--preview", is_flag=True, help="Show the study to yourself, from any trial on (/?trial=12); nothing is kept."
+)
 @click.option(
     "--researcher-token",
     envvar="SEGUE_RESEARCHER_TOKEN",
@@ -92,6 +103,10 @@ def serve(
     parameters: tuple[str, ...],
     completion_code: str,
     completion_url: str,
+    failed_code: str,
+    failed_url: str,
+    dry_run: bool,
+    preview: bool,
     researcher_token: str | None,
     behind_proxy: bool,
     public_urls: tuple[str, ...],
@@ -111,8 +126,9 @@ def serve(
 
     checked = load_for_people(protocol)
     folder = results_folder(checked, out)
-    if completion_url and not completion_url.startswith(("https://", "http://")):
-        raise click.UsageError(f"expected a completion URL that starts with https://, found {completion_url!r}.")
+    for name, url in (("completion", completion_url), ("failed", failed_url)):
+        if url and not url.startswith(("https://", "http://")):
+            raise click.UsageError(f"expected a {name} URL that starts with https://, found {url!r}.")
     if root_path and not re.fullmatch(r"(/[\w.~-]+)+", root_path, re.ASCII):
         raise click.UsageError(f"expected a path such as /study, without a slash at its end, found {root_path!r}.")
     own_names(host, public_urls)  # refuses what is no address, before anything is rendered
@@ -122,7 +138,10 @@ def serve(
         groups=groups,
         completion_code=completion_code,
         completion_url=completion_url,
-        parameters=(*Settings.parameters, *parameters),
+        failed_code=failed_code,
+        failed_url=failed_url,
+        preview=preview,
+        parameters=(*Settings.parameters, *parameters, *(["trial"] if preview else [])),
     )
     rendered, ahead = None if library is not None else rendered_before(checked, folder), None
     if rendered is None:
@@ -133,7 +152,17 @@ def serve(
     else:
         check_database(database, rendered)
 
+    if dry_run:
+        from study.apps.server.dry_run import walk_through
+
+        say(str(walk_through(checked, folder, settings, ahead)))
+        return
+
     def started(address: str, place: str) -> None:
+        if preview:
+            say(f"preview       {address}/?trial=1  (any trial; nothing is kept)")
+            say("Ctrl-C stops it.")
+            return
         say(f"participants  {address}/")
         # What is printed ends up in logs: a token of the researcher's own is not repeated.
         token = f"#{settings.researcher_token}" if researcher_token is None else "  (asks for your token)"
@@ -145,16 +174,17 @@ def serve(
             )
         say("Ctrl-C stops it; the same command resumes.")
 
-    run(
-        checked,
-        folder,
-        settings,
-        host=host,
-        port=port,
-        behind_proxy=behind_proxy,
-        root_path=root_path,
-        database=database,
-        public_urls=public_urls,
-        ahead=ahead,
-        started=started,
-    )
+    with tempfile.TemporaryDirectory() as nothing_kept:
+        run(
+            checked,
+            folder,
+            settings,
+            host=host,
+            port=port,
+            behind_proxy=behind_proxy,
+            root_path=root_path,
+            database=nothing_kept if preview else database,
+            public_urls=public_urls,
+            ahead=ahead,
+            started=started,
+        )

@@ -23,7 +23,7 @@ from study.apps.player.pages import AGAIN, Look, cells_of
 from study.apps.player.sheet import draw_page
 from study.apps.player.showing import Showing, find_rate, frame_at
 from study.experiment.picture_size import Sight, seen_degrees, wanted_px
-from study.experiment.session import Session, advanced, answered, current, filled, missed, progress, restarted
+from study.experiment.session import Session, advanced, answered, current, filled, missed, outcome, progress, restarted
 from study.experiment.steps import Kind, Step
 from study.experiment.stimuli.stimulus import Stimulus
 from study.experiment.store.answers import Presentation
@@ -126,6 +126,8 @@ class _Player(Desk):
             while (step := current(self.session)).kind != "done":
                 STEPS.get(step.kind, _Player._read)(self, step)
             self.store.event("finished")
+            if (how := outcome(self.session)) != "finished":
+                self.store.event(how)
             self.read_until(screens.last_page(self.protocol, self.protocol.texts.finished))
         except Stopped as stopped:
             end = stopped.end

@@ -29,7 +29,8 @@ from study.apps.server.writer import Writer
 from study.errors import SessionError, StimulusError
 from study.experiment.plan import draw_plan, groups_of
 from study.experiment.protocol.whole import Protocol
-from study.experiment.session import Session, advanced, answered, current, filled, missed, open_session
+from study.experiment.session import Session, advanced, answered, current, filled, missed, open_session, outcome
+from study.experiment.simulation import answers_before, before_trials
 from study.experiment.steps import Step
 from study.experiment.stimuli.manifest import Manifest
 from study.experiment.stimuli.rendering import RenderAhead, known_beforehand
@@ -141,6 +142,9 @@ class Host:
         record = session_by_id(self.responses, participant.session_id)
         before = stored_answers(self.responses, record.id)
         happened = event_counts(self.responses, record)
+        if self.settings.preview and (trial := participant.parameters.get("trial", "")):
+            before = (*answers_before(self.protocol, record.plan, int(trial) if trial.isdecimal() else 0), *before)
+            happened = {**dict.fromkeys(before_trials(self.protocol), 1), **happened}
         frames = {known.id: known.frames for known in self.manifest.records}
         state = views.to_view(open_session(self.protocol, record.plan, before, passed=happened, frames=frames))
         answers = {(a.trial, a.item, a.attempt): a for a in before}
@@ -151,7 +155,7 @@ class Host:
         """A page was opened: the view that it shows, and the token that its cookie should hold."""
         kept = {name: value for name, value in message.parameters.items() if name in self.settings.parameters}
         parameters, unfilled = filled_in(kept, (*self.settings.identifying, VISIT))
-        live = await self.live_session(token) if token else None
+        live = await self.live_session(token) if token and not self.settings.preview else None
         if live is not None and self._is_another(live, parameters):
             live = None
         if live is None:
@@ -334,10 +338,13 @@ class Host:
             # All is answered: who closes the page over the debriefing has finished, too.
             if not live.finished:
                 await self._note(live, "finished")
+                if (how := outcome(live.state)) != "finished":
+                    await self._note(live, how)
                 live.finished = True
             view["withdrawal_code"] = live.participant.withdrawal_code
         if step.kind == "done":
-            view |= {"completion_code": self.settings.completion_code, "completion_url": self.settings.completion_url}
+            code, url = self.settings.completion(outcome(live.state))
+            view |= {"completion_code": code, "completion_url": url}
             # Nothing more will change: the memory is for those who are in progress.
             self._forget(live.record.id)
         return view

@@ -79,7 +79,10 @@ def _overview(host: Host, by_number: Mapping[int, LiveSession]) -> dict[str, Any
     return {
         "title": host.protocol.title,
         "protocol_sha256": host.protocol.sha256,
-        "counts": {state: states.count(state) for state in ("in progress", "finished", "dropped out", "declined")},
+        "counts": {
+            state: states.count(state)
+            for state in ("in progress", "finished", "failed checks", "dropped out", "declined")
+        },
         "withdrawn": withdrawn,
         "most_participants": host.settings.most_participants,
         "groups": people.filled_groups(host.responses, host.places, clock=host.clock),
@@ -91,7 +94,9 @@ def _overview(host: Host, by_number: Mapping[int, LiveSession]) -> dict[str, Any
 
 def _listed(host: Host, row: Mapping[str, Any], live: LiveSession | None, now: datetime) -> dict[str, Any]:
     happened = row["events"]
-    if "finished" in happened:
+    if "failed-checks" in happened:
+        state = "failed checks"
+    elif "finished" in happened:
         state = "finished"
     elif "declined" in happened:
         state = "declined"

@@ -28,7 +28,12 @@ class Constant(Settings):
 
     def drawn(self, draw: Draw, rng: np.random.Generator) -> list[Trial]:
         """The trials of a study, repeat after repeat."""
-        return [trial for repeat in range(1, draw.repeats + 1) for trial in _drawn_set(draw, repeat, rng)]
+        trials = [trial for repeat in range(1, draw.repeats + 1) for trial in _drawn_set(draw, repeat, rng)]
+        if not draw.blocks:
+            return trials
+        motions = list(dict.fromkeys(pair.motion for pair in draw.pairs))
+        order = {motions[i]: place for place, i in enumerate(rng.permutation(len(motions)))}
+        return sorted(trials, key=lambda trial: order[trial.motion])  # as they were drawn within a block
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,8 @@ class Draw:
     """How often the whole set is shown."""
     group: int
     """The participant's, for `by-group`."""
+    blocks: bool = False
+    """Whether trials with one transition follow each other."""
 
 
 @dataclass(frozen=True)

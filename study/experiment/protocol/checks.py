@@ -115,6 +115,12 @@ def _check_analysis(protocol: Content) -> None:
     names = protocol.analysis.confirmatory
     _check_known(names, preferences, "preference studies", "analysis", "confirmatory")
     check_once(names, "study", "analysis", "confirmatory")
+    if protocol.failed_checks.most is not None and not any(study.attention_checks for study in protocol.studies):
+        raise KeyMismatchError(
+            "expected attention_checks in a study with this rule, found none; add some, or remove the rule",
+            "failed_checks",
+            "most",
+        )
     rules, where = protocol.analysis.exclusions, ("analysis", "exclusions")
     if rules.most_failed_checks is not None and not any(study.attention_checks for study in protocol.studies):
         raise KeyMismatchError(
@@ -152,6 +158,9 @@ def _check_lengths(protocol: Content, study: StudySpec, index: int) -> None:
             "studies",
             index,
         )
+    if study.blocks and study.procedure.differences() is not None:
+        message = f"expected no blocks in {study.name!r}, whose procedure chooses the trials; remove it"
+        raise KeyMismatchError(message, "studies", index, "blocks")
     for key in ("practice", "attention_checks"):
         found = getattr(study, key)
         if found > trials:

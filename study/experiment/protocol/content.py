@@ -12,7 +12,7 @@ from pydantic import Field
 
 from study.errors import ProtocolError
 from study.experiment.protocol.methods import OwnMethod
-from study.experiment.protocol.stimuli import Points, Screen, StimulusSettings, Timing, TransitionSpec
+from study.experiment.protocol.stimuli import FailedChecks, Points, Screen, StimulusSettings, Timing, TransitionSpec
 from study.experiment.protocol.studies import AnalysisSettings, StudySpec
 from study.experiment.protocol.texts import MOST_PARTS, Consent, FormField, Keys, Listed, Part, Slug, Texts
 from study.models.tracks import Rule
@@ -32,8 +32,13 @@ class Content(Part):
     participants: int | None = Field(
         default=None, ge=1, le=100_000, description="Planned number of participants, fixed before there is data."
     )
-    study_order: Literal["as-listed", "random"] = Field(
-        default="as-listed", description="Order of the studies in a session."
+    study_order: Literal["as-listed", "random", "latin-square"] = Field(
+        default="as-listed",
+        description="Order of the studies in a session; `latin-square` goes by the participant's group, so that each "
+        "study stands at each place, and follows each other one, equally often.",
+    )
+    failed_checks: FailedChecks = Field(
+        default=FailedChecks(), description="What failed attention checks lead to while the session runs."
     )
     stimuli: StimulusSettings = Field(default=StimulusSettings(), description="How stimuli are built and drawn.")
     screen: Screen = Field(default=Screen(), description="How large stimuli are shown.")

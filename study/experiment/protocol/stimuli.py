@@ -173,6 +173,19 @@ class Timing(Part):
     )
 
 
+class FailedChecks(Part):
+    """What failed attention checks lead to while the session runs."""
+
+    most: int | None = Field(
+        default=None, ge=0, le=100, description="How many may be failed or missed; by default any number. [checks]"
+    )
+    then: Literal["end", "flag"] = Field(
+        default="end",
+        description="With one more: `end` the session there, or `flag` it, which ends as usual with the outcome "
+        "`failed-checks`.",
+    )
+
+
 class Points(Part):
     """How transition points are chosen: given, or drawn at random from the protocol's seed under conditions.
 

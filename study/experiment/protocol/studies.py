@@ -150,6 +150,11 @@ class StudySpec(Part):
         description="Order within pairs: `both` shows each pair in both, `random` draws, `balanced` draws half each "
         "way, `by-group` rotates by the participant's group (2003).",
     )
+    blocks: bool = Field(
+        default=False,
+        description="Whether all trials with one transition follow each other, block after block in random order; with "
+        "constant stimuli.",
+    )
     repeats: int = Field(default=1, ge=1, le=1000, description="How often the whole set is shown.")
     question: str = Field(
         default="{standard}", description="What the participant is asked after each pair or stimulus."

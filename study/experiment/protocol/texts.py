@@ -174,6 +174,11 @@ class Texts(Part):
         default="This one checks the controls. Please answer: {answer}",
         description="The question of an attention check; {answer} is the answer to give.",
     )
+    checks_failed: str = Field(
+        default="The questions that check the controls were not answered as asked, so the study ends here. Thank you.",
+        min_length=1,
+        description="When a session ends early because of failed attention checks.",
+    )
     form: str = Field(default="A few questions about you", description="Heading of the form.")
     study_form: str = Field(default="About this part", description="Heading of the questions after a study.")
     skip: str = Field(default="Skip", min_length=1, description="Button that leaves a question of the form empty.")
