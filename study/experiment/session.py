@@ -134,7 +134,7 @@ def outcome(session: Session) -> Outcome:
 
 
 def _failed(trial: Trial, answer: Answer) -> bool:
-    """Whether an attention check was failed; one that was badly shown counts for nothing."""
+    """Whether an attention check was failed; one after a display failure counts for nothing."""
     return trial.role == "check" and answer.shown_well and not is_right(trial, answer.value or "", trial.expected)
 
 

@@ -109,7 +109,7 @@ def walk_through(
             server.should_exit = True
             thread.join()
     if stored != given["choices"]:
-        raise SessionError(f"Expected {given['choices']} answers in the database, found {stored}.")
+        raise SessionError(f"Expected {counted(given['choices'], 'answer')} in the database, found {stored}.")
     return Walked(pages, given["all"], films, size / 1e6, time.monotonic() - began)
 
 

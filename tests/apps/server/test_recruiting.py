@@ -148,7 +148,7 @@ def test_the_researcher_sees_who_is_where_and_takes_the_tables(serve: Callable[.
     person.post("/api/happened", {"kind": "fault", "detail": {"what": "stalled"}})
     person.post("/api/happened", {"kind": "focus-lost"})
     overview = serving.ask("overview").json()
-    assert overview["counts"] == {"in progress": 1, "finished": 1, "dropped out": 0, "declined": 0}
+    assert overview["counts"] == {"in progress": 1, "finished": 1, "dropped out": 0, "declined": 0, "failed checks": 0}
     row = overview["sessions"][0]
     assert (row["state"], row["step"], row["answers"], row["faults"], row["focus_losses"]) == (
         "in progress",
