@@ -31,17 +31,19 @@ sys.path.insert(0, str(Path(__file__).parent))
 from fit_weights import labelled
 from one_hop_robustness import WEIGHT, draw_distances, floor_of, smoothness_of
 
+from renderer.strip import render_strip
 from study.apps.cli import run
 from study.files import write_whole
-from study.motion.clip import Clip, retarget, trim
+from study.motion.clip import Clip, joint_positions, retarget, trim
+from study.motion.drawing import figure_for
 from study.motion.library import open_library
 from study.transitions.fit_weights import fit_weights
 from study.transitions.one_hop.beats import all_beat_offsets, find_beats
 from study.transitions.one_hop.build import build_table
-from study.transitions.one_hop.play import Trigger, play
+from study.transitions.one_hop.play import Played, Trigger, play
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
 from study.transitions.one_hop.robustness import costs_of, draw_costs, robustness_set
-from study.transitions.one_hop.strip import draw_played
+from study.transitions.one_hop.strip import strip_segments
 from study.transitions.point_cloud import point_cloud, window_distances
 from study.transitions.weights import WANG2003
 
@@ -68,6 +70,19 @@ def segue(command: str) -> dict[str, Any]:
     assert status == 0, command
     said: dict[str, Any] = json.loads(printed.getvalue())
     return said
+
+
+def draw_played(played: Played, path: Path, first: int, height: int = 300) -> None:
+    """Thirteen poses of four seconds from a frame on, so that several strips show the same times."""
+    last = min(first + 240, played.clip.frames - 1)
+    render_strip(
+        path,
+        joint_positions(played.clip, ends=True),
+        figure_for(played.clip.skeleton),
+        frames=sorted({round(first + (last - first) * k / 12) for k in range(13)}),
+        segments=strip_segments(played),
+        height=height,
+    )
 
 
 class Papers:
@@ -98,7 +113,7 @@ class Papers:
             command = f"segue cost-matrix {pair} --library {self.library} {options} --out {self.at(f'2003_{figure}')}"
             said = segue(command)
             printed = {
-                "1": "stripes; darker is cheaper",
+                "1": "a picture of the costs, darker is cheaper; the number of cheap frames is not given",
                 "2a": "the least cost is at the same frames for nu from 0 to 100",
                 "2b": "as 2a",
                 "3": "fewer cheap frames than Figure 1: “more restrictive”",
@@ -144,14 +159,14 @@ class Papers:
         figure = self.at("2004_1")
         command = f"segue transition walk run --library {self.library} {points} --method geodesic --out {figure}"
         segue(command)
-        yield Entry("2004, Figure 1: a transition", "a walk becomes another motion",
+        yield Entry("2004, Figure 1: a transition", "an example of a transition",
                     "source blue, blend purple, destination orange; the left side is darker", command, "Other motions.", (figure,))  # fmt: skip
         figure = self.at("2004_3")
         command = f"segue blend-length walk walk_fast --library {self.library} {other} --method geodesic --out {figure}"
         said = segue(command)
         yield Entry(
             "2004, Figures 2, 3 and 5: cost by blend length, frame by frame and joint by joint",
-            "one minimum, at 0.5 s; three joints have theirs elsewhere",
+            "the least cost is at 0.5 s; three joints have no minimum there",
             f"least at {said['blend_s']:.2f} s ({said['blend_frames']} frames at 30 fps), cost {said['cost']:.3g}",
             command,
             "Another walk, and other points.",
@@ -182,7 +197,11 @@ class Papers:
         segue(command)
         said = segue(f"segue analyse {results}")
         segue(f"segue report {results}")
-        lengths = [one["statement"] for one in said["headline"] if one["unit"].startswith("frames")]
+        lengths = [
+            one["statement"].partition(" At the first")[0]
+            for one in said["headline"]
+            if one["unit"].startswith("frames")
+        ]
         others = [one["statement"] for one in said["headline"] if not one["unit"].startswith("frames")]
         curves = sorted((results / "figures").glob("*curve.png"))
         yield Entry(
@@ -226,7 +245,7 @@ class Papers:
             for method in ("direct", "one-hop"):
                 played = self.played(clips, table, switch, method)
                 first = max(switch.first_trigger - 24, 0)
-                draw_played(played, self.at(f"{name}_{method}"), span=(first, min(first + 240, played.clip.frames - 1)))
+                draw_played(played, self.at(f"{name}_{method}"), first)
                 paths.append(self.at(f"{name}_{method}"))
             return paths[0], paths[1]
 
@@ -237,10 +256,10 @@ class Papers:
 
         ranked = np.argsort(-gain)
         shown = "Above the direct transition, below through the hop (yellow); blends purple, a pose every 0.33 s."
-        dances = "Other dances; the paper's are of a Japanese pop group."
+        dances = "Other dances; the paper has 20 s clips of hip-hop, jazz and pop."
         for figure, rank, printed in (
             ("1", 0, "a natural transition where the direct one has severe artifacts"),
-            ("7", 1, "crouching, and turned away: the hop first stands up, or turns"),
+            ("7", 1, "triggered while crouching, or from standing to sitting: the hop stands up, or sits down, while dancing"),
         ):
             number = int(ranked[rank])
             yield Entry(f"2019, Figure {figure}: direct and optimal one-hop transition", printed, words(number),
@@ -259,7 +278,7 @@ class Papers:
             skates.append(slide)
         slides = np.array(skates)
         worst = int(np.argmax(slides[:, 0] - slides[:, 1]))
-        yield Entry("2019, Figure 8: feet that slide", "severe sliding in the direct transition, none through the hop",
+        yield Entry("2019, Figure 8: feet that slide", "severe sliding in the direct transition, almost negligible through the hop",
                     f"{words(worst)}; the slower toe slides {slides[worst, 0]:.2f} m in the direct transition, {slides[worst, 1]:.2f} m through "
                     f"the hop (mean of all {len(switches)}: {slides[:, 0].mean():.2f} and {slides[:, 1].mean():.2f} m)",
                     f"{command}", f"{dances} Nothing is done about feet in either row.", pair(worst, "2019_8"))  # fmt: skip
@@ -280,7 +299,7 @@ class Papers:
         yield self.weights(clips, problem, switches[int(ranked[0])])
         yield self.beats(clips, problem)
 
-    def played(self, clips: list[Clip], table: Any, switch: Switch, method: str) -> Any:
+    def played(self, clips: list[Clip], table: Any, switch: Switch, method: str) -> Played:
         trigger = [Trigger(switch.first_trigger, switch.destination)]
         return play(clips, table, trigger, first=switch.source, method=method)
 
@@ -298,7 +317,7 @@ class Papers:
             path = self.at(f"2019_11_{times:g}")
             played = self.played(clips, table, switch, "one-hop")
             first = max(switch.first_trigger - 24, 0)
-            draw_played(played, path, span=(first, min(first + 240, played.clip.frames - 1)), height=220)
+            draw_played(played, path, first, height=220)
             paths.append(path)
         return Entry("2019, Figure 11: the weight trades smoothness for responsiveness", "larger weights: shorter stays, less smooth",
                      "; ".join(found), "segue one-hop build CLIPS --times 3 --out X.npz", "Other dances; rows from no weight to ten times Eq. 5's.",
@@ -316,7 +335,7 @@ class Papers:
         trigger = int(at[len(at) // 2]) + table.rows[0].first_trigger
         played = self.played(clips, table, replace(switch, first_trigger=trigger), "one-hop")
         path = self.at("2019_12")
-        draw_played(played, path)
+        draw_played(played, path, max(trigger - 24, 0))
         entry = table.look_up(0, 2, trigger)
         assert entry is not None
         own = set((beats[entry.hop] + entry.offset).tolist())
@@ -324,7 +343,7 @@ class Papers:
         return Entry("2019, Figure 12: hops that keep the beat", "the hop has the beats of source and destination",
                      f"hop {clips[entry.hop].name} at offset {entry.offset}: {shared} of {len(beats[0])} beats of the source lie on beats of the hop",
                      "segue one-hop build CLIPS --on-beat --out X.npz",
-                     "Beats are estimated from the motions, which were not danced to one music as the paper's were.", (path,))  # fmt: skip
+                     "Beats are estimated from the motions, which were danced to no common music as the paper's were: only the beat at which the clips are aligned is shared.", (path,))  # fmt: skip
 
 
 PAGE = """<!doctype html>
