@@ -29,8 +29,9 @@ TABLES = int(os.environ.get("SEGUE_TABLES", "300"))
 A_TEST = 10
 
 # Said in words where the key is described: nothing was left out; not two methods; a column that the task does not have;
-# ends of intervals that the answers leave open; strengths of two methods alone; trials that came by no staircase.
-ELSEWHERE = {"staircases", "without_exclusions", "difference", "quality", "low", "high", "bradley_terry"}
+# ends of intervals that the answers leave open; strengths of two methods alone; trials that came by no staircase;
+# ties where nobody called two equal.
+ELSEWHERE = {"staircases", "without_exclusions", "difference", "quality", "low", "high", "bradley_terry", "ties"}
 
 
 def people_of(rng: np.random.Generator) -> Iterator[tuple[str, int, float]]:

@@ -99,4 +99,4 @@ def test_three_methods_have_an_omnibus_test_first(fitted: Fitted) -> None:
     assert len(pairs) == 3
     apart = [row.replace(",A,", ",C,") for row in rows if ",A," in row or ",B," in row]
     parted = [row.rsplit(",", 1)[0] + (",1" if ",B," in row else ",9") for row in apart]
-    assert "separate perfectly" in fitted("\n".join(["who,m,a", *parted]), *rated)["answer"]
+    assert "8.00, the same for all 12, exact sign test" in fitted("\n".join(["who,m,a", *parted]), *rated)["answer"]
