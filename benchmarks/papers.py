@@ -50,6 +50,9 @@ from study.transitions.weights import WANG2003
 GIVEN = "Simulated observers answer, who were given the paper's findings: this tests the way from answers to numbers."
 
 
+KEY = "A pose every 0.33 s. Source blue, blends purple, hop yellow, destination orange; the right side is darker."
+
+
 @dataclass(frozen=True)
 class Entry:
     """One figure or table of a paper."""
@@ -83,6 +86,24 @@ def draw_played(played: Played, path: Path, first: int, height: int = 300) -> No
         segments=strip_segments(played),
         height=height,
     )
+
+
+def labelled_rows(rows: list[tuple[str, Path]], path: Path, key: str) -> None:
+    """Strips one below the other, each under its label, with a key below."""
+    from matplotlib.font_manager import findfont
+    from PIL import Image, ImageDraw, ImageFont
+
+    font = ImageFont.truetype(findfont("DejaVu Sans"), 22)
+    strips = [(words, Image.open(strip).convert("RGB")) for words, strip in rows]
+    width, line = max(strip.width for _, strip in strips), 34
+    sheet = Image.new("RGB", (width, sum(strip.height + line for _, strip in strips) + line), "white")
+    draw, top = ImageDraw.Draw(sheet), 0
+    for words, strip in strips:
+        draw.text((8, top + 4), words, fill="#1d2328", font=font)
+        sheet.paste(strip, (0, top + line))
+        top += strip.height + line
+    draw.text((8, top + 4), key, fill="#5b666e", font=font)
+    sheet.save(path)
 
 
 class Papers:
@@ -160,7 +181,7 @@ class Papers:
         command = f"segue transition walk run --library {self.library} {points} --method geodesic --out {figure}"
         segue(command)
         yield Entry("2004, Figure 1: a transition", "an example of a transition",
-                    "source blue, blend purple, destination orange; the left side is darker", command, "Other motions.", (figure,))  # fmt: skip
+                    "source blue, blend purple, destination orange; the right side is darker", command, "Other motions.", (figure,))  # fmt: skip
         figure = self.at("2004_3")
         command = f"segue blend-length walk walk_fast --library {self.library} {other} --method geodesic --out {figure}"
         said = segue(command)
@@ -239,7 +260,7 @@ class Papers:
         gain = np.array([one.direct - one.total for one in costs])
         command = f"segue one-hop robustness {' '.join(clip.name for clip in clips)} --library {self.library}"
 
-        def pair(number: int, name: str) -> tuple[Path, Path]:
+        def pair(number: int, name: str) -> tuple[Path, ...]:
             switch, table = switches[number], tables[number]
             paths = []
             for method in ("direct", "one-hop"):
@@ -247,7 +268,10 @@ class Papers:
                 first = max(switch.first_trigger - 24, 0)
                 draw_played(played, self.at(f"{name}_{method}"), first)
                 paths.append(self.at(f"{name}_{method}"))
-            return paths[0], paths[1]
+            cost = costs[number]
+            says = f"direct, {cost.direct:.3f} m²", f"one-hop, {cost.total:.3f} m²"
+            labelled_rows(list(zip(says, paths, strict=True)), self.at(name), KEY)
+            return (self.at(name),)
 
         def words(number: int) -> str:
             switch, cost = switches[number], costs[number]
