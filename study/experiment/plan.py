@@ -208,5 +208,9 @@ def groups_of(protocol: Protocol, pairs: Sequence[Pair]) -> int:
 def questions(protocol: Protocol, plan: Plan) -> int:
     """How many answers a plan asks for at most, without repeats after display failures."""
     items = {study.name: max(1, len(study.items)) + bool(study.confidence_points) for study in protocol.studies}
-    known = sum(1 if trial.role == "check" else items[trial.study] for trial in plan.trials)
+    rounds = {study.name: study.practice_most if study.practice_until else 1 for study in protocol.studies}
+    known = sum(
+        1 if trial.role == "check" else items[trial.study] * (rounds[trial.study] if trial.role == "practice" else 1)
+        for trial in plan.trials
+    )
     return known + sum(course.most * items[course.study] for course in plan.courses)

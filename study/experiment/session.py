@@ -27,6 +27,7 @@ from study.experiment.steps import (
     comes_again,
     feedback_text,
     film_times,
+    practice_due,
     steps_left,
     trial_steps,
 )
@@ -46,6 +47,7 @@ class Session:
     then costs the same however long the plan is. `badly_shown` are the showings (trial and attempt) of which an answer
     says that they were faulty: a trial with several items comes again where any of them does. `chosen` is the last
     answer that is not about how sure the one before it was; `failed` counts the attention checks that were failed.
+    `practised` are the answers to practice trials.
     """
 
     plan: Plan
@@ -57,6 +59,7 @@ class Session:
     badly_shown: frozenset[tuple[int, int]] = frozenset()
     chosen: Answer | None = None
     failed: int = 0
+    practised: tuple[Answer, ...] = ()
 
     def trial(self, number: int) -> Trial:
         """A trial by its number: one that is known beforehand, or that the answers so far led to."""
@@ -93,8 +96,9 @@ def open_session(
     badly_shown = frozenset((answer.trial, answer.attempt) for answer in before if not answer.shown_well)
     failed = sum(_failed(folded.trial(answer.trial), answer) for answer in before)
     chosen = next((answer for answer in reversed(before) if answer.item != CONFIDENCE), None)
+    practised = tuple(answer for answer in before if folded.trial(answer.trial).role == "practice")
     known = Session(plan, protocol, steps, _trials_left(steps), folded, badly_shown=badly_shown, chosen=chosen)
-    return _unless_failed(replace(known, failed=failed), "debrief" in passed)
+    return _unless_failed(replace(known, failed=failed, practised=practised), "debrief" in passed)
 
 
 def current(session: Session) -> Step:
@@ -151,7 +155,7 @@ def _at(session: Session, position: int, badly_shown: frozenset[tuple[int, int]]
     # Not `replace`, which takes as long as the rest of an answer.
     known = session.plan, session.protocol, session.steps, session.trials_left, session.folded
     badly_shown = session.badly_shown if badly_shown is None else badly_shown
-    return Session(*known, position, badly_shown, session.chosen, session.failed)
+    return Session(*known, position, badly_shown, session.chosen, session.failed, session.practised)
 
 
 def near(session: Session) -> tuple[list[Step], list[Step]]:
@@ -284,9 +288,11 @@ def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
         session = _unless_failed(replace(session, failed=session.failed + 1))
         if current(session).kind == "done" or session.steps[session.position + 1].kind == "done":
             return session, answer
+    if trial.role == "practice":
+        session = replace(session, practised=(*session.practised, answer))
     if trial.role == "practice" and not trial_goes_on:
         feedback = Step("feedback", here.study, feedback_text(session.protocol, trial, chosen), role=trial.role)
-        session = _with_steps(session, session.position, [feedback])
+        session = _practised_again(_with_steps(session, session.position, [feedback]), trial)
     if trial_goes_on or trial.role == "practice":
         return session, answer
     if not comes_again(session.protocol, trial, answer.attempt, showing not in badly_shown):
@@ -294,6 +300,20 @@ def _record(session: Session, answer: Answer) -> tuple[Session, Answer]:
     end = max(i for i, step in enumerate(session.steps) if step.study == trial.study and step.trial) + 1
     repeat = trial_steps(session.protocol, trial, answer.attempt + 1, frozenset())
     return _with_steps(session, end, repeat), answer
+
+
+def _practised_again(session: Session, trial: Trial) -> Session:
+    """After a practice trial: another round after its feedback and pause, where the last one was not right enough."""
+    own = session.plan.practice(trial.study)
+    numbers = {one.trial for one in own}
+    given = [answer for answer in session.practised if answer.trial in numbers]
+    due = practice_due(session.protocol, own, given)
+    if due is None or due == given[-1].attempt:
+        return session
+    again = [Step("instructions", trial.study, session.protocol.texts.practice_again.strip())]
+    for one in own:
+        again += trial_steps(session.protocol, one, due, frozenset())
+    return _with_steps(session, session.position + 2, again)
 
 
 def _finished(session: Session, trial: Trial, answer: Answer) -> Session:

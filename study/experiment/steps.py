@@ -15,7 +15,7 @@ from study.experiment import wording
 from study.experiment.plan import Plan
 from study.experiment.protocol.whole import Protocol, StudySpec
 from study.tasks.answer import CONFIDENCE, Answer
-from study.tasks.registry import kind_of, layout_of, right_answer, task_of
+from study.tasks.registry import is_right, kind_of, layout_of, right_answer, task_of
 from study.tasks.task import Kind as AnswerKind
 from study.tasks.task import scale
 from study.tasks.trial import PLACES, Pair, Trial
@@ -185,14 +185,19 @@ def _study_steps(
     again: list[tuple[int, list[Step]]] = []
     begun = any(trial.trial in earlier for trial in trials if trial.role != "practice")
     practised = trials[0].role == "practice" and not begun
+    practice = [trial for trial in trials if trial.role == "practice"]
+    given = [answer for trial in practice for _, answer in earlier.get(trial.trial, ())]
+    due = practice_due(protocol, practice, given) if practised else None
     for trial in trials:
         if practised and trial.role != "practice" and protocol.texts.practice_over.strip():
             steps.append(Step("instructions", study.name, protocol.texts.practice_over.strip()))
         practised = practised and trial.role == "practice"
         attempt, done = showing_due(protocol, trial, earlier)
+        if trial.role == "practice" and due is not None and attempt < due:
+            attempt, done = due, frozenset()
         if done is None:
             continue
-        if attempt > 1:
+        if attempt > 1 and trial.role != "practice":
             queued = max(place for place, answer in earlier[trial.trial] if answer.attempt == attempt - 1)
             again.append((queued, trial_steps(protocol, trial, attempt, done)))
             continue
@@ -234,15 +239,37 @@ def showing_due(protocol: Protocol, trial: Trial, earlier: Earlier) -> tuple[int
     answers = [answer for _, answer in earlier.get(trial.trial, ())]
     attempt = max((answer.attempt for answer in answers), default=1)
     latest = [answer for answer in answers if answer.attempt == attempt]
-    items = {step.item for step in _questions(protocol, trial, Step("answer"))}
-    if any(answer.missed and not answer.item for answer in latest):
-        items = {""}
     done = frozenset(answer.item for answer in latest)
-    if not items <= done:
+    if not _all_asked(protocol, trial, latest):
         return attempt, done
     if not comes_again(protocol, trial, attempt, all(answer.shown_well for answer in latest)):
         return attempt, None
     return attempt + 1, frozenset()
+
+
+def _all_asked(protocol: Protocol, trial: Trial, showing: Sequence[Answer]) -> bool:
+    """Whether everything that one showing of a trial asks was answered, or missed."""
+    items = {step.item for step in _questions(protocol, trial, Step("answer"))}
+    if any(answer.missed and not answer.item for answer in showing):
+        items = {""}
+    return items <= {answer.item for answer in showing}
+
+
+def practice_due(protocol: Protocol, trials: Sequence[Trial], answers: Sequence[Answer]) -> int | None:
+    """Which round of a study's practice is due, from 1, by the answers to its trials; None where it is over."""
+    study = protocol.study(trials[0].study)
+    rounds = max((answer.attempt for answer in answers), default=1)
+    latest = [answer for answer in answers if answer.attempt == rounds]
+    if not all(_all_asked(protocol, one, [each for each in latest if each.trial == one.trial]) for one in trials):
+        return rounds
+    right = sum(
+        is_right(one, each.value or "", right_answer(one) or "")
+        for one in trials
+        for each in latest
+        if each.trial == one.trial and each.item != CONFIDENCE
+    )
+    enough = study.practice_until is None or right >= study.practice_until * len(trials) - 1e-9
+    return None if enough or rounds >= study.practice_most else rounds + 1
 
 
 def trial_steps(protocol: Protocol, trial: Trial, attempt: int, done: frozenset[str]) -> list[Step]:

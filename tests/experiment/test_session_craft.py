@@ -15,6 +15,7 @@ from study.experiment.protocol.whole import Protocol, parse_protocol
 from study.experiment.session import advanced, answered, current, missed, open_session, outcome
 from study.models.latin_square import latin_square
 from study.tasks.answer import Answer
+from study.tasks.registry import right_answer
 
 MakeStimuli = Callable[[Protocol], FakeStimuli]
 
@@ -119,3 +120,42 @@ def test_blocks_hold_the_trials_of_a_transition_together(make_stimuli: MakeStimu
         assert len(blocks) == len(set(blocks)) > 1
         seen.add(tuple(blocks))
     assert len(seen) > 1
+
+
+@pytest.mark.parametrize(("right_in", "rounds"), [((2,), 1), ((1, 2), 2), ((0, 1, 0, 2), 3)])
+def test_practice_comes_again_until_enough_of_a_round_is_right(
+    make_stimuli: MakeStimuli, right_in: tuple[int, ...], rounds: int
+) -> None:
+    """So many right answers of two in each round, at most three rounds; killed and resumed after each answer."""
+    more = 'order = "both"\npractice = 2\npractice_until = 1.0\nconfidence_points = 3'
+    protocol = parse_protocol(TOY_PROTOCOL.replace('order = "both"', more))
+    plan = draw_plan(protocol, make_stimuli(protocol).pairs, "p01")
+    own = [trial.trial for trial in plan.practice("jnd")]
+    stored: list[Answer] = []
+    read: list[str] = []
+    session = open_session(protocol, plan)
+    while (step := current(session)).kind != "done":
+        if step.kind != "answer":
+            read.append(step.text)
+            session = advanced(session)
+            continue
+        trial, value = session.trial(step.trial), step.legal[0]
+        if trial.role == "practice" and not step.item:
+            right = right_answer(trial)
+            wanted = own.index(step.trial) < right_in[step.attempt - 1]
+            value = next(one for one in step.legal if (one == right) == wanted)
+        session, answer = answered(session, value, 0.5)
+        stored.append(answer)
+        again = open_session(protocol, plan, stored)
+        left = [(one.trial, one.attempt, one.item) for one in session.steps[session.position :] if one.kind == "answer"]
+        assert [(one.trial, one.attempt, one.item) for one in again.steps if one.kind == "answer"] == left
+    practised = [(one.trial, one.attempt) for one in stored if one.trial in own and not one.item]
+    assert practised == [(number, attempt) for attempt in range(1, rounds + 1) for number in own]
+    assert read.count(protocol.texts.practice_again) == rounds - 1
+    assert read.count(protocol.texts.practice_over) == 1
+
+
+def test_practice_until_needs_a_task_with_right_answers() -> None:
+    text = TOY_PROTOCOL.replace('order = "both"', 'order = "both"\npractice_until = 0.8')
+    with pytest.raises(ProtocolError, match=r"practice_until: expected practice, and a task with right answers"):
+        parse_protocol(text)

@@ -177,6 +177,13 @@ def _check_practice(protocol: Content, study: StudySpec, index: int) -> None:
     where = ("studies", index, "practice_transitions")
     if study.practice_transitions and not study.practice:
         raise KeyMismatchError("expected practice of one trial or more with them, found none; set practice", *where)
+    if study.practice_until is not None and not (study.practice and study.differences_frames):
+        raise KeyMismatchError(
+            f"expected practice, and a task with right answers, with practice_until, found the {study.task} study "
+            f"{study.name!r} with {counted(study.practice, 'practice trial')}; remove it",
+            *where[:-1],
+            "practice_until",
+        )
     shown = protocol.transitions_of(study)
     if not shown:
         raise KeyMismatchError(f"expected a transition for the trials of {study.name!r}, found none but these", *where)

@@ -167,6 +167,16 @@ class StudySpec(Part):
     practice: int = Field(
         default=0, ge=0, le=100, description="Trials with feedback before the study, which are not analysed. [trials]"
     )
+    practice_until: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description="Share of right responses at which practice is over; until then it comes again. For tasks with "
+        "right answers.",
+    )
+    practice_most: int = Field(
+        default=3, ge=1, le=20, description="How often practice comes with `practice_until`, whatever the responses."
+    )
     practice_transitions: Listed[str] = Field(
         default=(),
         description="Transitions for practice and the example only, so that neither shows the study's stimuli; "

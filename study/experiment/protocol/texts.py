@@ -169,6 +169,11 @@ class Texts(Part):
         default="That was the practice. From now on your answers count.",
         description="Read between practice and study; not shown if empty.",
     )
+    practice_again: str = Field(
+        default="Let us practise once more.",
+        min_length=1,
+        description="Read before practice that comes again (`practice_until`).",
+    )
     missed: str = Field(default="The time to answer was over.", description="After a trial without a response.")
     attention_check: str = Field(
         default="This one checks the controls. Please answer: {answer}",
