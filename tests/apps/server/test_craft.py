@@ -81,3 +81,22 @@ def test_a_preview_begins_at_any_trial_and_anew_each_time(serve: Callable[..., A
         assert person.until(person.begin("page-again", parameters={"trial": "2"}), "trial")["trial"] == 2
     refused = serving.person().post("/api/begin", {"page": "page-one", "parameters": {"trial": "99"}})
     assert (refused.status_code, "Expected a trial from 1 to" in refused.text) == (422, True)
+
+
+def test_practice_that_was_not_right_comes_again_with_films_of_its_own(serve: Callable[..., Any]) -> None:
+    text = PROTOCOL.replace("practice = 1\n", "practice = 1\npractice_until = 1.0\npractice_most = 3\n")
+    person = serve(text=text).person()
+    view = person.until(person.begin(), "trial")
+    seen = []
+    while view["label"] == "Practice":
+        seen.append((view["trial"], view["attempt"], tuple(film["url"] for film in view["films"])))
+        told = person.answer(view, "same" if len(seen) < 2 else "different")
+        assert told["kind"] == "feedback"
+        right = "That was right" in told["text"]
+        view = person.until(person.done(told), "trial")
+        assert (view["label"] == "Practice") == (not right and len(seen) < 3)
+        if len(seen) == 1:  # a reload asks for the same round
+            again = person.until(person.begin("page-two", previous="page-one"), "trial")
+            assert (again["trial"], again["attempt"]) == (view["trial"], view["attempt"])
+    assert [attempt for _, attempt, _ in seen] == list(range(1, len(seen) + 1))
+    assert len({url for _, _, urls in seen for url in urls}) == 2 * len(seen)
