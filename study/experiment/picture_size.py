@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from study.errors import SessionError
 from study.experiment.protocol.stimuli import Screen
@@ -53,3 +54,16 @@ def seen_degrees(height_px: float, sight: Sight) -> float | None:
     if sight.px_per_cm is None or sight.distance_cm is None:
         return None
     return math.degrees(2.0 * math.atan(height_px / sight.px_per_cm / 2.0 / sight.distance_cm))
+
+
+def size_shown(wide_px: int, high_px: int, sight: Sight) -> dict[str, Any]:
+    """How large a picture is shown, for the record (`store.variables.SIZE_SHOWN`)."""
+    degrees = seen_degrees(high_px, sight)
+    return {
+        "width_px": wide_px,
+        "height_px": high_px,
+        "height_degrees": None if degrees is None else round(degrees, 3),
+        "screen_height_px": sight.screen_px,
+        "px_per_cm": None if sight.px_per_cm is None else round(sight.px_per_cm, 4),
+        "distance_cm": sight.distance_cm,
+    }

@@ -16,8 +16,8 @@ from study.apps.cli.one_hop import (
     pairs_of,
     problem_of,
     search_options,
-    show_played,
 )
+from study.apps.cli.one_hop_play import show_played
 from study.counting import counted
 
 if TYPE_CHECKING:

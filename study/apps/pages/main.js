@@ -105,7 +105,13 @@ async function start() {
   window.addEventListener("beforeunload", (event) => {
     if (hasKept()) event.preventDefault();
   });
-  await run(study);
+  try {
+    await run(study);
+  } catch (error) {
+    if (!(error instanceof Refused)) throw error;
+    status("");
+    screens.notice(error.message); // nothing can be shown at this address
+  }
 }
 
 // A page that the back button brings back as it was left shows what may have long been answered.

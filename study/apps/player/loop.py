@@ -21,15 +21,14 @@ from study.apps.player.calm import calm, settled
 from study.apps.player.desk import Desk, Stopped
 from study.apps.player.pages import AGAIN, Look, cells_of
 from study.apps.player.sheet import draw_page
-from study.apps.player.showing import Showing, find_rate, frame_at
-from study.experiment.picture_size import Sight, seen_degrees, wanted_px
+from study.apps.player.showing import Showing, find_rate, frame_at, presentations
+from study.experiment.picture_size import Sight, size_shown, wanted_px
 from study.experiment.session import Session, advanced, answered, current, filled, missed, outcome, progress, restarted
 from study.experiment.steps import Kind, Step
 from study.experiment.stimuli.stimulus import Stimulus
 from study.experiment.store.answers import Presentation
 from study.tasks.registry import layout_of
 from study.tasks.task import Layout
-from study.tasks.trial import PLACES
 
 if TYPE_CHECKING:
     from renderer.window import Window
@@ -263,16 +262,7 @@ class _Player(Desk):
     def _size_shown(self, identifier: str, cell: Shares) -> dict[str, Any]:
         """How large a stimulus is shown, for the record."""
         _, _, wide, high = self._drawing(identifier, cell).place
-        sight = self._sight()
-        degrees = seen_degrees(high, sight)
-        return {
-            "width_px": wide,
-            "height_px": high,
-            "height_degrees": None if degrees is None else round(degrees, 3),
-            "screen_height_px": sight.screen_px,
-            "px_per_cm": None if sight.px_per_cm is None else round(sight.px_per_cm, 4),
-            "distance_cm": sight.distance_cm,
-        }
+        return size_shown(wide, high, self._sight())
 
     def _show(self, identifiers: Sequence[str], drawings: Sequence[Any]) -> list[Showing] | None:
         """Play stimuli at once to the end of the longest; None where the participant interrupted it and stays.
@@ -382,33 +372,11 @@ class _Player(Desk):
         return list(dict.fromkeys(reasons))
 
     def _presentations(self, step: Step) -> list[Presentation]:
-        method = "own clock" if self.window.pacing.own_clock else "swap"
-        rows = []
         at_once = len(self.stills) if self.plays else 0
         cells = cells_of(at_once) if at_once else [WHOLE] * len(self.showings)
-        for number, showing in enumerate(self.showings):
-            place = PLACES[number % len(cells)]
-            detail: Mapping[str, Any] = {
-                **showing.detail(),
-                **self._size_shown(showing.stimulus, cells[number % len(cells)]),
-                **({"play": 1 + number // at_once, "apart_frames": 0.0} if at_once else {}),
-                "faults": [*showing.faults, *self.faults],
-            }
-            rows.append(
-                Presentation(
-                    step.trial,
-                    step.attempt,
-                    place,
-                    showing.stimulus,
-                    method,
-                    showing.frames_in_all,
-                    len(showing.presented),
-                    round(showing.longest_gap_frames, 4),
-                    showing.shown_well and not self.faults,
-                    detail,
-                )
-            )
-        return rows
+        sizes = [self._size_shown(one.stimulus, cells[n % len(cells)]) for n, one in enumerate(self.showings)]
+        method = "own clock" if self.window.pacing.own_clock else "swap"
+        return presentations(step, self.showings, sizes, at_once, method, self.faults)
 
 
 STEPS: Mapping[Kind, Callable[[_Player, Step], None]] = {

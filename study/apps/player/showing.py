@@ -7,11 +7,15 @@ holds each frame for two flips, on one of 144 Hz for four or five. So the frame 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from study.errors import SessionError
+from study.experiment.steps import Step
+from study.experiment.store.answers import Presentation
+from study.tasks.trial import PLACES
 
 LONGEST_GAP_FRAMES = 1.5
 """A frame that is shown longer than this is a display failure: the trial is repeated."""
@@ -135,3 +139,43 @@ class Showing:
             "faults": list(self.faults),
             "shown_well": self.shown_well,
         }
+
+
+def presentations(
+    step: Step,
+    showings: Sequence[Showing],
+    sizes: Sequence[Mapping[str, Any]],
+    at_once: int,
+    method: str,
+    faults: Sequence[str],
+) -> list[Presentation]:
+    """The records of what a trial showed.
+
+    Parameters
+    ----------
+    sizes
+        How large each was (`picture_size.size_shown`).
+    at_once
+        How many were shown at once, maybe several times; 0 where one came after the other.
+    faults
+        Of the trial as a whole.
+    """
+    rows = []
+    for number, (showing, size) in enumerate(zip(showings, sizes, strict=True)):
+        played = {"play": 1 + number // at_once, "apart_frames": 0.0} if at_once else {}
+        detail = {**showing.detail(), **size, **played, "faults": [*showing.faults, *faults]}
+        rows.append(
+            Presentation(
+                step.trial,
+                step.attempt,
+                PLACES[number % (at_once or len(showings))],
+                showing.stimulus,
+                method,
+                showing.frames_in_all,
+                len(showing.presented),
+                round(showing.longest_gap_frames, 4),
+                showing.shown_well and not faults,
+                detail,
+            )
+        )
+    return rows

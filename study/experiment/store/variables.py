@@ -23,6 +23,12 @@ class Variable:
         found = {"Description": self.description, "Units": self.unit, "Levels": dict(self.levels)}
         return {key: value for key, value in found.items() if value}
 
+    def line(self, name: str) -> str:
+        """What `docs/exporting.md` says of it, a row of its table."""
+        kind = f"{self.kind}, {self.unit}" if self.unit else self.kind
+        levels = "; ".join(f"`{value}`: {meaning}" for value, meaning in self.levels.items())
+        return f"| `{name}` | {kind} | {self.description}{f' {levels}.' if levels else ''} |"
+
 
 ANSWERS: Mapping[str, Variable] = {
     "participant": Variable("Who answered."),

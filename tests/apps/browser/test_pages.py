@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from devtools import Tab
 from serving import Site
-from walking import END, KEPT, LOOK, PATIENT, QUESTION, SHORT, answers, press, read_on, to_films, to_question
+from walking import END, KEPT, LOOK, PATIENT, QUESTION, SHORT, answers, go_on, press, read_on, to_films, to_question
 
 pytestmark = pytest.mark.gl
 
@@ -244,3 +244,13 @@ def test_the_keyboard_alone_leads_through_a_session(
     assert sorted(live) == ["progress", "status"]
     assert "0 of 10 done" in json.dumps(sorted(spoken(tab)))
     assert list(answers(site)["answer"]) == ["different"]
+
+
+def test_an_address_at_which_nothing_can_be_shown_says_why(
+    make_site: Callable[..., Any], make_tab: Callable[..., Any]
+) -> None:
+    site, tab = make_site(SHORT, preview=True, parameters=("trial",)), make_tab()
+    tab.open(f"{site.address}/?trial=99")
+    tab.wait_text("Expected a trial from 1 to 4, found 99.")
+    tab.open(f"{site.address}/?trial=4")
+    go_on(tab, True)
