@@ -69,7 +69,7 @@ export function cellSize(study, count, slider) {
 export function stage(study) {
   const size = pictureSize(study);
   const ratio = window.devicePixelRatio || 1;
-  const made = element("div", { class: "stage", "data-focus": true, tabindex: "-1" });
+  const made = element("div", { class: "stage", role: "group", "data-focus": true, tabindex: "-1" });
   const middle = (room, own) => `${Math.max(0, Math.round((room * ratio - own) / 2)) / ratio}px`;
   made.style.left = middle(window.innerWidth, size.width_px);
   made.style.top = middle(window.innerHeight, size.height_px);
@@ -148,7 +148,7 @@ async function blindSpotDistance(study, perCm) {
 function vanished(speed) {
   return new Promise((resolve) => {
     const [square, dot] = [element("div", { class: "fixation" }), element("div", { class: "dot" })];
-    show([element("div", { class: "field", "data-focus": true, tabindex: "-1" }, square, dot)], { trial: true });
+    show([element("div", { class: "field", role: "group", "data-focus": true, tabindex: "-1" }, square, dot)], { trial: true });
     const began = performance.now();
     const controller = new AbortController();
     const away = () => ((performance.now() - began) / 1000) * speed;

@@ -78,7 +78,7 @@ function cells(view, study) {
   const films = view.films.map(() => element("div", { class: "film" }));
   const made = films.map((film, at) => element("div", { class: "cell" }, film, slider ? element("b", {}, "ABCDEF"[at]) : null));
   const grid = element("div", { class: "grid" }, ...made);
-  const place = element("div", { class: "together", "data-focus": true, tabindex: "-1" }, grid);
+  const place = element("div", { class: "together", role: "group", "data-focus": true, tabindex: "-1" }, grid);
   const fit = () => {
     const { columns, ...size } = cellSize(study, films.length, slider);
     grid.style.gridTemplateColumns = `repeat(${columns}, auto)`;
