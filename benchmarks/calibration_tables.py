@@ -1,4 +1,4 @@
-"""The tables of docs/analysis.md out of the rows that `calibration.py ... --out FILE` kept.
+"""The tables behind docs/analysis.md out of the rows that `calibration.py ... --out FILE` kept.
 
 python benchmarks/calibration_tables.py cells.jsonl
 """
