@@ -104,7 +104,7 @@ others = ["cut"]
     (("others = [\"cut\"]", "others = [\"cut\"]\nsets = 2"), "expected sets that divide the 3 pairs of methods"),
     (("others = [\"cut\"]", "others = [\"cut\"]\nsets = 3\norder = \"by-group\""), "another order than by-group"),
     (("others = [\"cut\"]", "others = [\"cut-lee2002\"]"), "'geodesic' and 'fixed' and 'cut-lee2002'; change one"),
-    (("task = \"preference\"", "task = \"rating\""), "expected others in preference studies only"),
+    (("task = \"preference\"", "task = \"rating\""), "expected others in preference and parallel-rating studies only"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_refused(change: tuple[str, str], message: str) -> None:
     parse_protocol(TEXT)

@@ -181,6 +181,14 @@ function track(label, ticks, moved) {
     moved();
   };
   for (const kind of ["input", "click"]) input.addEventListener(kind, touched);
+  // The knob that is not seen yet lies in the middle all the same, and would take every press near there for its own.
+  input.addEventListener("pointerdown", (event) => {
+    if (!input.classList.contains("untouched")) return;
+    const { left, width } = input.getBoundingClientRect();
+    const knob = 1.5 * parseFloat(getComputedStyle(document.documentElement).fontSize);
+    input.value = Math.round((100 * (event.clientX - left - knob / 2)) / (width - knob));
+    touched();
+  });
   const marks = ticks ? element("div", { class: "ticks", "aria-hidden": "true" }, ...Array.from({ length: 11 }, () => element("i"))) : null;
   return element("div", { class: "track" }, input, marks);
 }

@@ -18,7 +18,7 @@ from study.experiment.store.sessions import find_session
 pytestmark = pytest.mark.gl
 
 ANSWERS = (
-    SHORT[: SHORT.index("[[studies]]")]
+    SHORT[: SHORT.index("[[studies]]")].replace("[timing]", "[timing]\nshow_again = 0")
     + """
 [[studies]]
 name = "liking"
@@ -57,11 +57,16 @@ PICTURES = os.environ.get("SEGUE_PICTURES")
 """Where the tests leave pictures of the pages, where somebody wants to look at them."""
 
 
+# What follows from another size is on the screen.
+DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
 def looked_at(tab: Any, name: str) -> None:
     """What is on the page is legible and not too large, on a laptop and on a telephone."""
     for size, where in ((LAPTOP, "laptop"), (PHONE, "phone")):
         tab.size(*size)
         tab.wait(f"window.innerWidth === {size[0]}")
+        tab.run(DRAWN)
         if PICTURES:
             tab.picture(Path(PICTURES) / f"{name}-{where}.png")
         assert [one for one in tab.run(CONTRASTS) if one[1] < one[2]] == []
@@ -74,7 +79,7 @@ def looked_at(tab: Any, name: str) -> None:
         assert tab.run(unnamed) == 0
     tab.size(*LAPTOP)
     tab.wait(f"window.innerWidth === {LAPTOP[0]}")
-    tab.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    tab.run(DRAWN)
 
 
 def to(tab: Any, script: str) -> None:
