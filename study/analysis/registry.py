@@ -10,6 +10,7 @@ from study.analysis.preference.analyse import Preference, analyse_preference
 from study.analysis.ratings.analyse import PairRatings, ParallelRatings, Ratings, analyse_parallel, analyse_ratings
 from study.analysis.same_different.analyse import SameDifferent, analyse_same_different
 from study.analysis.study_result import TaskAnalysis
+from study.analysis.yes_no.analyse import YesNo, analyse_yes_no
 from study.errors import AnalysisError
 
 ANALYSES: Mapping[str, TaskAnalysis] = {
@@ -19,6 +20,7 @@ ANALYSES: Mapping[str, TaskAnalysis] = {
     "parallel-rating": TaskAnalysis(analyse_parallel, (ParallelRatings,)),
     "oddity": TaskAnalysis(partial(analyse_forced, Oddity), (Oddity,)),
     "2afc": TaskAnalysis(partial(analyse_forced, TwoAlternatives), (TwoAlternatives,)),
+    "yes-no": TaskAnalysis(analyse_yes_no, (YesNo,)),
 }
 
 

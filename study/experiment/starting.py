@@ -39,6 +39,11 @@ _LEVELS = """reference = "geodesic"  # the blend of the length k that the geodes
 differences_frames = {differences}
 order = "both"  # each pair in every order
 """
+_SINGLE = """reference = "geodesic"  # the blend of the length k that the geodesic distance method finds (2004, 3.1)
+# Frames by which the blend that is shown is shorter or longer than k; "yes" at 0 is a false alarm.
+differences_frames = {differences}
+repeats = 4
+"""
 _METHODS = """# Two ways to make a transition; docs/transitions.md lists more, such as "inertialize" or "cut".
 reference = "geodesic"
 comparison = "fixed"
@@ -69,6 +74,7 @@ OF_TASK: Mapping[str, Study] = {
     "same-different": Study("How noticeable is the length of a blend?", _LEVELS, (-3, -2, -1, 0, 1, 2, 4)),
     "oddity": Study("Which of three blends has another length?", _LEVELS, (-3, -2, -1, 1, 2, 4)),
     "2afc": Study("Which of two blends is longer?", _LEVELS, (-3, -2, -1, 1, 2, 4)),
+    "yes-no": Study("At which lengths does a blend look wrong?", _SINGLE, (-3, -2, -1, 0, 1, 2, 4)),
     "preference": Study(
         "Does a blend of the geodesic length look more natural than one of ten frames?",
         _METHODS + 'order = "balanced"  # half of the pairs in each order\n',

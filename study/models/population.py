@@ -12,6 +12,7 @@ import numpy as np
 
 from study.arrays import FloatArray
 from study.errors import SessionError
+from study.models.detection import said_yes
 from study.models.differencing import detected
 from study.models.forced import Forced
 
@@ -47,6 +48,11 @@ def probability_found(
 ) -> FloatArray:
     """Probability that one observer is right in a forced choice, in the shape of the differences."""
     return forced.with_lapses(_d_prime(observer, difference_frames), observer.lapse)
+
+
+def probability_yes(observer: SameDifferentObserver, difference_frames: float | FloatArray) -> FloatArray:
+    """Probability that one observer says "yes" in a yes-no task, in the shape of the differences."""
+    return said_yes(_d_prime(observer, difference_frames), observer.criterion, observer.lapse)
 
 
 def visibility(observer: SameDifferentObserver, difference_frames: float) -> float:

@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from study.arrays import FloatArray, IntArray
+from study.models.detection import BEST_D_PRIME, said_yes
 from study.models.differencing import criterion_free_delta, detected
 from study.models.forced import FORCED, Forced
 from study.models.population import LEAST_CRITERION
@@ -136,7 +137,8 @@ class QuestRule(Rule):
 
     title: ClassVar[str] = "QUEST+ track"
     task: str
-    """`same-different`: the differencing model; the threshold is criterion-free. Else one of `FORCED`."""
+    """`same-different`: the differencing model; the threshold is criterion-free. Or `yes-no`, likewise; else one of
+    `FORCED`."""
     levels: tuple[int, ...]
     """The differences that may be asked, in frames, from the least."""
     threshold_frames: float
@@ -144,7 +146,8 @@ class QuestRule(Rule):
     """`threshold_frames`, `threshold_spread`: median of the prior, and standard deviation of the natural logarithm."""
     criterion: float
     criterion_spread: float
-    """`criterion`, `criterion_spread`: mean and standard deviation of the prior, for same-different."""
+    """`criterion`, `criterion_spread`: mean and standard deviation of the prior, for same-different; yes-no takes
+    half of both (`models.detection`)."""
     most_lapses: float
     """Lapse rates up to this are as likely as one another."""
     slope_spread: float
@@ -167,10 +170,10 @@ class QuestRule(Rule):
         return "median of the posterior"
 
     def meaning(self, right: str) -> str:
-        """What holds at the threshold: in same-different, whatever a participant's own criterion is."""
+        """What holds at the threshold: in same-different and yes-no, whatever a participant's own criterion is."""
         if not DECIDING[self.task].has_criterion:
             return super().meaning(right)
-        return f"an observer with the best criterion would be right in {100 * self.target:.0f}% of the pairs"
+        return f"an observer with the best criterion would be right in {100 * self.target:.0f}% of the trials"
 
     def begin(self) -> Asked:
         """Nothing was asked."""
@@ -230,12 +233,18 @@ def _same_different(over: FloatArray, criterion: FloatArray, lapse: FloatArray) 
     return np.where(over > 0, different, 1 - different)
 
 
+def _yes_no(over: FloatArray, criterion: FloatArray, lapse: FloatArray) -> FloatArray:
+    yes = said_yes(BEST_D_PRIME * over, criterion, lapse)
+    return np.where(over > 0, yes, 1 - yes)
+
+
 def _forced(forced: Forced, over: FloatArray, slope: FloatArray, lapse: FloatArray) -> FloatArray:
     return forced.with_lapses(forced.at_threshold * over**slope, lapse)
 
 
 DECIDING = {
     "same-different": Deciding(0.75, True, _same_different),
+    "yes-no": Deciding(0.75, True, _yes_no),
     **{name: Deciding(forced.halfway, False, partial(_forced, forced)) for name, forced in FORCED.items()},
 }
 """By the task."""

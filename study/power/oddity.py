@@ -62,11 +62,20 @@ def forced_study(forced: Forced, design: Design, precision: float, confidence: f
     model = make_model("2afc", choices=forced.choices)
 
     def told(conditions: Conditions, right: FloatArray, shown: FloatArray) -> bool:
-        people, levels = len(right), conditions.differences
-        counts = {"yes": right.ravel(), "shown": shown.ravel(), "motion": np.tile(conditions.motions, people)}
-        table = pd.DataFrame({"participant": np.repeat(np.arange(people), len(levels)).astype(str), **counts})
-        table["level"], side = np.tile(np.abs(levels), people), np.tile(np.sign(levels), people)
-        parts = [part for sign in (-1, 1) if len(part := table[(side == sign) & (table["shown"] > 0)])]
+        table = counts_table(conditions, right, shown)
+        table["level"], side = table["difference"].abs(), np.sign(table["difference"])
+        parts = [part for sign in (-1, 1) if len(part := table[side == sign])]
         return _told([typical_threshold(part, model, confidence) for part in parts], precision)
 
     return level_study(design, partial(probability_found, forced), forced.chance, told)
+
+
+def counts_table(conditions: Conditions, yes: FloatArray, shown: FloatArray) -> pd.DataFrame:
+    """Return counts, shape (participants, conditions), as a table of `participant`, `motion`, `difference`, `yes`,
+    `shown`; without what was not shown.
+    """
+    people = len(yes)
+    counts = {"yes": yes.ravel(), "shown": shown.ravel(), "motion": np.tile(conditions.motions, people)}
+    counts["difference"] = np.tile(conditions.differences, people)
+    who = np.repeat(np.arange(people), len(conditions.motions)).astype(str)
+    return pd.DataFrame({"participant": who, **counts})[counts["shown"] > 0].copy()

@@ -13,6 +13,7 @@ from study.power.preference import preference_effect
 from study.power.ratings import rating_effect
 from study.power.same_different import same_different_effect
 from study.power.staircases import staircase_effect
+from study.power.yes_no import yes_no_effect
 
 Make = Callable[["StudySpec", Mapping[str, float], "AnalysisSettings"], Effect]
 """From a study, the numbers of its effect by name, and what was decided about the analysis."""
@@ -23,6 +24,7 @@ EFFECTS: Mapping[str, Make] = {
     "rating": rating_effect,
     "oddity": forced_effect,
     "2afc": forced_effect,
+    "yes-no": yes_no_effect,
     "parallel-rating": rating_effect,
 }
 

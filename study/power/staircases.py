@@ -18,6 +18,7 @@ from study.analysis.oddity.analyse import ForcedChoice
 from study.analysis.same_different.analyse import SameDifferent
 from study.analysis.same_different.counts import SIGNS
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
+from study.analysis.yes_no.analyse import YesNo
 from study.arrays import BoolArray, FloatArray
 from study.counting import counted
 from study.errors import AnalysisError
@@ -27,20 +28,23 @@ from study.experiment.procedures.interleaved import Interleaving
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.forced import FORCED
-from study.models.population import SameDifferentObserver, probability_different, probability_found
+from study.models.population import SameDifferentObserver, probability_different, probability_found, probability_yes
 from study.models.quest_plus import Asked, QuestRule
 from study.power.curve import Run
 from study.power.design import Design, Effect, times
 from study.power.oddity import forced_observer
 from study.power.same_different import narrow, same_different_observer, threshold_numbers
+from study.power.yes_no import yes_no_observer
 from study.tasks.observer import ObserverSettings
 
 OBSERVERS: Mapping[str, Callable[[float, float, float, float], ObserverSettings]] = {
     "same-different": same_different_observer,
+    "yes-no": yes_no_observer,
     **{name: partial(forced_observer, forced) for name, forced in FORCED.items()},
 }
 RIGHT: Mapping[str, tuple[Callable[[SameDifferentObserver, FloatArray], FloatArray], float]] = {
     "same-different": (probability_different, 0.5),
+    "yes-no": (probability_yes, 0.5),
     **{name: (partial(probability_found, forced), forced.chance) for name, forced in FORCED.items()},
 }
 """The probability of a right response by the difference, and what it is for an observer who does not know."""
@@ -68,7 +72,8 @@ def staircase_effect(study: StudySpec, options: Mapping[str, float], decided: An
 
 def staircases_found(analysis: Analysis, name: str, precision: float) -> bool:
     """Return whether the intervals of the thresholds of all sides are as narrow as asked."""
-    result = analysis.of(SameDifferent).get(name) or analysis.of(ForcedChoice).get(name)
+    kinds = analysis.of(SameDifferent), analysis.of(ForcedChoice), analysis.of(YesNo)
+    result = kinds[0].get(name) or kinds[1].get(name) or kinds[2].get(name)
     return result is not None and result.staircases is not None and _told(result.staircases, precision)
 
 

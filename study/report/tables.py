@@ -99,6 +99,7 @@ COLUMNS: Mapping[str, tuple[str, Kind]] = {
     "d_prime": ("d-prime", "two"),
     "d_prime_independent": ("independent observations", "two"),
     "criterion": ("criterion", "two"),
+    "criterion_free": ("criterion-free, frames", "two"),
     "lapse_percent": ("lapses, %", "one"),
     "known": ("known", "two"),
     "found": ("found", "two"),

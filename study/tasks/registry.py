@@ -17,10 +17,11 @@ from study.tasks.same_different import SAME_DIFFERENT
 from study.tasks.task import SLIDER_POINTS, Asked, Kind, Layout, Problem, Task
 from study.tasks.trial import Trial
 from study.tasks.two_alternatives import TWO_ALTERNATIVES
+from study.tasks.yes_no import YES_NO
 
 TASKS: Mapping[str, Task] = {
     task.name: task
-    for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING, ODDITY, TWO_ALTERNATIVES, PARALLEL_RATING)
+    for task in (SAME_DIFFERENT, PREFERENCE, RATING, PAIR_RATING, ODDITY, TWO_ALTERNATIVES, YES_NO, PARALLEL_RATING)
 }
 
 DECIDES: Mapping[str, str] = {task.name: task.decides for task in TASKS.values() if task.name == task.asked_as}

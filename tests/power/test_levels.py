@@ -207,3 +207,16 @@ def test_quest_plus_is_compared_with_constant_stimuli() -> None:
         assert ("QUEST+ saves" if asked < fixed else "constant stimuli saves") in said
         times.append(fixed / asked)
     assert times[1] > 1.5 * times[0]
+
+
+def test_yes_no_observers_say_yes_as_often_as_percepts_drawn_one_by_one() -> None:
+    """At the thresholds asked for in three of four trials, and more precisely the more people there are."""
+    text = PROTOCOL.replace('"oddity"', '"yes-no"') + LEVELS.replace("-4, 4", "-4, 0, 4")
+    design = design_of(text, 24)
+    effect = effect_of(design.study, OPTIONS, design.protocol.analysis)
+    own, rng = effect.observer.same_different, np.random.default_rng(2)
+    for d_prime in (8.0 * own.d_prime_shorter, 6.0 * own.d_prime_longer):
+        yes = rng.standard_normal(400_000) + d_prime > own.criterion / 2
+        assert own.lapse / 2 + (1 - own.lapse) * yes.mean() == pytest.approx(0.75, abs=0.003)
+    few, many = (share(effect.study(design), people, 8) for people in (4, 24))
+    assert few < many

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TypicalThreshold:
-    """Where a typical participant's curve is half way, with Student's interval; None where there is none, see `note`.
+    """Where a typical participant's curve is half way or as asked, with Student's interval; None where there is none.
 
-    Slope and spreads are on the scale of the link.
+    `note` says why there is none. Slope and spreads are on the scale of the link.
     """
 
     threshold: float | None = None
@@ -33,6 +33,7 @@ class TypicalThreshold:
     slope: float | None = None
     intercept_spread: float | None = None
     slope_spread: float | None = None
+    slope_error: float | None = None
     note: str = ""
     correlation: float | None = None
     participants: int | None = None
@@ -49,6 +50,7 @@ def psychometric_mixed(
     guess: float = 0.0,
     lapse: float = 0.0,
     confidence: float = 0.95,
+    at: float = 0.0,
 ) -> TypicalThreshold:
     """Return the threshold of a typical participant: random intercept and slope over participants.
 
@@ -58,6 +60,8 @@ def psychometric_mixed(
         Columns `participant`, `level`, `yes`, `shown`, and `motion` where it is known.
     link, guess, lapse
         The curve; one half is guessed in 2AFC.
+    at
+        Where on the scale of the link the threshold lies; 0 is half way.
 
     Notes
     -----
@@ -74,7 +78,7 @@ def psychometric_mixed(
     fit = _fit(table, (levels - centre) / unit, motions.to_numpy(), link, guess, lapse, confidence)
     if isinstance(fit, str):
         return TypicalThreshold(note=fit)
-    return _threshold(fit, centre, unit, confidence)
+    return _threshold(fit, centre, unit, confidence, at)
 
 
 def _fit(
@@ -104,13 +108,15 @@ def _sound(fit: MixedFit) -> bool:
     return all(effect.standard_error is not None for effect in fit.effects) and bool(np.isfinite(fit.covariance).all())
 
 
-def _threshold(fit: MixedFit, centre: float, unit: float, confidence: float) -> TypicalThreshold:
+def _threshold(fit: MixedFit, centre: float, unit: float, confidence: float, at: float) -> TypicalThreshold:
     motions = len(fit.effects) - 1
-    own, slope = np.array([effect.value for effect in fit.effects[:motions]]), fit.effects[-1].value
+    own, slope = np.array([effect.value - at for effect in fit.effects[:motions]]), fit.effects[-1].value
+    error = fit.effects[-1].standard_error
     found = TypicalThreshold(
         slope=slope / unit,
         intercept_spread=fit.spread[0],
         slope_spread=fit.spread[1] / unit,
+        slope_error=None if error is None else error / unit,
         correlation=fit.correlation,
         participants=fit.participants,
         note=fit.note,

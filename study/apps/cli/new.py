@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 @click.option(
     "--study",
     metavar="TASK",
-    help="What participants decide: preference, same-different, oddity, 2afc, rating or parallel-rating "
+    help="What participants decide: preference, same-different, oddity, 2afc, yes-no, rating or "
+    "parallel-rating "
     "(default: asks).",
 )
 @click.option(

@@ -30,16 +30,20 @@ class Quest(Interleaving):
         1, "From one difference that may be shown to the next; every one is a stimulus to render. [frames]"
     )
     threshold_frames: Annotated[float, Gt(0), Le(400)] = setting(
-        8.0, "Prior of the threshold: its median. In a same-different study the threshold is criterion-free. [frames]"
+        8.0,
+        "Prior of the threshold: its median. In same-different and yes-no studies the threshold is "
+        "criterion-free. [frames]",
     )
     threshold_spread: Annotated[float, Ge(0.1), Le(3)] = setting(
         0.8, "Prior of the threshold: standard deviation of its natural logarithm; 0.7 is a factor of two."
     )
     criterion: Annotated[float, Gt(0), Le(10)] = setting(
-        2.0, "Prior of a same-different criterion: its mean, in standard deviations of one percept."
+        2.0,
+        "Prior of a same-different criterion: its mean, in standard deviations of one percept. In yes-no studies half "
+        "of it: with 2, 16% false alarms in both tasks.",
     )
     criterion_spread: Annotated[float, Ge(0.05), Le(5)] = setting(
-        1.0, "Prior of a same-different criterion: its standard deviation."
+        1.0, "Prior of a same-different criterion: its standard deviation; in yes-no studies half of it."
     )
     slope_spread: Annotated[float, Ge(0), Le(2)] = setting(
         0.45,
@@ -109,6 +113,7 @@ class Quest(Interleaving):
             f"QUEST+ with {self.range_in_words()}, a log-normal prior of the threshold (median "
             f"{self.threshold_frames:g} frames, standard deviation {self.threshold_spread:g} in natural logarithms), "
             f"and as nuisance parameters the lapse rate (up to {100 * self.most_lapses:g}%, all as likely) and the "
-            f"criterion (same-different; normal prior, {self.criterion:g} ± {self.criterion_spread:g}) or the slope "
+            f"criterion (same-different; normal prior, {self.criterion:g} ± {self.criterion_spread:g}, half of both in "
+            f"yes-no) or the slope "
             f"(oddity, 2AFC; log-normal prior, median 1, {self.slope_spread:g}); each track stopped {stops}"
         )

@@ -129,8 +129,8 @@ class StudySpec(Part):
     )
     differences_frames: Listed[Difference] = Field(
         default=(),
-        description="Same-different, oddity, 2AFC: comparison minus reference blend length, a pair each; 0 shows one "
-        "twice, in same-different studies. [frames]",
+        description="Same-different, oddity, 2AFC, yes-no: comparison minus reference blend length, a pair each; 0 "
+        "shows one twice in same-different studies, the reference in yes-no studies. [frames]",
     )
     fixed_frames: int | None = Field(
         default=None,

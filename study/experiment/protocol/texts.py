@@ -113,12 +113,15 @@ class Keys(Part):
     first: Key = Field(default="1", description="Key for the answer `first`.")
     second: Key = Field(default="2", description="Key for the answer `second`.")
     third: Key = Field(default="3", description="Answers with the third of three.")
+    yes: Key = Field(default="y", description="Key for the answer `yes`.")
+    no: Key = Field(default="n", description="Key for the answer `no`.")
     equal: Key = Field(default="0", description="Key for the answer `equal`.")
 
     @model_validator(mode="after")
     def _differ(self) -> Self:
         for one, other in (
             ("same", "different"),
+            ("yes", "no"),
             ("first", "second"),
             ("first", "third"),
             ("second", "third"),
@@ -148,6 +151,8 @@ class Texts(Part):
     first: str = Field(default="First", min_length=1, description="The answer `first`.")
     second: str = Field(default="Second", min_length=1, description="The answer `second`.")
     third: str = Field(default="Third", min_length=1, description="The answer `third`.")
+    yes: str = Field(default="Yes", min_length=1, description="The answer `yes`.")
+    no: str = Field(default="No", min_length=1, description="The answer `no`.")
     left: str = Field(default="Left", min_length=1, description="The answer `first` where films are side by side.")
     right: str = Field(default="Right", min_length=1, description="The answer `second` there.")
     play_again: str = Field(default="Play again", min_length=1, description="Button that plays films again.")

@@ -101,7 +101,7 @@ def test_the_protocol_can_be_shown_as_it_is(capsys: pytest.CaptureFixture[str], 
     text = re.sub(r"(entry_s|exit_s) = [\d.]+", rf"\1 = {wider.around_s}", text)
     text = re.sub(
         r"differences_frames = \[(.*)\]",
-        f"differences_frames = {[-3 * wider.step_frames, 4 * wider.step_frames]}",
+        f"differences_frames = {[-3 * wider.step_frames, *([0] * (task == 'yes-no')), 4 * wider.step_frames]}",
         text,
     )
     assert check(parse_protocol(text), library) != []

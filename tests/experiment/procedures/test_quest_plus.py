@@ -24,7 +24,8 @@ SETTINGS = Quest(most_frames=40)
 def begun(
     settings: Quest, seed: int, task: str = "same-different", motions: tuple[str, ...] = ("walk",)
 ) -> Interleaved:
-    slots = ((1, 0, 0), (0, 1, 0), (0, 0, 1)) if task == "oddity" else ((0, 1), (1, 0))
+    orders = {"oddity": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "yes-no": ((0,),)}
+    slots = orders.get(task, ((0, 1), (1, 0)))
     pairs = tuple(
         Pair(
             f"jnd/{motion}/{level:+d}",
@@ -32,8 +33,8 @@ def begun(
             task,
             motion,
             motion,
-            (f"{motion}-k", f"{motion}{level:+d}"),
-            ("g", "g"),
+            (f"{motion}-k", f"{motion}{level:+d}")[-len(slots[0]) :],
+            ("g", "g")[-len(slots[0]) :],
             level,
         )
         for motion in motions
@@ -97,6 +98,81 @@ def test_thresholds_are_found_and_their_intervals_hold_them(criterion: float, la
             held.append(found.low <= frames[longer] <= found.high)
     assert np.median(ratios) == pytest.approx(1, abs=0.1)
     assert 0.93 <= np.mean(held) <= 0.97
+
+
+class Detector:
+    """Says yes where one noisy percept lies above a criterion; its threshold, for the best one, is at `frames`."""
+
+    def __init__(self, rng: np.random.Generator, frames: dict[bool, float], criterion: float, lapse: float) -> None:
+        self.rng, self.frames, self.criterion, self.lapse = rng, frames, criterion, lapse
+
+    def __call__(self, trial: Trial) -> str:
+        difference = trial.difference_frames or 0
+        percept = self.rng.normal(2 * norm.ppf(0.75) * abs(difference) / self.frames[difference > 0])
+        if self.rng.random() < self.lapse:
+            return ("yes", "no")[int(self.rng.integers(2))]
+        return "yes" if percept > self.criterion else "no"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("criterion", "lapse"), [(0.5, 0.02), (1.0, 0.0), (1.5, 0.05)])
+def test_yes_no_tells_thresholds_whatever_the_criterion(criterion: float, lapse: float) -> None:
+    """Over 250 people, two thresholds each, with other criteria and lapses than the prior's; intervals are wide."""
+    ratios, held = [], []
+    for seed in range(250):
+        rng = np.random.default_rng([seed, 13])
+        frames = {longer: 8 * float(np.exp(0.5 * rng.standard_normal())) for longer in (False, True)}
+        procedure = begun(SETTINGS, seed, "yes-no")
+        for longer, track in tracks(procedure, run(procedure, Detector(rng, frames, criterion, lapse))).items():
+            found = procedure.rule.found(track)
+            assert found is not None
+            assert found.low is not None
+            assert found.high is not None
+            ratios.append(found.frames / frames[longer])
+            held.append(found.low <= frames[longer] <= found.high)
+    assert np.median(ratios) == pytest.approx(1, abs=0.1)
+    assert 0.93 <= np.mean(held) <= 0.99
+
+
+def test_yes_no_asks_what_brute_force_finds_trial_by_trial() -> None:
+    """Bayes' rule point by point, the entropy that is expected after either answer, and the level with the least."""
+    settings = replace(SETTINGS, side="longer", most_frames=9, step_frames=2, most_trials=12, catch_every=3)
+    procedure = begun(settings, 5, "yes-no")
+    answers = run(procedure, Detector(np.random.default_rng(5), {False: 4.0, True: 4.0}, 1.0, 0.05))
+    frames = 8 * np.exp(0.8 * np.linspace(-3, 3, 41))
+    criteria = np.linspace(max(2 - 2.5, 0.2), 2 + 5.0, 19)
+    points = [(f, c / 2, lapse) for f in frames for c in criteria for lapse in np.linspace(0, 0.1, 5)]
+    f, c, lapse = np.array(points).T
+    belief = norm.pdf(np.log(f / 8) / 0.8) * norm.pdf(2 * c - 2)
+    belief /= belief.sum()
+
+    def yes(level: float) -> np.ndarray:
+        return lapse / 2 + (1 - lapse) * norm.cdf(2 * norm.ppf(0.75) * level / f - c)
+
+    def unsure(mass: np.ndarray) -> float:
+        each = mass.reshape(41, -1).sum(axis=1)
+        each = each[each > 0] / each.sum()
+        return -float(each @ np.log(each))
+
+    asked = 0
+    for place, answer in enumerate(answers):
+        (trial,) = procedure.next(answers[:place])
+        level = trial.difference_frames
+        assert level is not None
+        if level:
+            expected = {
+                one: sum((belief @ chance) * unsure(belief * chance) for chance in (yes(one), 1 - yes(one)))
+                for one in settings.levels()
+            }
+            assert expected[level] == pytest.approx(min(expected.values()), abs=1e-8)
+            asked += 1
+        chance = yes(level) if answer.value == "yes" else 1 - yes(level)
+        belief = belief * chance / (belief @ chance)
+    assert asked == 12
+    found = procedure.rule.found(tracks(procedure, answers)[True])
+    assert found is not None
+    each = belief.reshape(41, -1).sum(axis=1)
+    assert found.frames == pytest.approx(float(np.exp(np.interp(0.5, np.cumsum(each) - each / 2, np.log(frames)))))
 
 
 class Finder:

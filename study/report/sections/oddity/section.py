@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Mapping, Sequence
 
 from study.analysis.analyse import Analysis
-from study.analysis.oddity.analyse import ForcedChoice
+from study.analysis.oddity.analyse import ForcedChoice, OddityLevel
 from study.analysis.psychometric.analyse import BelievedThreshold
-from study.analysis.same_different.counts import SIGNS
+from study.analysis.same_different.counts import SIGNS, Side
 from study.counting import counted
 from study.report import tables
 from study.report.drawing import BLUE, INK, SOFT, Picture, new_figure, percent_axis, picture_of
@@ -16,9 +15,6 @@ from study.report.references import MACMILLAN_2005
 from study.report.sections.section import About, Drawing, Headline, Section, SectionKind
 from study.report.sections.staircases import staircase_table, tracks_drawing
 from study.report.tables import Table
-
-if TYPE_CHECKING:
-    pass
 
 
 def oddity_section(result: ForcedChoice, about: About) -> Section | None:
@@ -31,12 +27,15 @@ def oddity_section(result: ForcedChoice, about: About) -> Section | None:
         "and psychometric functions of all answers. The dashed line is chance; the dotted one, at "
         f"{result.forced.halfway:.0%}, defines thresholds."
     )
+    curves = {side: found.pooled.curve for side, found in result.functions.items()}
+    lines = (100 * result.forced.chance, 100 * result.forced.halfway)
+    picture = levels_figure(result.levels, curves, lines, "right answers", f"study-{name}-right", about.mark)
     return Section(
         anchor=f"study-{name}",
         title=about.title,
         headlines=(_headline(result, about.fps),),
         drawings=(
-            Drawing(f"{name}_right", oddity_figure(result, f"study-{name}-right", about.mark), caption),
+            Drawing(f"{name}_right", picture, caption),
             *([tracks_drawing(name, result.staircases, about.mark)] if result.staircases else []),
         ),
         tables=(_levels_table(name, result), _threshold_table(name, result, about.fps)),
@@ -48,37 +47,45 @@ def oddity_section(result: ForcedChoice, about: About) -> Section | None:
     )
 
 
-def oddity_figure(result: ForcedChoice, name: str, mark: str) -> Picture:
-    """Draw right answers by difference, with the function of each side and its threshold."""
-    levels = result.levels
+def levels_figure(
+    levels: Sequence[OddityLevel],
+    curves: Mapping[Side, Sequence[tuple[float, float]]],
+    lines: tuple[float | None, float],
+    counted: str,
+    name: str,
+    mark: str,
+) -> Picture:
+    """Draw the percentage of answers by difference, with the curve of each side, and lines at chance and threshold."""
     with new_figure(7.2, 3.7) as (figure, axes):
         percent_axis(axes)
-        axes.axhline(100 * result.forced.chance, color=SOFT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
-        axes.axhline(100 * result.forced.halfway, color=SOFT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
-        for side, found in result.functions.items():
-            line = [(SIGNS[side] * level, 100 * share) for level, share in found.pooled.curve]
+        for height, dashes in zip(lines, ((4, 2), (1, 2)), strict=True):
+            if height is not None:
+                axes.axhline(height, color=SOFT, linewidth=0.9, linestyle=(0, dashes), zorder=1)
+        for side, curve in curves.items():
+            line = [(SIGNS[side] * level, 100 * share) for level, share in curve]
             if line:
                 axes.plot(*zip(*line, strict=True), color=BLUE, linewidth=1.8, zorder=3)
         for level in levels:
             if level.low is not None and level.high is not None:
                 axes.plot([level.difference_frames] * 2, [level.low, level.high], color=INK, linewidth=1.1, zorder=4)
-        axes.plot([one.difference_frames for one in levels], [one.percent for one in levels], "o", color=INK, zorder=5)
         ticks = [one.difference_frames for one in levels]
-        axes.set_xticks(ticks, [f"{tick:+d}".replace("-", "−") for tick in ticks])
+        axes.plot(ticks, [one.percent for one in levels], "o", color=INK, zorder=5)
+        axes.set_xticks(ticks, [f"{tick:+d}".replace("-", "−") if tick else "0" for tick in ticks])
         axes.set_xlabel("difference in blend length from k, frames (shorter ← → longer)")
-        axes.set_ylabel("right answers")
+        axes.set_ylabel(counted)
         spoken = "; ".join(f"{one.difference_frames:+d} frames: {one.percent:.0f}%" for one in levels)
-        return picture_of(figure, name, "Percent of right answers by difference in blend length", spoken, mark)
+        return picture_of(figure, name, f"Percent of {counted} by difference in blend length", spoken, mark)
 
 
-def _frames(found: BelievedThreshold, fps: float) -> str:
+def frames_in_words(found: BelievedThreshold, fps: float) -> str:
+    """Return "is 7.1 frames (0.237 s)", or why it is not known."""
     if found.value is None:
         return f"is not known ({found.note})"
     return f"is {found.value:.1f} frames ({found.value / fps:.3f} s)"
 
 
 def _headline(result: ForcedChoice, fps: float) -> Headline:
-    told = [f"for {side} blends it {_frames(found, fps)}" for side, found in result.thresholds.items()]
+    told = [f"for {side} blends it {frames_in_words(found, fps)}" for side, found in result.thresholds.items()]
     answers, people = sum(one.answers for one in result.levels), max(one.participants for one in result.levels)
     chance, right = f"{result.forced.chance:.0%}", f"{result.forced.halfway:.0%}"
     return Headline(
