@@ -95,7 +95,7 @@ shortest_frames = 5
 avoid_frames = 10
 avoid_within_frames = 4
 """
-_TEXT = """# A first protocol, written by `segue new` for you to edit. docs/protocols.md explains every key;
+_TEXT = """# A first protocol, written by `segue new` for you to edit. docs/protocol_keys.md explains every key;
 # `segue check` says what will be shown, and everything that is wrong, before anything is rendered.
 
 name = "{name}"

@@ -1,4 +1,4 @@
-"""The keys of a protocol as tables: the part of `docs/protocols.md` that says what each key is.
+"""The keys of a protocol as tables: what stands in `docs/protocol_keys.md`.
 
 Run as `python -m study.experiment.protocol.keys` to print them; a test keeps the page and the code the same.
 """
@@ -44,7 +44,7 @@ def _title(path: str) -> str:
 
 def _table(title: str, model: type[BaseModel]) -> str:
     rows = [_row(name, field) for name, field in model.model_fields.items()]
-    return "\n".join([f"### {title}", *_HEAD, *rows])
+    return "\n".join([f"## {title}", *_HEAD, *rows])
 
 
 _HEAD = ("", "| key | type | default | meaning |", "|---|---|---|---|")

@@ -4,7 +4,7 @@ A TOML file comes in; a frozen `Protocol` goes out, with the exact text and its 
 say under which protocol it was made. A protocol names motions, never files: a library supplies them. The keys
 cover the four studies of 2004 (section 4, one session) and the rating study of 2003 (section 4.2).
 
-The meaning of a key is its `description`; `docs/protocols.md` is written from these (`keys`).
+The meaning of a key is its `description`; `docs/protocol_keys.md` is written from these (`keys`).
 """
 
 from __future__ import annotations

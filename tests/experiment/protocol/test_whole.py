@@ -246,7 +246,7 @@ def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:
 def test_every_key_is_described_and_stands_in_the_documentation(repository: Path) -> None:
     from study.experiment.protocol.keys import key_tables
 
-    document = (repository / "docs" / "protocols.md").read_text()
+    document = (repository / "docs" / "protocol_keys.md").read_text()
     assert key_tables() in document, "run `python -m study.experiment.protocol.keys` and paste its tables"
 
 
