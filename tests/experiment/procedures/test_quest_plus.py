@@ -115,9 +115,16 @@ class Detector:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("criterion", "lapse"), [(0.5, 0.02), (1.0, 0.0), (1.5, 0.05)])
+@pytest.mark.parametrize(
+    ("criterion", "lapse"),
+    [
+        pytest.param(0.5, 0.02, marks=pytest.mark.xfail(strict=True, reason="medians are 14% low: few catch trials")),
+        (1.0, 0.0),
+        pytest.param(1.5, 0.05, marks=pytest.mark.xfail(strict=True, reason="intervals hold 98%, more than they say")),
+    ],
+)
 def test_yes_no_tells_thresholds_whatever_the_criterion(criterion: float, lapse: float) -> None:
-    """Over 250 people, two thresholds each, with other criteria and lapses than the prior's; intervals are wide."""
+    """Over 250 people, two thresholds each, with other criteria and lapses than the prior's."""
     ratios, held = [], []
     for seed in range(250):
         rng = np.random.default_rng([seed, 13])
@@ -131,7 +138,7 @@ def test_yes_no_tells_thresholds_whatever_the_criterion(criterion: float, lapse:
             ratios.append(found.frames / frames[longer])
             held.append(found.low <= frames[longer] <= found.high)
     assert np.median(ratios) == pytest.approx(1, abs=0.1)
-    assert 0.93 <= np.mean(held) <= 0.99
+    assert 0.93 <= np.mean(held) <= 0.97
 
 
 def test_yes_no_asks_what_brute_force_finds_trial_by_trial() -> None:
