@@ -232,7 +232,7 @@ function question(asked, study, films) {
       clearTimeout(timer);
       for (const button of document.querySelectorAll("main button, main input")) {
         button.disabled = true;
-        button.setAttribute("aria-pressed", String(button.dataset.value === value));
+        if (button.dataset.value !== undefined) button.setAttribute("aria-pressed", String(button.dataset.value === value));
       }
       resolve({ value, at, began, shown });
     };
