@@ -13,7 +13,7 @@ has no maximum; linear programs find which differences are finite (Konis 2007), 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -215,8 +215,6 @@ def _fitted(
     `design` has a row a comparison and a column a method but the one held at 0; `counts` are answers for the first with
     half of the ties, answers in all, and ties. `told` says of each effect whether the answers tell it.
     """
-    from scipy.special import xlogy
-
     yes, total, tied = counts
     effects = design.shape[1]
     with_ties = len(told) > effects
@@ -269,21 +267,8 @@ def _fitted(
     ranked = [*zip(point, found, strict=False), (0.0, Strength(held, 0.0, None, Interval(0.0, 0.0, confidence)))]
     ranked.sort(key=lambda pair: -pair[0])
     every = (*found, *([order] if order else []), *([ties] if ties else []))
-    endless = [row.method for row in every if row.value is None]
-    notes = [note] if note else []
-    if endless:
-        one_way = f"the answers for or against it all go one way, so its distance from {held} has no finite estimate"
-        notes.append(f"{', '.join(endless)}: {one_way}")
-    if any(row.value is not None and row.standard_error is None for row in every):
-        notes.append(
-            f"{counted(sizes[0] if sizes else 0, 'participant')}: too few, or too similar, for standard errors"
-        )
-    # Rows may hold single answers: the saturated model is one share for every pair and order.
-    cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
-    seen, *given = (np.bincount(cells, each) for each in (total, yes - tied / 2, total - yes - tied / 2, tied))
-    full = float(sum(xlogy(each, each / np.maximum(seen, 1e-12)).sum() for each in given))
-    deviance = max(2 * (full - float(best.value[0])), 0.0)
-    freedom = int((seen > 0).sum()) * (2 if with_ties else 1) - size
+    notes = [*filter(None, [note]), *_noted(every, held, sizes)]
+    deviance, freedom = _misfit(design, counts, float(best.value[0]), size)
     return BradleyTerry(
         strengths=tuple(row for _, row in ranked),
         reference=held,
@@ -330,3 +315,29 @@ def _strength(name: str, value: float | None, error: float, times: float, confid
     if value is None or not np.isfinite(error) or error < 1e-9:
         return Strength(name, value, None, Interval(None, None, confidence))
     return Strength(name, value, error, Interval(value - times * error, value + times * error, confidence))
+
+
+def _noted(effects: Sequence[Strength], held: str, sizes: Sequence[int]) -> Iterator[str]:
+    """What could not be estimated, and why."""
+    if endless := [row.method for row in effects if row.value is None]:
+        one_way = f"the answers for or against it all go one way, so its distance from {held} has no finite estimate"
+        yield f"{', '.join(endless)}: {one_way}"
+    if any(row.value is not None and row.standard_error is None for row in effects):
+        yield f"{counted(sizes[0] if sizes else 0, 'participant')}: too few, or too similar, for standard errors"
+
+
+def _misfit(
+    design: FloatArray, counts: tuple[FloatArray, FloatArray, FloatArray], log_likelihood: float, size: int
+) -> tuple[float, int]:
+    """Deviance from the saturated model, which has one share for every pair and order, and its degrees of freedom.
+
+    Rows may hold single answers; those of one pair and order are put together.
+    """
+    from scipy.special import xlogy
+
+    yes, total, tied = counts
+    cells = np.unique(design, axis=0, return_inverse=True)[1].ravel()
+    seen, *given = (np.bincount(cells, each) for each in (total, yes - tied / 2, total - yes - tied / 2, tied))
+    full = float(sum(xlogy(each, each / np.maximum(seen, 1e-12)).sum() for each in given))
+    freedom = int((seen > 0).sum()) * (2 if size > design.shape[1] else 1) - size
+    return max(2 * (full - log_likelihood), 0.0), freedom

@@ -254,3 +254,4 @@ def test_an_address_at_which_nothing_can_be_shown_says_why(
     tab.wait_text("Expected a trial from 1 to 4, found 99.")
     tab.open(f"{site.address}/?trial=4")
     go_on(tab, True)
+    assert list(answers(site).trial) == [4]
