@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,22 +82,32 @@ def tracks(procedure: Interleaved, answers: list[Answer]) -> dict[bool, Asked]:
     return {key.longer: track for key, track in procedure._tracks(answers).items()}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("criterion", "lapse"), [(1.2, 0.02), (2.0, 0.0), (2.0, 0.1), (2.8, 0.02)])
-def test_thresholds_are_found_and_their_intervals_hold_them(criterion: float, lapse: float) -> None:
-    """Over 250 people, two thresholds each, whose criterion and lapses are not the prior's."""
+def thresholds_of_people(
+    settings: Quest, task: str, stream: int, observer: Callable[[np.random.Generator, dict[bool, float]], Any]
+) -> tuple[list[float], list[bool]]:
+    """Of 250 people with a threshold for each side: found over true, and whether the interval holds the true one."""
     ratios, held = [], []
     for seed in range(250):
-        rng = np.random.default_rng([seed, 11])
+        rng = np.random.default_rng([seed, stream])
         frames = {longer: 8 * float(np.exp(0.5 * rng.standard_normal())) for longer in (False, True)}
-        procedure = begun(SETTINGS, seed)
-        for longer, track in tracks(procedure, run(procedure, Observer(rng, frames, criterion, lapse))).items():
+        procedure = begun(settings, seed, task)
+        for longer, track in tracks(procedure, run(procedure, observer(rng, frames))).items():
             found = procedure.rule.found(track)
             assert found is not None
             assert found.low is not None
             assert found.high is not None
             ratios.append(found.frames / frames[longer])
             held.append(found.low <= frames[longer] <= found.high)
+    return ratios, held
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("criterion", "lapse"), [(1.2, 0.02), (2.0, 0.0), (2.0, 0.1), (2.8, 0.02)])
+def test_thresholds_are_found_and_their_intervals_hold_them(criterion: float, lapse: float) -> None:
+    """Over 250 people, two thresholds each, whose criterion and lapses are not the prior's."""
+    ratios, held = thresholds_of_people(
+        SETTINGS, "same-different", 11, lambda rng, frames: Observer(rng, frames, criterion, lapse)
+    )
     assert np.median(ratios) == pytest.approx(1, abs=0.1)
     assert 0.93 <= np.mean(held) <= 0.97
 
@@ -125,18 +137,9 @@ class Detector:
 )
 def test_yes_no_tells_thresholds_whatever_the_criterion(criterion: float, lapse: float) -> None:
     """Over 250 people, two thresholds each, with other criteria and lapses than the prior's."""
-    ratios, held = [], []
-    for seed in range(250):
-        rng = np.random.default_rng([seed, 13])
-        frames = {longer: 8 * float(np.exp(0.5 * rng.standard_normal())) for longer in (False, True)}
-        procedure = begun(SETTINGS, seed, "yes-no")
-        for longer, track in tracks(procedure, run(procedure, Detector(rng, frames, criterion, lapse))).items():
-            found = procedure.rule.found(track)
-            assert found is not None
-            assert found.low is not None
-            assert found.high is not None
-            ratios.append(found.frames / frames[longer])
-            held.append(found.low <= frames[longer] <= found.high)
+    ratios, held = thresholds_of_people(
+        SETTINGS, "yes-no", 13, lambda rng, frames: Detector(rng, frames, criterion, lapse)
+    )
     assert np.median(ratios) == pytest.approx(1, abs=0.1)
     assert 0.93 <= np.mean(held) <= 0.97
 
@@ -220,18 +223,7 @@ def test_the_threshold_of_three() -> None:
 def test_forced_choices_tell_thresholds_whatever_the_slope(task: str, slope: float, lapse: float) -> None:
     """Over 250 people, two thresholds each, whose slope and lapses are not the prior's; of two, trials tell less."""
     settings = replace(SETTINGS, catch_every=0, most_trials=80 if task == "2afc" else 40)
-    ratios, held = [], []
-    for seed in range(250):
-        rng = np.random.default_rng([seed, 12])
-        frames = {longer: 8 * float(np.exp(0.5 * rng.standard_normal())) for longer in (False, True)}
-        procedure = begun(settings, seed, task)
-        for longer, track in tracks(procedure, run(procedure, Finder(rng, frames, slope, lapse))).items():
-            found = procedure.rule.found(track)
-            assert found is not None
-            assert found.low is not None
-            assert found.high is not None
-            ratios.append(found.frames / frames[longer])
-            held.append(found.low <= frames[longer] <= found.high)
+    ratios, held = thresholds_of_people(settings, task, 12, lambda rng, frames: Finder(rng, frames, slope, lapse))
     assert np.median(ratios) == pytest.approx(1, abs=0.1)
     assert 0.93 <= np.mean(held) <= 0.97
 
