@@ -75,7 +75,7 @@ def methods_paragraphs(
         ("Apparatus and procedure", _procedure(protocol, analysis, presentations)),
         ("Analysis", _analysis(analysis)),
         ("Exclusions", _excluded(analysis)),
-        ("Software", _software(protocol)),
+        ("Software", _software(protocol, analysis, presentations)),
     ]
 
 
@@ -257,9 +257,11 @@ def _excluded(analysis: Analysis) -> str:
     )
 
 
-def _software(protocol: Protocol) -> str:
-
+def _software(protocol: Protocol, analysis: Analysis, presentations: pd.DataFrame) -> str:
+    # Segue's own sessions with people always record how stimuli were shown; those of other programs can't.
+    own = len(presentations) > 0 or analysis.data == "simulated"
+    made = "sessions" if own else "trials"
     return (
-        f"Stimuli, sessions and analysis were made with Segue {study.__version__}, under the protocol {protocol.name} "
-        f"(sha256 {protocol.sha256[:12]})."
+        f"Stimuli, {made} and analysis were made with Segue {study.__version__}, under the protocol {protocol.name} "
+        f"(sha256 {protocol.sha256[:12]}).{'' if own else ' The sessions were run in another program.'}"
     )

@@ -83,9 +83,8 @@ def import_answers(
             except (AnalysisError, SessionError) as refusal:
                 raise SessionError(f"{file}: {refusal}") from refusal
     lines = [
-        f"{file}: {counted(one.answers, 'answer')} of {counted(one.participants, 'participant')}, of whom "
-        f"{one.finished} have answered all"
-        + (f"; {counted(one.late, 'answer')} came too late and count as missed" if one.late else "")
+        f"{file}: {counted(one.answers, 'answer')} of {counted(one.participants, 'participant')}; all answered: "
+        f"{one.finished}" + (f"; {counted(one.late, 'answer')} came too late and count as missed" if one.late else "")
         for file, one in rows.items()
     ]
     emit({"folder": str(results), "files": {file: asdict(one) for file, one in rows.items()}}, "\n".join(lines))
