@@ -2,9 +2,9 @@
 
     python benchmarks/one_hop_robustness.py FOLDER A.bvh B.bvh ...
 
-Writes `one_hop_costs.png` (Figure 10) and `one_hop_distances.png` (Figure 5, the first two clips) into the folder, as
-`docs/one_hop.md` shows them, and prints how smooth the transitions are: direct, with blends of one length, and with
-blends of their own length.
+Writes `one_hop_costs.png` (Figure 10) and `one_hop_distances.png` (Figure 5, of the transition that gains most by its
+hop) into the folder, as `docs/one_hop.md` shows them, and prints how smooth the transitions are: direct, with blends of
+one length, and with blends of their own length.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -122,71 +121,72 @@ def compare(problem: Problem) -> None:
             print(f"  {field.name:20} {np.mean(values):8.3f} ({np.max(values):.3f})")
 
 
-def strain(problem: Problem, table: OneHopTable, switch: Switch) -> float:
-    """What both blends of an entry cost, whichever table it is from, as `problem.distance` counts them."""
+@dataclass(frozen=True)
+class Crossing:
+    """Where a blend joins two clips: their numbers, their frames at its start, and its own frames."""
+
+    clips: tuple[int, int]
+    frames: tuple[int, int]
+    blend_frames: int
+
+
+def crossings(table: OneHopTable, switch: Switch) -> tuple[Crossing, ...]:
+    """The blends of the table's entry at the first trigger; one where the hop is the destination in its place."""
     entry = table.look_up(switch.source, switch.destination, switch.first_trigger)
     assert entry is not None  # the robustness set has only triggers from which a transition fits
     to = switch.alignment.offset_at(switch.first_trigger)
     first, second = entry_steps(table, entry, switch.destination, to)
     start = switch.first_trigger + first.stay
     then = start + first.blend_frames + second.stay
+    leave = Crossing((switch.source, entry.hop), (start, start - first.offset), first.blend_frames)
+    arrive = Crossing((entry.hop, switch.destination), (then - first.offset, then - to), second.blend_frames)
+    return (leave,) if arrive.clips[0] == arrive.clips[1] and arrive.frames[0] == arrive.frames[1] else (leave, arrive)
+
+
+def strain(problem: Problem, table: OneHopTable, switch: Switch) -> float:
+    """What both blends of an entry cost, whichever table it is from, as `problem.distance` counts them."""
     total = 0.0
-    for other, at, step, there in (
-        (switch.source, start, first, start - first.offset),
-        (switch.destination, then - to, second, then - first.offset),
-    ):
-        if (switch.destination, then - to) == (entry.hop, there) and step is second:
-            continue  # the hop is the destination in its place
-        pair = [problem.distance.prepare(problem.clips[number], step.blend_frames) for number in (other, entry.hop)]
-        if other == entry.hop:
-            pair[1] = pair[0]
-        rows, columns = range(at, at + 1), range(there, there + 1)
-        total += int(problem.distance.counts(*pair, step.blend_frames, rows, columns)[0, 0]) * problem.distance.unit
+    for one in crossings(table, switch):
+        prepared = {number: problem.distance.prepare(problem.clips[number], one.blend_frames) for number in one.clips}
+        first, second = (prepared[number] for number in one.clips)
+        rows, columns = (range(frame, frame + 1) for frame in one.frames)
+        counts = problem.distance.counts(first, second, one.blend_frames, rows, columns)
+        total += int(counts[0, 0]) * problem.distance.unit
     return total
 
 
-def draw_distances(
-    distances: NDArray[np.float64],
-    path: Path,
-    *,
-    fps: float,
-    names: tuple[str, str] = ("A", "B"),
-    words: str = "distance",
-    marks: Sequence[tuple[int, int]] = (),
-) -> None:
-    """A colour map of the distance of every frame of one clip from every frame of another (Figure 5).
+def draw_path(clips: Sequence[Clip], table: OneHopTable, switch: Switch, path: Path) -> None:
+    """Colour maps of the distances that a transition crosses, a cross where each blend starts (2019, Figure 5).
 
-    Parameters
-    ----------
-    distances : (frames, frames)
-        Rows for the first clip, columns for the second; blends start at these frames.
-    path
-        The PNG file.
-    fps
-        The clips' frame rate, for axes in seconds.
-    names, words
-        The clips, and what the colours are.
-    marks
-        (row, column) places to mark with a cross, such as where transitions start.
+    The first map is of the direct transition, from the triggered frame on; then come the one-hop transition's, out of
+    the source and into the destination. All have one scale: metres squared, the mean over points and a blend's frames.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    rows, columns = distances.shape
-    inches = 5.4 / max(rows, columns)
-    size = max(inches * columns, 1.5) + 1.7, max(inches * rows, 1.5) + 0.8
-    figure = Figure(figsize=size, dpi=120, layout="constrained")
+    clouds, trigger = [point_cloud(clip) for clip in clips], switch.first_trigger
+    there = trigger - switch.alignment.offset_at(trigger)
+    direct = Crossing((switch.source, switch.destination), (trigger, there), table.blend_frames)
+    shown = (direct, *crossings(table, switch))
+    maps = [window_distances(*(clouds[number] for number in one.clips), one.blend_frames) for one in shown]
+    widths = [distances.shape[1] for distances in maps]
+    figure = Figure(figsize=(4.0 * len(shown) + 0.8, 4.0), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    image = axes.imshow(
-        distances, origin="lower", extent=(0.0, columns / fps, 0.0, rows / fps), cmap="viridis", interpolation="nearest"
-    )
-    if marks:
-        frames = (np.array(marks) + 0.5) / fps
-        axes.plot(frames[:, 1], frames[:, 0], "x", color="#ff5050", markersize=9, markeredgewidth=2)
-    axes.set_xlabel(f"{names[1]}, seconds")
-    axes.set_ylabel(f"{names[0]}, seconds")
-    figure.colorbar(image, ax=axes, label=words)
+    highest = max(float(distances.max()) for distances in maps)
+    panels = figure.subplots(1, len(shown), squeeze=False, width_ratios=widths)[0]
+    for axes, one, distances, title in zip(panels, shown, maps, ("direct", "to the hop", "from the hop"), strict=False):
+        fps = clips[0].fps
+        rows, columns = (size / fps for size in distances.shape)
+        extent = (0.0, columns, 0.0, rows)
+        image = axes.imshow(
+            distances, origin="lower", extent=extent, cmap="viridis", interpolation="nearest", vmin=0.0, vmax=highest
+        )
+        row, column = ((frame + 0.5) / fps for frame in one.frames)
+        axes.plot(column, row, "x", color="#ff5050", markersize=9, markeredgewidth=2)
+        axes.set_title(f"{title}: {distances[one.frames]:.2g} m²")
+        axes.set_xlabel(f"{clips[one.clips[1]].name}, seconds")
+        axes.set_ylabel(f"{clips[one.clips[0]].name}, seconds")
+    figure.colorbar(image, ax=list(panels), label="distance (m²)")
     with whole_file(path) as unfinished:
         figure.savefig(unfinished, format="png")
 
@@ -202,9 +202,9 @@ def main(folder: Path, files: Sequence[Path]) -> None:
     compare(problem)
     costs = [costs_of(problem, table, number, switch.first_trigger) for number, switch in enumerate(switches)]
     draw_costs(costs, folder / "one_hop_costs.png")
-    first, second = clips[:2]
-    distances = window_distances(point_cloud(first), point_cloud(second), settings.blend_frames)
-    draw_distances(distances, folder / "one_hop_distances.png", fps=FPS, names=(first.name, second.name))
+    gains = [one.direct - one.total for one in costs]
+    best = switches[int(np.argmax(gains))]
+    draw_path(clips, build_table(replace(problem, switches=(best,))), best, folder / "one_hop_distances.png")
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from fit_weights import labelled
-from one_hop_robustness import WEIGHT, draw_distances, floor_of, smoothness_of
+from one_hop_robustness import WEIGHT, draw_path, floor_of, smoothness_of
 
 from renderer.strip import render_strip
 from study.apps.cli import run
@@ -44,7 +44,6 @@ from study.transitions.one_hop.play import Played, Trigger, play
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
 from study.transitions.one_hop.robustness import costs_of, draw_costs, robustness_set
 from study.transitions.one_hop.strip import strip_segments
-from study.transitions.point_cloud import point_cloud, window_distances
 from study.transitions.weights import WANG2003
 
 GIVEN = "Simulated observers answer, who were given the paper's findings: this tests the way from answers to numbers."
@@ -294,11 +293,11 @@ class Papers:
                         f"segue one-hop play TABLE --first {clips[switches[number].source].name} --trigger {switches[number].first_trigger} "
                         f"{clips[switches[number].destination].name} --out X.png", f"{dances} {shown}", pair(number, f"2019_{figure}"))  # fmt: skip
         figure = self.at("2019_5")
-        distances = window_distances(point_cloud(clips[0]), point_cloud(clips[1]), settings.blend_frames)
-        draw_distances(distances, figure, fps=60.0, names=(clips[0].name, clips[1].name), words="distance (m²)")
+        best = int(ranked[0])
+        draw_path(clips, tables[best], switches[best], figure)
         yield Entry("2019, Figure 5: distances between all frames of two clips", "a colour map, in units the paper does not state",
-                    f"from {distances.min():.3g} to {distances.max():.3g} m², mean over points and the 30 frames of a blend",
-                    "python benchmarks/one_hop_robustness.py FOLDER A.bvh B.bvh", dances, (figure,))  # fmt: skip
+                    f"{words(best)}; a cross where each blend starts",
+                    "python benchmarks/one_hop_robustness.py FOLDER A.bvh B.bvh ...", dances, (figure,))  # fmt: skip
         floor, skates = floor_of(clips), []
         for number, switch in enumerate(switches):
             slide = [smoothness_of(self.played(clips, tables[number], switch, method), switch.first_trigger, floor).slide_m
@@ -324,7 +323,7 @@ class Papers:
             dances,
             (figure,),
         )
-        yield self.weights(clips, problem, switches[int(ranked[0])])
+        yield self.weights(clips, problem, switches[best])
         yield self.beats(clips, problem)
 
     def played(self, clips: list[Clip], table: Any, switch: Switch, method: str) -> Played:

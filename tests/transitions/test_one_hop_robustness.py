@@ -20,7 +20,7 @@ from study.transitions.cost_matrix import cost_matrix
 from study.transitions.one_hop.adaptive import adaptive, lengths_at
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.joint_distance import JointDistance
-from study.transitions.one_hop.play import Played, Segment
+from study.transitions.one_hop.play import Played, Segment, Trigger, play
 from study.transitions.one_hop.problem import Alignment, PointCloudDistance, Problem, Settings, Switch, weight_in_counts
 from study.transitions.one_hop.robustness import Costs, costs_of, draw_costs, robustness_set
 from study.transitions.point_cloud import point_cloud, window_distances
@@ -84,14 +84,21 @@ def test_bars_are_as_high_as_their_costs(tmp_path: Path) -> None:
     assert heights[bars[3]] == pytest.approx(2 * heights[bars[-4]], abs=3)
 
 
-def test_a_colour_map_has_its_marks(dances: tuple[Clip, ...], tmp_path: Path, robustness: ModuleType) -> None:
-    distances = window_distances(point_cloud(dances[0]), point_cloud(dances[1]), 15)
-    robustness.draw_distances(distances, tmp_path / "plain.png", fps=30.0)
-    robustness.draw_distances(distances, tmp_path / "marked.png", fps=30.0, marks=[(20, 100)])
-    plain, marked = imread(tmp_path / "plain.png"), imread(tmp_path / "marked.png")
-    changed = np.argwhere(np.any(plain != marked, axis=-1))
-    assert 20 < len(changed) < 500
-    assert len(np.unique(plain.reshape(-1, 4), axis=0)) > 100
+def test_the_path_crosses_the_frames_that_the_player_joins(
+    dances: tuple[Clip, ...], tmp_path: Path, robustness: ModuleType
+) -> None:
+    distance, settings = PointCloudDistance(), Settings.at(30.0)
+    for switch in robustness_set(dances, settings, 6):
+        table = build_table(Problem(dances, (switch,), settings, weight_in_counts(3e-4, distance), distance))
+        played = play(dances, table, [Trigger(switch.first_trigger, switch.destination)], first=switch.source)
+        seen = [(part.clip, part.clip_start) for part in played.segments if part.kind == "blend"]
+        path = robustness.crossings(table, switch)
+        assert [(one.clips[1], one.frames[1]) for one in path] == seen[: len(path)]
+        robustness.draw_path(dances, table, switch, tmp_path / "path.png")
+        red = np.all(
+            np.abs(imread(tmp_path / "path.png")[..., :3] - np.array([1.0, 0x50 / 255, 0x50 / 255])) < 0.02, axis=-1
+        )
+        assert red.sum() > 20 * (len(path) + 1)
 
 
 def test_the_joint_cost_plugs_in(dances: tuple[Clip, ...]) -> None:
