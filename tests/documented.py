@@ -140,10 +140,10 @@ def furnish(folder: Path) -> None:
     from study.motion.readers.bvh_writing import write_bvh
     from study.motion.synthetic import synthesize
 
-    for name in ("walk", "run"):
-        write_bvh(synthesize(name, seconds=6), folder / f"{name}.bvh")
-        (folder / "motions").mkdir(exist_ok=True)
-        write_bvh(synthesize(name, seconds=6), folder / "motions" / f"{name}.bvh")
+    (folder / "motions").mkdir(exist_ok=True)
+    for name, places in (("walk", (".", "motions")), ("run", (".", "motions")), ("box", ("motions",))):
+        for place in places:
+            write_bvh(synthesize(name, seconds=6), folder / place / f"{name}.bvh")
     cuts = [f"walk,run,{20 + 9 * n},{30 + 7 * n},{('good', 'bad')[n % 2]}" for n in range(8)]
     (folder / "labels.csv").write_text(
         "\n".join(["source,destination,source_frame,destination_frame,label", *cuts]) + "\n", encoding="utf-8"

@@ -189,7 +189,8 @@ class SyntheticLibrary(Library):
 
     def entry(self, name: str) -> Entry:
         if name not in self.names():
-            raise MotionError(_unknown(name, self.names(), "the synthetic library"))
+            known = _unknown(name, self.names(), "the synthetic library")
+            raise MotionError(f"{known} Motions of your own are found with --library FOLDER.")
         about = synthetic.describe(name)
         ends: tuple[Boundary, Boundary] = ("gait" if about.cyclic[0] else "", "gait" if about.cyclic[1] else "")
         return Entry(name, about.kind, f"synthetic: {about.line}", *ends)
