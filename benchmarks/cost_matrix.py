@@ -18,11 +18,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from renderer.workers import cores
 from study.motion import quaternions as quat
 from study.motion.clip import Clip
 from study.motion.synthetic import synthesize
 from study.transitions.cost_matrix import extremes, joint_blocks
-from study.transitions.threads import cores, one_blas_thread
+from study.transitions.threads import one_blas_thread
 from study.transitions.weights import joint_weights
 
 ROWS, COLUMNS = 256, 512

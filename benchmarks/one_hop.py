@@ -31,6 +31,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from renderer.workers import cores
 from study.motion.clip import Clip, resample, retarget, trim
 from study.motion.mending import mend
 from study.motion.readers.registry import read_clip
@@ -47,7 +48,6 @@ from study.transitions.one_hop.problem import (
     weight_in_counts,
 )
 from study.transitions.one_hop.table import OneHopTable
-from study.transitions.threads import cores
 
 WEIGHT = 2.5e-4
 ALIGNMENTS = {"music": Alignment(offset=0), "start": Alignment(destination_frame=100)}

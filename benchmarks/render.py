@@ -34,9 +34,10 @@ from renderer.camera import Camera
 from renderer.context import open_context
 from renderer.figure import Figure, make_figure
 from renderer.framing import frame_group
-from renderer.jobs import RenderJob, default_workers, render_many
+from renderer.jobs import RenderJob, render_many
 from renderer.offscreen import paste_frames, render_frames
 from renderer.video import frame_rate, open_encoder, render_video
+from renderer.workers import cores
 
 SIZES = ((640, 480), (1280, 720))
 GOALS = {(640, 480): 0.50, (1280, 720): 0.65}
@@ -340,7 +341,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--only", choices=("encoder", "study", "peers"), help="one part")
     parser.add_argument("--clip", help="a .bvh or .amc instead of the synthetic walk")
-    parser.add_argument("--workers", type=int, default=default_workers())
+    parser.add_argument("--workers", type=int, default=cores())
     parser.add_argument("--turns", type=int, default=5, help="how often each is timed, after one turn to warm up")
     parser.add_argument("--repeats", type=int, default=2, help="clips a worker makes in one turn")
     chosen = parser.parse_args()

@@ -1,24 +1,16 @@
-"""Many videos: a list of jobs in, finished videos out, one process a core.
+"""Many videos: a list of jobs in, finished videos out, one process a core or a cluster of machines.
 
-Jobs are plain data, so they may be sent to another process or machine (`run_job`). Each process has its own GL
-context and encoder with a single thread each, which is the fastest way to use few cores and keeps the bytes the same
-however many workers there are.
+Jobs are plain data and films come back as bytes, so that they may be made in another process or on another machine.
+Each process has its own GL context and encoder with a single thread each, which is the fastest way to use few cores and
+keeps the bytes the same wherever they are made.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
-import signal
-import sys
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +19,10 @@ from numpy.typing import NDArray
 
 from renderer.camera import Camera
 from renderer.capsules import Figure
-from renderer.context import os_environ_defaults
 from renderer.errors import RendererError
-from renderer.files import cannot_write, discard_unfinished, scratch_folder
+from renderer.files import scratch_folder, whole_file
 from renderer.video import VideoInfo, render_video
+from renderer.workers import Where, run_jobs
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,21 +84,24 @@ class Progress:
         return f"{self.videos}/{self.videos_total} videos, {self.frames_per_second:.0f} frames/s{eta}"
 
 
-def run_job(job: RenderJob) -> VideoInfo:
-    """Make one video in this process."""
-    return render_video(job.path, job.positions, job.figure, job.camera, fps=job.fps)
+def make_film(job: RenderJob) -> tuple[VideoInfo, bytes]:
+    """A video as the bytes of its file; nothing is written under the job's path."""
+    with scratch_folder("segue-film") as folder:
+        video = render_video(folder / Path(job.path).name, job.positions, job.figure, job.camera, fps=job.fps)
+        return video, video.path.read_bytes()
 
 
-def default_workers() -> int:
-    """One for each core that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+def write_film(job: RenderJob, made: tuple[VideoInfo, bytes]) -> VideoInfo:
+    """Write what `make_film` made under the job's path; `DiskError` where the disk refuses."""
+    video, content = made
+    with whole_file(Path(job.path)) as unfinished:
+        unfinished.write_bytes(content)
+    return replace(video, path=Path(job.path))
 
 
 def render_many(
     jobs: Iterable[RenderJob],
-    workers: int | None = None,
+    workers: Where = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> list[VideoInfo]:
     """Make all videos; the results are in the order of the jobs.
@@ -116,7 +111,8 @@ def render_many(
     jobs
         No two with the same path.
     workers
-        Processes; one a core where None. With 1 (or one job) the work is done in this process.
+        Processes, one a core where None, or the address of a Dask scheduler. With 1 (or one job) the work is done in
+        this process.
     progress
         Called after every video, in this process.
 
@@ -131,140 +127,13 @@ def render_many(
     if len({path.absolute() for path in paths}) != len(paths):
         twice = next(path for path in paths if paths.count(path) > 1)
         raise RendererError(f"Expected every job to write a file of its own; {twice} is there twice.")
-    count = default_workers() if workers is None else workers
-    if count < 1:
-        raise RendererError(f"Expected at least one worker, got {workers}.")
     start, frames = time.perf_counter(), sum(len(job.positions) for job in todo)
-    told: list[VideoInfo] = []
-
-    def tell(video: VideoInfo) -> VideoInfo:
-        told.append(video)
-        if progress is not None:
-            made, seconds = sum(one.frames for one in told), time.perf_counter() - start
-            progress(Progress(len(told), len(todo), made, frames, seconds, video))
-        return video
-
-    if min(count, len(todo)) <= 1:
-        return [tell(run_job(job)) for job in todo]
-    return _in_processes(todo, min(count, len(todo)), tell)
-
-
-class Workers:
-    """Processes that make one video after another, as they are asked to, until they are closed.
-
-    Parameters
-    ----------
-    count
-        Processes; one a core where None.
-    """
-
-    def __init__(self, count: int | None = None) -> None:
-        self.count = default_workers() if count is None else count
-        """How many videos are made at a time."""
-        self._pool = self._begun()
-        self._open = ExitStack()
-        self._folder = self._open.enter_context(scratch_folder("segue-jobs"))
-
-    def make(self, job: RenderJob) -> Future[VideoInfo]:
-        """One video; the future raises `RendererError` where it can't be made."""
-        path = _store(job, self._folder / f"{Path(job.path).stem}.job")
-        try:
-            return self._pool.submit(_run_stored, path)
-        except BrokenProcessPool:  # a process was killed: others take its place
-            self._pool = self._begun()
-            return self._pool.submit(_run_stored, path)
-
-    def _begun(self) -> Executor:
-        try:
-            return _processes(self.count)
-        except OSError:  # as in `_in_processes`
-            self.count = 1
-            return ThreadPoolExecutor(1)
-
-    def close(self) -> None:
-        """End the processes, without waiting for what runs."""
-        _stop(self._pool, finished=False)
-        self._open.close()
-
-
-def _processes(workers: int) -> ProcessPoolExecutor:
-    # Spawned, not forked: a GL library that has run in this process does not survive a fork.
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
-
-
-def _in_processes(jobs: list[RenderJob], workers: int, tell: Callable[[VideoInfo], VideoInfo]) -> list[VideoInfo]:
-    try:
-        pool = _processes(workers)
-    except OSError:
-        # No semaphores here (/dev/shm is missing or not ours to write, as in some containers): one process does it all.
-        return [tell(run_job(job)) for job in jobs]
-    done: dict[int, VideoInfo] = {}
+    made: dict[int, VideoInfo] = {}
     # The longest first, so that no worker is left with a long one at the end.
-    order = sorted(range(len(jobs)), key=lambda i: -len(jobs[i].positions))
-    finished = False
-    # Workers read jobs from files. Sent through the pool's queue a job is larger than its pipe: when workers end early
-    # the thread that feeds the pipe would wait for a reader indefinitely, and so would the interpreter at its exit.
-    with scratch_folder("segue-jobs") as folder:
-        try:
-            waiting: dict[Future[VideoInfo], int] = {
-                pool.submit(_run_stored, _store(jobs[i], folder / f"{i}.job")): i for i in order
-            }
-            while waiting:
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                    done[waiting.pop(future)] = tell(future.result())
-            finished = True
-        except BrokenProcessPool as error:
-            raise RendererError(
-                "A rendering process ended before its time: killed for memory, or started from a script without "
-                "`if __name__ == '__main__':` around its work. Try fewer workers, or workers=1."
-            ) from error
-        finally:
-            _stop(pool, finished)
-            if not finished:
-                for job in jobs:
-                    with suppress(OSError):
-                        discard_unfinished(Path(job.path))
-    return [done[i] for i in range(len(jobs))]
-
-
-def _store(job: RenderJob, path: Path) -> str:
-    try:
-        path.write_bytes(pickle.dumps(job))
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    return str(path)
-
-
-def _run_stored(path: str) -> VideoInfo:
-    """Make the video of a job that this program's other process has just stored."""
-    job: RenderJob = pickle.loads(Path(path).read_bytes())
-    return run_job(job)
-
-
-def _stop(pool: Executor, finished: bool) -> None:
-    """End the pool; when the work was cut short, without waiting for what runs."""
-    processes = list((getattr(pool, "_processes", None) or {}).values())
-    pool.shutdown(wait=finished, cancel_futures=True)
-    if not finished:
-        for process in processes:
-            process.terminate()
-        for process in processes:
-            process.join(timeout=5.0)
-
-
-def _start_worker() -> None:
-    """The parent decides when to stop: Ctrl-C reaches all processes of a terminal at once."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name, value in os_environ_defaults.items():
-        os.environ.setdefault(name, value)
-    if sys.platform.startswith("linux"):
-        _die_with_parent()
-
-
-def _die_with_parent() -> None:
-    """Ask Linux to end this process when its parent is gone, even by a kill."""
-    import ctypes
-
-    set_death_signal = 1
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(set_death_signal, signal.SIGTERM)
+    order = sorted(range(len(todo)), key=lambda i: -len(todo[i].positions))
+    for number, film in run_jobs(make_film, [todo[i] for i in order], workers):
+        video = made[order[number]] = write_film(todo[order[number]], film)
+        if progress is not None:
+            done, seconds = sum(one.frames for one in made.values()), time.perf_counter() - start
+            progress(Progress(len(made), len(todo), done, frames, seconds, video))
+    return [made[i] for i in range(len(todo))]

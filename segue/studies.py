@@ -13,6 +13,7 @@ from segue.views import View
 if TYPE_CHECKING:
     import pandas as pd
 
+    from renderer.workers import Where
     from study.analysis.analyse import Analysis
     from study.experiment.protocol.whole import Protocol
     from study.experiment.stimuli.outlook import Outlook
@@ -53,7 +54,7 @@ class Study:
 
         return look_ahead(self.protocol, self.library)
 
-    def render(self, workers: int | None = None) -> Study:
+    def render(self, workers: Where = None) -> Study:
         """Render all stimuli into the results folder; those that are there are reused."""
         from study.experiment.stimuli.prepare import prepare
         from study.experiment.stimuli.rendering import render

@@ -145,7 +145,8 @@ def test_no_other_code_writes_files() -> None:
             found[path.relative_to(ROOT).as_posix()] = count
     assert found == {
         "renderer/files.py": 1,  # the ending
-        "renderer/jobs.py": 1,  # jobs for its own processes, in a scratch folder
+        "renderer/jobs.py": 1,  # a film, within `whole_file`
+        "renderer/workers.py": 1,  # jobs for its own processes, in a scratch folder
         "study/files.py": 1,
         "study/experiment/store/export.py": 7,  # within `whole_folder`
         "study/motion/download.py": 3,  # within `whole_file`, and what a broken connection left

@@ -13,10 +13,9 @@ from typing import Any
 
 import pytest
 
-from renderer import context, files, jobs
+from renderer import context, files, workers
 from renderer.errors import RendererError
 from study.apps.server import running
-from study.transitions import threads
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -89,18 +88,16 @@ def test_a_file_of_another_process_is_left_where_it_can_not_be_asked_about(monke
 
 
 def test_a_worker_asks_only_linux_to_end_it_with_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jobs, "signal", SimpleNamespace(signal=lambda *_: None, SIGINT=2, SIG_IGN=1))
-    monkeypatch.setattr(jobs, "_die_with_parent", lambda: pytest.fail("prctl is of Linux"))
+    monkeypatch.setattr(workers, "signal", SimpleNamespace(signal=lambda *_: None, SIGINT=2, SIG_IGN=1))
+    monkeypatch.setattr(workers, "_die_with_parent", lambda: pytest.fail("prctl is of Linux"))
     for platform in ("win32", "darwin"):
-        monkeypatch.setattr(jobs, "sys", SimpleNamespace(platform=platform))
-        jobs._start_worker()
+        monkeypatch.setattr(workers, "sys", SimpleNamespace(platform=platform))
+        workers._start_worker()
 
 
 def test_cores_are_counted_where_no_affinity_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (jobs, threads):
-        monkeypatch.setattr(module, "os", SimpleNamespace(cpu_count=lambda: 6, environ={}))
-    assert jobs.default_workers() == 6
-    assert threads.cores() == 6
+    monkeypatch.setattr(workers, "os", SimpleNamespace(cpu_count=lambda: 6, environ={}))
+    assert workers.cores() == 6
 
 
 def test_the_server_asks_for_open_files_only_where_there_is_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,14 +12,12 @@ distances of vectors, which one matrix product gives for all frames together.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
+from renderer.workers import run_jobs
 from study.arrays import AnyFloat, FloatArray, IntArray
 from study.errors import TransitionError
 from study.motion import quaternions as quat
@@ -27,7 +25,7 @@ from study.motion.clip import Clip, retarget
 from study.transitions.blending import facing
 from study.transitions.distances import half_angle_squares, on_joints_of
 from study.transitions.point_cloud import point_cloud, window_distances
-from study.transitions.threads import cores, one_blas_thread
+from study.transitions.threads import one_blas_thread
 from study.transitions.weights import joint_weights
 
 Block = tuple[range, AnyFloat]
@@ -138,13 +136,8 @@ def joint_blocks(
         return rows, block
 
     todo = [range(at, min(at + _BLOCK_ROWS, source.frames)) for at in range(0, source.frames, _BLOCK_ROWS)]
-    workers = min(cores(), len(todo))
-    with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
-        remaining = iter(todo)
-        waiting: deque[Future[Block]] = deque(pool.submit(work, rows) for rows in islice(remaining, workers + 1))
-        while waiting:
-            yield waiting.popleft().result()
-            waiting.extend(pool.submit(work, rows) for rows in islice(remaining, 1))
+    with one_blas_thread():
+        yield from (block for _, block in run_jobs(work, todo, threads=True, in_order=True))
 
 
 def pointcloud_blocks(source: Clip, destination: Clip, *, window: int | None = None) -> Iterator[Block]:

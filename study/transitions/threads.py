@@ -6,16 +6,9 @@ other threads run during its loops; BLAS threads of its own would only get in th
 
 from __future__ import annotations
 
-import os
-
 from threadpoolctl import threadpool_limits
 
 
 def one_blas_thread() -> threadpool_limits:
     """A context in which each matrix product takes one thread."""
     return threadpool_limits(1, user_api="blas")
-
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

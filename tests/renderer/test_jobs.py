@@ -15,7 +15,8 @@ import pytest
 from renderer.errors import RendererError
 from renderer.figure import make_figure
 from renderer.framing import frame_group
-from renderer.jobs import Progress, RenderJob, default_workers, render_many
+from renderer.jobs import Progress, RenderJob, render_many
+from renderer.workers import cores
 
 ROOT = Path(__file__).parents[2]
 
@@ -77,7 +78,7 @@ def test_two_jobs_for_one_file_are_refused(tmp_path: Path, puppet: Any) -> None:
 def test_no_workers_are_refused(tmp_path: Path, puppet: Any) -> None:
     with pytest.raises(RendererError, match="at least one worker, got 0"):
         render_many(jobs_in(tmp_path, puppet), 0)
-    assert default_workers() >= 1
+    assert cores() >= 1
 
 
 LONG = """
@@ -167,7 +168,7 @@ def test_where_no_pool_can_be_made_one_process_does_it_all(
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("renderer.jobs.ProcessPoolExecutor", refuse)
+    monkeypatch.setattr("renderer.workers.get_context", refuse)
     made = render_many(jobs_in(tmp_path, puppet, count=2), 2)
     assert [video.path.name for video in made] == ["0.mp4", "1.mp4"]
     assert all(video.path.is_file() for video in made)

@@ -6,8 +6,9 @@ import json
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import click
 
@@ -73,6 +74,24 @@ def together(*options: Callable[[Any], Any]) -> Callable[[Command], Command]:
         return command
 
     return add
+
+
+def workers_options(verb: Command) -> Command:
+    """Adds `--workers` and `--cluster`, of which one may be given; the verb is handed it as `workers`."""
+
+    @click.option("--workers", type=click.IntRange(min=1), help="Number of processes (default: one a core).")
+    @click.option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Instead of --workers: the Dask scheduler whose workers do it, such as tcp://host:8786.",
+    )
+    @wraps(verb)
+    def placed(*arguments: Any, workers: int | None, cluster: str | None, **options: Any) -> Any:
+        if workers and cluster:
+            raise click.UsageError("expected either --workers or --cluster; give one of them.")
+        return verb(*arguments, workers=cluster or workers, **options)
+
+    return cast("Command", placed)
 
 
 def emit(result: Mapping[str, Any], text: str) -> None:

@@ -7,8 +7,17 @@ from pathlib import Path
 
 import click
 
-from study.apps.cli.console import FOLDER, READABLE, RESULTS, database_option, emit, json_option, library_option
-from study.apps.cli.shared import WORKERS, load_for_people, prepare_stimuli, render_stimuli
+from study.apps.cli.console import (
+    FOLDER,
+    READABLE,
+    RESULTS,
+    database_option,
+    emit,
+    json_option,
+    library_option,
+    workers_options,
+)
+from study.apps.cli.shared import load_for_people, prepare_stimuli, render_stimuli
 from study.counting import counted
 
 
@@ -25,10 +34,10 @@ from study.counting import counted
 @click.option("--participants", type=click.IntRange(1, 9999), help="Number of participants (default: the protocol's).")
 @library_option
 @click.option("--out", type=FOLDER, required=True, help="Folder for films and trials; a results folder, too.")
-@WORKERS
+@workers_options
 @json_option
 def export_stimuli(
-    protocol: str, tool: str, participants: int | None, library: str | None, out: Path, workers: int | None
+    protocol: str, tool: str, participants: int | None, library: str | None, out: Path, workers: int | str | None
 ) -> None:
     """Films and trials for another program, which shows them in place of Segue.
 

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import click
 
-from study.apps.cli.console import database_option, library_option, say
+from study.apps.cli.console import database_option, library_option, say, workers_options
 from study.apps.cli.shared import (
     OUT,
-    WORKERS,
     check_database,
     load_for_people,
     prepare_stimuli,
@@ -25,7 +24,7 @@ from study.apps.cli.shared import (
 @click.argument("protocol")
 @library_option
 @OUT
-@WORKERS
+@workers_options
 @database_option
 @click.option(
     "--host",
@@ -94,7 +93,7 @@ def serve(
     protocol: str,
     library: str | None,
     out: Path | None,
-    workers: int | None,
+    workers: int | str | None,
     database: str | None,
     host: str,
     port: int,

@@ -11,12 +11,12 @@ import click
 from study.apps.cli.console import FOLDER, progress, say
 
 if TYPE_CHECKING:
+    from renderer.workers import Where
     from study.experiment.protocol.whole import Protocol
     from study.experiment.stimuli.manifest import Manifest
     from study.experiment.stimuli.stimulus import StimulusSet
 
 OUT = click.option("--out", type=FOLDER, default=None, help="Results folder (default: results/<name of the protocol>).")
-WORKERS = click.option("--workers", type=click.IntRange(min=1), help="Number of processes (default: one a core).")
 
 
 def load(protocol: str) -> Protocol:
@@ -51,9 +51,7 @@ def prepare_stimuli(protocol: Protocol, library: str | None) -> StimulusSet:
         return prepare(protocol, opened, lambda done, total: report(done / total, f"{done} of {total}"))
 
 
-def render_stimuli(
-    stimuli: StimulusSet, folder: Path, workers: int | None, *, all_levels: bool = True
-) -> dict[str, Any]:
+def render_stimuli(stimuli: StimulusSet, folder: Path, workers: Where, *, all_levels: bool = True) -> dict[str, Any]:
     """Render what is not rendered yet, with progress on standard error; the numbers for `--json`."""
     from study.experiment.stimuli.rendering import render as render_all
 

@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study.apps.cli.console import FOLDER, RESULTS, database_option, emit, json_option, library_option, progress, say
-from study.apps.cli.shared import OUT, WORKERS, check_database, load, prepare_stimuli, render_stimuli, results_folder
+from study.apps.cli.console import (
+    FOLDER,
+    RESULTS,
+    database_option,
+    emit,
+    json_option,
+    library_option,
+    progress,
+    say,
+    workers_options,
+)
+from study.apps.cli.shared import OUT, check_database, load, prepare_stimuli, render_stimuli, results_folder
 from study.apps.cli.shown import shortcut_lines, table_of, trials_between
 from study.counting import counted
 from study.errors import MotionError, ProtocolError
@@ -129,9 +139,9 @@ def check(protocol: str, library: str | None, texts: bool) -> None:
 @click.argument("protocol")
 @library_option
 @OUT
-@WORKERS
+@workers_options
 @json_option
-def render(protocol: str, library: str | None, out: Path | None, workers: int | None) -> None:
+def render(protocol: str, library: str | None, out: Path | None, workers: int | str | None) -> None:
     """Render all stimuli of a protocol; existing ones are reused, so an interrupted run resumes."""
     from study.experiment.stimuli.rendering import rendered_already
     from study.motion.library import open_library
@@ -236,7 +246,7 @@ def report(results: Path, out: Path | None, database: str | None) -> None:
 
 @click.command()
 @OUT
-@WORKERS
+@workers_options
 @click.option(
     "--participants",
     type=click.IntRange(min=1),
@@ -245,7 +255,7 @@ def report(results: Path, out: Path | None, database: str | None) -> None:
     help="Number of simulated participants.",
 )
 @json_option
-def demo(out: Path | None, workers: int | None, participants: int) -> None:
+def demo(out: Path | None, workers: int | str | None, participants: int) -> None:
     """A small study from end to end, without screen or network: stimuli, simulated observers, analysis, report."""
     from study.analysis.analyse import analysis_json
     from study.report.document import write_report

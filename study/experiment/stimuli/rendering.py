@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +32,7 @@ from study.tasks.trial import Pair
 if TYPE_CHECKING:
     from renderer.jobs import Progress, RenderJob
     from renderer.video import VideoInfo
+    from renderer.workers import Where
     from study.experiment.protocol.whole import Protocol
     from study.motion.library import Library
 
@@ -50,7 +51,7 @@ class RenderSummary:
 def render(
     stimulus_set: StimulusSet,
     out: str | Path,
-    workers: int | None = None,
+    workers: Where = None,
     progress: Callable[[Progress], object] | None = None,
     *,
     all_levels: bool = True,
@@ -64,7 +65,7 @@ def render(
     out
         The results folder; made where there is none.
     workers
-        Processes; one a core by default.
+        Processes, one a core by default, or the address of a Dask scheduler.
     progress
         Called after every video with `renderer.jobs.Progress` (videos, frames, frames a second, seconds left).
     all_levels
@@ -118,8 +119,8 @@ class RenderAhead:
     made when they are wanted again. `videos` are those that are finished, as the manifest describes them.
     """
 
-    def __init__(self, stimulus_set: StimulusSet, out: str | Path, workers: int | None = None) -> None:
-        from renderer.jobs import Workers
+    def __init__(self, stimulus_set: StimulusSet, out: str | Path, workers: Where = None) -> None:
+        from renderer.workers import Workers
 
         self._set, self._folder, self._workers = stimulus_set, Path(out), Workers(workers)
         self._stimuli = {stimulus.id: stimulus for stimulus in stimulus_set.stimuli}
@@ -151,14 +152,19 @@ class RenderAhead:
 
     async def _make(self, identifier: str) -> None:
         from renderer.errors import RendererError
+        from renderer.jobs import make_film, write_film
 
         job = _job(self._folder, self._stimuli[identifier], self._set.protocol.fps)
         try:
-            made = await asyncio.wrap_future(self._workers.make(job))
+            try:
+                film = await asyncio.wrap_future(self._workers.submit(make_film, job))
+            except BrokenExecutor:  # its process was killed
+                film = await asyncio.wrap_future(self._workers.submit(make_film, job))
+            made = await asyncio.to_thread(write_film, job, film)
             async with self._writing:
                 self.videos[identifier] = _video_entry(made)
                 await asyncio.to_thread(write_manifest, self._folder, self._set, dict(self.videos))
-        except (RendererError, BrokenProcessPool) as error:
+        except (RendererError, BrokenExecutor) as error:
             raise StimulusError(f"{job.path}: expected to render it, found that it can't be done ({error}).") from error
         finally:
             del self._made[identifier]

@@ -12,20 +12,20 @@ import time
 import zipfile
 import zlib
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from renderer.workers import cores, run_jobs
 from study.arrays import CountArray
 from study.files import whole_file
 from study.transitions.one_hop.jobs import Found, Job, make_jobs, run_job
 from study.transitions.one_hop.problem import FORBIDDEN, Problem
 from study.transitions.one_hop.search import Best
 from study.transitions.one_hop.table import OneHopTable, table_of
-from study.transitions.threads import cores, one_blas_thread
+from study.transitions.threads import one_blas_thread
 
 MEMORY_BYTES = 2 * 2**30
 _SAVE_EVERY_S = 5.0
@@ -73,19 +73,16 @@ def build_table(
     if checkpoint is not None and checkpoint.exists():
         state.read(checkpoint, key)
     prepared = [problem.distance.prepare(clip, problem.settings.blend_frames) for clip in problem.clips]
-    waiting = [number for number in range(len(jobs)) if not state.done[number]]
+    todo = [number for number in range(len(jobs)) if not state.done[number]]
     saved = time.monotonic()
-    with one_blas_thread(), ThreadPoolExecutor(max_workers=workers) as pool:
-        running: dict[Future[list[Found]], int] = {}
+    with one_blas_thread():
         try:
-            while waiting or running:
-                while waiting and len(running) < workers:
-                    number = waiting.pop(0)
-                    running[pool.submit(run_job, problem, prepared, jobs[number], state.best)] = number
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    state.take(running.pop(future), future.result())
-                    if progress is not None:
-                        progress(int(state.done.sum()), len(jobs))
+            for place, found in run_jobs(
+                lambda number: run_job(problem, prepared, jobs[number], state.best), todo, workers, threads=True
+            ):
+                state.take(todo[place], found)
+                if progress is not None:
+                    progress(int(state.done.sum()), len(jobs))
                 if checkpoint is not None and time.monotonic() - saved > _SAVE_EVERY_S:
                     state.write(checkpoint, key)
                     saved = time.monotonic()
