@@ -83,7 +83,7 @@ def workers_options(verb: Command) -> Command:
     @click.option(
         "--cluster",
         metavar="ADDRESS",
-        help="Instead of --workers: the Dask scheduler whose workers do it, such as tcp://host:8786.",
+        help="Dask scheduler whose workers do it, such as tcp://host:8786 (default: --workers on this machine).",
     )
     @wraps(verb)
     def placed(*arguments: Any, workers: int | None, cluster: str | None, **options: Any) -> Any:
