@@ -107,7 +107,8 @@ def current(session: Session) -> Step:
 
 
 def progress(session: Session) -> tuple[int, int]:
-    """Trials finished and trials in all, as the plan counts them (repeats of faulty ones not counted).
+    """Trials finished and trials in all, as the plan counts them; repeats of faulty ones and further rounds of practice
+    are not counted. The first never falls.
 
     Of trials that depend on answers the most that there may be count; what was not needed is finished, too.
     """
@@ -341,7 +342,7 @@ def _trials_left(steps: Sequence[Step]) -> tuple[int, ...]:
     left: list[int] = []
     ahead: set[int] = set()
     for step in reversed(steps):
-        if step.trial:
+        if step.trial and not (step.role == "practice" and step.attempt > 1):
             ahead.add(step.trial)
         left.append(len(ahead))
     return tuple(reversed(left))

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,7 @@ def protocol_of(text: str = PROTOCOL) -> Protocol:
     return parse_protocol(text)
 
 
+@cache
 def prepared(text: str = PROTOCOL) -> Any:
     return prepare(protocol_of(text), open_library("synthetic"))
 

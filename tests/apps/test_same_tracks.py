@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from every import BESIDE, HEAD, all_tracks, track
 from scripted import Act, ScriptedWindow, press
-from serving import PROTOCOL, Person, make_host, protocol_of, unfilmed
+from serving import Person, make_host, prepared, protocol_of, unfilmed
 from starlette.testclient import TestClient
 
 from study.apps.cli.play import the_plan
@@ -26,67 +27,24 @@ from study.experiment.protocol.whole import Protocol
 from study.experiment.session import advanced, answered, current, open_session, walk
 from study.experiment.steps import Step, answer_keys
 from study.experiment.stimuli.manifest import Manifest
-from study.experiment.stimuli.prepare import prepare
 from study.experiment.store.answers import Presentation, record_answer, stored_answers
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import begin_session, find_session
-from study.motion.library import open_library
 from study.tasks.answer import Answer
 from study.tasks.trial import Trial
 
 NAME = "p01"
-STOPS = (3, 12)
+STOPS = (3, 50)
 """After so many responses, in all, a session is stopped."""
 
-PROCEDURES = {
-    "staircase": """
-[studies.procedure]
-name = "staircase"
-start_frames = 3
-most_frames = 5
-steps_frames = [2, 1]
-side = "longer"
-reversals = 4
-averaged = 2
-most_trials = 20
-catch_every = 4
-""",
-    "quest-plus": """
-[studies.procedure]
-name = "quest-plus"
-most_frames = 5
-threshold_frames = 3.0
-side = "longer"
-narrow = 2.5
-least_trials = 12
-most_trials = 20
-catch_every = 4
-""",
-}
-
-
-def text_with(procedure: str) -> str:
-    """The served protocol without consent and form: its same-different study with a procedure, and one study more.
-
-    The first also asks how sure participants are, which changes nothing of what comes next.
-    """
-    head, jnd, liking, *_ = PROTOCOL.split("\n[[studies]]\n")
-    head = head.replace('text = "Do you take part?"', 'text = ""')
-    head = head[: head.index("[[form]]")] + head[head.index("[stimuli]") :]
-    jnd = jnd.replace('differences_frames = [-2, 0]\norder = "both"\n', "").replace(
-        "attention_checks = 1\n", f"confidence_points = 4\n{procedure}"
-    )
-    jnd = jnd.replace("attention_checks = 1\n", f"confidence_points = 4\n{procedure}")
-    return "\n[[studies]]\n".join([head, jnd, liking])
-
-
-TEXTS = {name: text_with(procedure) for name, procedure in PROCEDURES.items()}
+TEXT = HEAD + "".join(track(*names, most_trials=12) for names in all_tracks()) + BESIDE
+"""Each procedure that chooses trials, with each task that takes it, and one study more."""
 
 
 def chosen(trial: int, legal: Sequence[str]) -> str:
     """A response that depends on the trial's number alone."""
-    return legal[0] if trial % 5 in (0, 3) else legal[1]
+    return legal[(trial // 4 + 1) % 2]
 
 
 def script(protocol: Protocol, plan: Plan, answers: Sequence[Answer]) -> Iterator[Act]:
@@ -118,7 +76,7 @@ class Stopping(ResponsesStore):
 
 
 def in_the_window(protocol: Protocol, responses: Responses) -> None:
-    stimuli = prepare(protocol, open_library("synthetic"))
+    stimuli = prepared(TEXT)
     plan = the_plan(responses, protocol, stimuli, NAME, None, 0)
     for stop in (*STOPS, float("inf")):
         store = Stopping(responses, protocol, plan, stimuli.library, stimuli.synthetic)
@@ -134,10 +92,10 @@ def in_the_window(protocol: Protocol, responses: Responses) -> None:
         assert outcome.end == "finished"
 
 
-def in_the_browser(manifest: Manifest, responses: Responses, text: str) -> None:
+def in_the_browser(manifest: Manifest, responses: Responses) -> None:
     cookies = None
     for stop in (*STOPS, float("inf")):
-        with TestClient(make_app(make_host(manifest, responses, text, parameters=("participant",)))) as client:
+        with TestClient(make_app(make_host(manifest, responses, TEXT, parameters=("participant",)))) as client:
             client.cookies = cookies or client.cookies
             person = Person(client, f"page-until-{stop}")
             view = person.begin(parameters={"participant": NAME}, force=True)
@@ -180,40 +138,41 @@ def table(responses: Responses) -> pd.DataFrame:
     return whole.drop(columns=["answered_at", "response_s"])
 
 
-@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
-def test_the_same_responses_lead_to_the_same_trials_in_window_browser_and_simulation(tmp_path: Path, text: str) -> None:
-    protocol = protocol_of(text)
-    manifest = unfilmed(tmp_path / "served", text)
+def test_the_same_responses_lead_to_the_same_trials_in_window_browser_and_simulation(tmp_path: Path) -> None:
+    protocol = protocol_of(TEXT)
+    manifest = unfilmed(tmp_path / "served", TEXT)
     with (
         open_responses(tmp_path / "window.sqlite") as window,
         open_responses(tmp_path / "browser.sqlite") as browser,
         open_responses(tmp_path / "simulated.sqlite") as simulated,
     ):
         in_the_window(protocol, window)
-        in_the_browser(manifest, browser, text)
+        in_the_browser(manifest, browser)
         in_a_simulation(protocol, manifest, simulated)
         tables = {"window": table(window), "browser": table(browser), "simulation": table(simulated)}
     pd.testing.assert_frame_equal(tables["window"], tables["simulation"])
     pd.testing.assert_frame_equal(tables["browser"], tables["simulation"])
     own = tables["simulation"]
-    tracked = own[(own["study"] == "jnd") & (own["role"] == "trial")]
-    assert list(tracked["trial"]) == list(range(2, 2 + len(tracked)))
-    assert len(set(tracked["difference_frames"])) > 3
-    assert len(tracked) > max(STOPS)
+    assert len(own) > max(STOPS)
+    courses = draw_plan(protocol, manifest.pairs, NAME).courses
+    assert [course.study for course in courses] == [f"{task}_{procedure}" for task, procedure in all_tracks()]
+    for course in courses:
+        tracked = own[own["study"] == course.study]
+        assert list(tracked["trial"]) == list(range(course.first, course.first + len(tracked)))
+        assert len(set(tracked["difference_frames"])) > 3
     # The study after it has the numbers that were kept for it.
-    course = draw_plan(protocol, manifest.pairs, NAME).courses[0]
-    assert list(own[own["study"] == "liking"]["trial"]) == [course.first + course.most]
+    assert list(own[own["study"] == "beside"]["trial"]) == [courses[-1].first + courses[-1].most]
 
 
-@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
-def test_other_responses_lead_to_other_trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+def test_other_responses_lead_to_other_trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that the test above could fail."""
-    protocol = protocol_of(text)
-    manifest = unfilmed(tmp_path / "served", text)
+    protocol = protocol_of(TEXT)
+    manifest = unfilmed(tmp_path / "served", TEXT)
     found = []
     for right in (1, 0):
         monkeypatch.setattr(f"{__name__}.chosen", lambda _, legal, right=right: legal[right])
         with open_responses(tmp_path / f"{right}.sqlite") as responses:
             in_a_simulation(protocol, manifest, responses)
-            found.append(list(table(responses)["difference_frames"].dropna()))
-    assert found[0] != found[1]
+            found.append(table(responses).groupby("study")["difference_frames"].agg(list))
+    for task, procedure in all_tracks():
+        assert found[0][f"{task}_{procedure}"] != found[1][f"{task}_{procedure}"]

@@ -14,8 +14,9 @@ from typing import Any
 import pandas as pd
 import pytest
 import sqlalchemy as sa
+from every import every_study
 from scripted import Act, ScriptedWindow, press
-from serving import PROTOCOL, Person, make_host, protocol_of, unfilmed
+from serving import PROTOCOL, Person, make_host, prepared, protocol_of, unfilmed
 from starlette.testclient import TestClient
 
 from renderer.events import Key, Typed
@@ -32,12 +33,11 @@ from study.experiment.session import advanced, answered, current, filled, open_s
 from study.experiment.simulation import simulate
 from study.experiment.steps import answer_keys
 from study.experiment.stimuli.manifest import Manifest
-from study.experiment.stimuli.prepare import prepare
 from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame
 from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import find_session
 from study.experiment.store.tables import presentations, sessions
-from study.motion.library import open_library
+from study.tasks.registry import TASKS, task_of_trial
 
 PEOPLE = ("sim-001", "sim-002")
 READ = ("instructions", "feedback", "break", "debrief")
@@ -46,47 +46,8 @@ OF_THE_ANSWER = ("answer", "missed", "correct", "chose_a", "confidence", "respon
 MARKS = ("simulated", "answered_at")
 AGE = "33"
 
-TEXT = (
-    PROTOCOL.replace('question = "Were they the same?"', 'question = "Were they the same?"\nconfidence_points = 4')
-    .replace('question = "Which was', 'ties = true\nconfidence_points = 7\nquestion = "Which was')
-    .replace('name = "rating"\n', 'name = "rating"\nslider = "ticks"\n')
-    .replace(
-        "attention_checks = 1\n",
-        """attention_checks = 1
-
-[[studies.form]]
-name = "remark"
-label = "What did you look at?"
-kind = "free-text"
-""",
-    )
-)
-TEXT += """
-[[studies]]
-name = "page"
-task = "parallel-rating"
-reference = "geodesic"
-comparison = "fixed"
-others = ["cut"]
-hidden_reference = "inertialize"
-replays = 2
-practice = 1
-attention_checks = 1
-
-[[studies.items]]
-name = "natural"
-question = "How natural are they?"
-low = "not at all"
-high = "very"
-
-[[studies]]
-name = "beside"
-task = "preference"
-reference = "geodesic"
-comparison = "fixed"
-side_by_side = true
-"""
-"""Every kind of answer and layout."""
+TEXT = PROTOCOL[: PROTOCOL.index("[[studies]]")] + every_study()
+"""Every task, kind of answer and layout; practice, attention checks, breaks, orders by group."""
 
 Read = list[tuple[str, str]]
 
@@ -121,9 +82,11 @@ def script(protocol: Protocol, plan: Plan) -> Iterator[Act]:
     yield press("space")
 
 
-def in_the_window(protocol: Protocol, responses: Responses, monkeypatch: pytest.MonkeyPatch) -> dict[str, Read]:
+def in_the_window(
+    protocol: Protocol, text: str, responses: Responses, monkeypatch: pytest.MonkeyPatch
+) -> dict[str, Read]:
     """Both participants in a scripted window; what each of them read."""
-    stimuli = prepare(protocol, open_library("synthetic"))
+    stimuli = prepared(text)
     read: dict[str, Read] = {}
     page_of = loop.screens.reading_page
     for name in PEOPLE:
@@ -186,7 +149,7 @@ def test_window_browser_and_simulation_have_the_same_trials(
         open_responses(tmp_path / "browser.sqlite") as browser,
         open_responses(tmp_path / "simulated.sqlite") as simulated,
     ):
-        read_in_window = in_the_window(protocol, window, monkeypatch)
+        read_in_window = in_the_window(protocol, text, window, monkeypatch)
         read_in_browser = in_the_browser(manifest, text, browser)
         simulate(protocol, manifest, simulated, len(PEOPLE))
         places = {"window": window, "browser": browser, "simulation": simulated}
@@ -198,10 +161,9 @@ def test_window_browser_and_simulation_have_the_same_trials(
     plans = {where: [(one.plan.group, one.plan.trials) for one in found if one] for where, found in records.items()}
     assert plans["window"] == plans["browser"] == plans["simulation"]
     assert [group for group, _ in plans["window"]] == [0, 1]
-    tasks = {trial.task for _, trials in plans["window"] for trial in trials}
-    assert tasks == {"same-different", "preference", "rating", "parallel-rating"}
+    assert {task_of_trial(trial).name for _, trials in plans["window"] for trial in trials} == set(TASKS)
     # A pair is rated after both its films, in the order of the group.
-    compared = [trial for _, trials in plans["window"] for trial in trials if trial.study == "compared"]
+    compared = [trial for _, trials in plans["window"] for trial in trials if trial.study == "each_pair-rating"]
     assert [trial.a_first for trial in compared] == [True, False]
     assert all(len(trial.stimuli) == 2 for trial in compared)
 
@@ -216,9 +178,9 @@ def test_window_browser_and_simulation_have_the_same_trials(
     pd.testing.assert_frame_equal(answers["window"], answers["browser"])
 
     asked = tables["simulation"].dropna(subset=["confidence"])
-    assert set(asked.study) == {"jnd", "liking"}
+    assert set(asked.study) == {"each_same-different", "each_preference"}
     assert not asked.missed.any()
-    assert (asked.confidence <= asked.study.map({"jnd": 3, "liking": 6})).all()
+    assert (asked.confidence <= asked.study.map({"each_same-different": 3, "each_preference": 4})).all()
 
     # What was really put on the screen, and what was read between the trials.
     assert stimuli["window"] == stimuli["browser"]
@@ -236,7 +198,7 @@ def test_window_browser_and_simulation_have_the_same_trials(
 def test_another_participant_or_another_seed_has_other_trials() -> None:
     """So that the test above could fail."""
     protocol, other = protocol_of(), protocol_of(PROTOCOL.replace("seed = 5", "seed = 6"))
-    pairs = prepare(protocol, open_library("synthetic")).pairs
+    pairs = prepared().pairs
     own = draw_plan(protocol, pairs, "sim-001").trials
     assert own != draw_plan(protocol, pairs, "sim-002").trials
     assert own != draw_plan(other, pairs, "sim-001").trials

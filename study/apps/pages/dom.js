@@ -77,3 +77,6 @@ export function ask(children, buttons, { enter = true } = {}) {
 }
 
 export const sleep = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+// Until what was put on the page is on the screen.
+export const drawn = () => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));

@@ -2,7 +2,7 @@
 
 import { attend, faults, filmsOn, unseen, visible } from "./attention.js";
 import { fromHex, surround } from "./colours.js";
-import { ask, element, heading, secondClick, show, sleep, status } from "./dom.js";
+import { ask, drawn, element, heading, secondClick, show, sleep, status } from "./dom.js";
 import { FilmFault, forget, load, loadAhead, release } from "./film.js";
 import { play, rewind } from "./playing.js";
 import { tell } from "./server.js";
@@ -96,6 +96,7 @@ const MOST_APART = 1; // frames between films that start together
 // All films at once. Each one's frames tell when its first one was due; how far that is from the earliest is kept.
 async function together(view, videos, restarts) {
   for (const video of videos) video.classList.add("now");
+  await drawn();
   if (videos.some((video) => video.currentTime > 0)) await Promise.all(videos.map(rewind));
   const all = await Promise.all(videos.map((video, at) => play(video, view.films[at], view.fps)));
   if (restarts && unseen()) throw new Unseen();

@@ -75,24 +75,26 @@ class Desk:
         self.showings = [one if one.ended_s is not None else replace(one, ended_s=at) for one in self.showings]
         return at
 
-    def ask(self, page: Page, deadline_s: float | None = None) -> tuple[Button | None, float]:
-        """Show a page until one of its buttons is chosen; the button and when, or None once the time is over."""
+    def ask(self, page: Page, deadline_s: float | None = None) -> tuple[Button | None, float, float]:
+        """Show a page until one of its buttons is chosen: the button and when, or None once the time is over; and when
+        the page was presented first.
+        """
         self.window.cursor(True)
-        drawn, shown_s = self.show_page(page)
+        drawn, asked_s = self.show_page(page)
         # Keys pressed before the page appeared are ignored, even if they arrive later.
         self.notice(self.window.poll())
         while True:
             left = None if deadline_s is None else deadline_s - self.window.now()
             if left is not None and left <= 0:
-                return None, self.window.now()
+                return None, self.window.now(), asked_s
             events = self.window.wait(left)
             for number, event in enumerate(events):
                 button = chosen(drawn, event)
-                in_time = shown_s <= event.time_s and (deadline_s is None or event.time_s <= deadline_s)
+                in_time = asked_s <= event.time_s and (deadline_s is None or event.time_s <= deadline_s)
                 if button is not None and in_time:
                     self.standing = drawn.page
                     self.notice(events[number + 1 :])  # a second key counts for nothing; a lost focus is logged
-                    return button, event.time_s
+                    return button, event.time_s, asked_s
                 if (turned := changed(drawn, event)) is not None:
                     drawn, _ = self.show_page(turned)
                 elif self.notice((event,)):
@@ -103,7 +105,7 @@ class Desk:
 
     def read_until(self, page: Page) -> str:
         """Show a page that has no time limit; the name of the button that was chosen."""
-        button, _ = self.ask(page)
+        button, _, _ = self.ask(page)
         assert button is not None, "without a deadline there is a button"
         return button.name
 

@@ -4,8 +4,9 @@ A window, a protocol, a plan's session and a store come in; what the participant
 before the next step. Which step comes next is the session's business alone, so that window, browser and simulation
 show the same trials. The window is an argument: a scripted one takes its place in tests, clock included.
 
-Reaction times run from the first flip of the last frame of the last stimulus. While a question stands the player
-sleeps until something happens, so a key is timed when it arrives, not at the next flip.
+Reaction times run from the first flip of the last frame of the last stimulus; those of a further question from the flip
+that put it up. While a question stands the player sleeps until something happens, so a key is timed when it arrives,
+not at the next flip.
 """
 
 from __future__ import annotations
@@ -339,11 +340,12 @@ class _Player(Desk):
     def _answer(self, step: Step) -> None:
         """Ask, and store the answer with how its stimuli were shown before anything else."""
         page = screens.answer_page(self.protocol, step, progress(self.session))
+        further = self.session.steps[self.session.position - 1].kind == "answer"
         while True:
             zero_s = max(showing.last_frame_s for showing in self.showings[-max(len(page.cells), 1) :])
             deadline_s = None if step.duration_s is None else zero_s + step.duration_s
             with calm():
-                button, at = self.ask(page, deadline_s)
+                button, at, asked_s = self.ask(page, deadline_s)
             if button is None or button.name != AGAIN or self.standing is None:
                 break
             self._play_together([showing.stimulus for showing in self.showings[: len(page.cells)]])
@@ -355,9 +357,9 @@ class _Player(Desk):
         if button is None:
             self.session, answer = missed(before, shown_well=shown_well)
         else:
-            self.session, answer = answered(before, button.name, at - zero_s, shown_well=shown_well)
-        first_item = before.steps[before.position - 1].kind != "answer"
-        self.store.answer(before.trial(step.trial), answer, self._presentations(step) if first_item else ())
+            response_s = at - (asked_s if further else zero_s)
+            self.session, answer = answered(before, button.name, response_s, shown_well=shown_well)
+        self.store.answer(before.trial(step.trial), answer, () if further else self._presentations(step))
         self._answers += 1
         self._faulty += not shown_well
         which = f"trial {step.trial}" + (f" {step.item}" if step.item else "")

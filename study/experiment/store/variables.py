@@ -57,13 +57,18 @@ ANSWERS: Mapping[str, Variable] = {
         "Whether the transition of method_a was shown first (preference, rating of a pair).", "boolean"
     ),
     "answer": Variable(
-        "The answer: same, different, first, second, third, equal, or a point of the scale; empty where missed."
+        "The answer: same, different, yes, no, first, second, third, equal, or a point of the scale; "
+        "empty where missed."
     ),
     "confidence": Variable("How sure the participant was of the answer, from 0; empty where not asked.", "number"),
     "missed": Variable("Whether the time to answer ended without an answer.", "boolean"),
     "correct": Variable("Whether the answer was right, where one is.", "boolean"),
     "chose_a": Variable("Whether the transition of method_a was favoured (preference); empty for equal.", "boolean"),
-    "response_s": Variable("Time from the end of the last stimulus to the answer.", "number", "s"),
+    "response_s": Variable(
+        "Time from the end of the last stimulus to the answer; to a further question, from when it was asked.",
+        "number",
+        "s",
+    ),
     "shown_well": Variable("Whether the stimuli were shown without a fault.", "boolean"),
     "answered_at": Variable("When the answer was given, with its time zone.", "time"),
     "role": Variable(

@@ -274,6 +274,7 @@ def test_ratings_take_digits_arrows_and_the_mouse(make_small: Any, store: Any, t
     ratings = [answer for answer in store.all("answer") if answer.item]
     assert [(answer.item, answer.value) for answer in ratings] == [("natural", "7"), ("smooth", "10")]
     assert ratings[0].response_s == pytest.approx(40.0 + 2 / 60)  # a questionnaire has no time limit
+    assert ratings[1].response_s == pytest.approx(0.2)  # a further question is timed from when it was put up
     assert [one.trial for one in store.all("shown")].count(7) == 1  # shown once, whatever it is asked
 
 
