@@ -11,6 +11,7 @@ from study.analysis.analyse import Analysis, Results
 from study.analysis.confidence import HowSure
 from study.analysis.quality import Quality
 from study.counting import counted, noun
+from study.experiment.store.anonymous import BEGINNING
 from study.report import tables, words
 from study.report.drawing import BLUE, FAINT, ORANGE, Picture, new_figure, picture_of, quiet_grid
 from study.report.sections.section import About
@@ -181,7 +182,7 @@ def _main_results(results: Results, analysis: Analysis) -> dict[str, dict[str, f
 def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Table:
     """Return one row a participant: when, how many answers, how fast, what was noticed."""
     started = {}
-    if len(sessions) and "started_at" in sessions:
+    if len(sessions) and "started_at" in sessions and (sessions["started_at"] != BEGINNING).any():
         started = {str(row.participant): str(row.started_at)[:16] for row in sessions.itertuples()}
     left_out = {one.participant: one.reason for one in analysis.exclusions.participants}
     rows = [
@@ -193,6 +194,7 @@ def participant_table(analysis: Analysis, sessions: pd.DataFrame) -> tables.Tabl
     hidden = {
         "kind": analysis.data != "mixed",
         "left_out": not left_out,
+        "started": not started,
         "shown_badly": not analysis.quality.shown_badly,
         "too_fast": not analysis.quality.too_fast,
         "false_alarms same_pairs": not any(row.same_pairs for row in analysis.quality.table),

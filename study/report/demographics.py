@@ -10,11 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import mean, stdev
 from typing import Any
 
+from study.experiment.form import FEWEST, told_together
 from study.experiment.protocol.texts import FormField
 from study.report import tables, words
-
-FEWEST = 5
-"""People that a cell needs to be shown."""
 
 
 def demographics_rows(form: Sequence[FormField], given: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
@@ -41,16 +39,12 @@ def _rows(field: FormField, values: Sequence[str]) -> Iterator[dict[str, Any]]:
         numbers = [float(value) for value in values]
         yield {"participants": len(values), "mean": mean(numbers), "standard_deviation": stdev(numbers)}
         return
-    counts = sorted((values.count(choice), place, choice) for place, choice in enumerate(field.choices))
-    together = [count for count in counts if 0 < count[0] < FEWEST]
-    rest = [count for count in counts if count[0] >= FEWEST]
-    while together and sum(count[0] for count in together) < FEWEST and rest:
-        together.append(rest.pop(0))
-    for count, _, choice in sorted(rest, key=lambda one: one[1]):
-        yield {"reading": choice, "participants": count}
+    counts = {choice: count for choice in field.choices if (count := values.count(choice))}
+    together = [choice for choice in counts if choice in told_together(counts)]
+    yield from ({"reading": one, "participants": count} for one, count in counts.items() if one not in together)
     if together:
-        named = words.joined([choice for choice in field.choices if choice in {name for _, _, name in together}])
-        yield {"reading": f"{named} together", "participants": sum(count for count, _, _ in together)}
+        count = sum(counts[choice] for choice in together)
+        yield {"reading": f"{words.joined(together)} together", "participants": count}
 
 
 def demographics_table(rows: Sequence[Mapping[str, Any]]) -> tables.Table:

@@ -177,6 +177,12 @@ def make_results(
     return folder
 
 
+@pytest.fixture(scope="session")
+def any_folder() -> Callable[..., Path]:
+    """`make_results`, for fixtures that several tests share."""
+    return make_results
+
+
 @pytest.fixture
 def results_folder(tmp_path: Path) -> Callable[..., Path]:
     """A function that makes a results folder, see `make_results`."""

@@ -187,9 +187,9 @@ def test_every_export_has_all_three_stimuli_and_says_what_they_are(protocol: Pro
     with open_responses(tmp_path / "results") as responses:
         simulate(protocol, Stimuli(), responses, 1, seed=3)
         plan = session_by_id(responses, 1).plan
-        export(protocol, responses, "psych-ds", tmp_path / "psych-ds")
-        export(protocol, responses, "bids", tmp_path / "bids")
-        export_csv(responses, tmp_path / "answers.csv")
+        export(protocol, responses, "psych-ds", tmp_path / "psych-ds", {})
+        export(protocol, responses, "bids", tmp_path / "bids", {})
+        export_csv(responses, tmp_path / "answers.csv", {}, {})
     shown = {trial.trial: trial.stimuli for trial in plan.trials}
     files = [
         tmp_path / "answers.csv",

@@ -32,7 +32,7 @@ EXAMPLES = {
     "simulate": "segue simulate my_study.toml --library motions --participants 20 --out results/try",
     "analyse": "segue analyse results/my_study",
     "report": "segue report results/my_study",
-    "export": "segue export results/my_study --to csv --out answers.csv",
+    "export": "segue export results/my_study --to release --author 'Doe, Jane' --licence CC-BY-4.0",
     "export-stimuli": "segue export-stimuli my_study.toml --library motions --to jspsych --out web",
     "import-answers": "segue import-answers web segue_p001.json segue_p002.json",
     "export-engine": "segue export-engine advice/advice.json --out game",

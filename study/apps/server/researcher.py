@@ -17,6 +17,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from study.apps.server.hosting import Host, LiveSession
+from study.experiment.form import asked
 from study.experiment.plan import questions
 from study.experiment.session import current
 from study.experiment.store import participants as people
@@ -144,7 +145,7 @@ def _joined(host: Host, table: sa.Table, *columns: sa.Column[Any]) -> str:
 
 
 TABLES: dict[str, Callable[[Host], str]] = {
-    "answers": lambda host: answers_csv(host.responses),
+    "answers": lambda host: answers_csv(host.responses, host.manifest.blends, asked(host.protocol)),
     "form": lambda host: _joined(host, form_values, form_values.c.name, form_values.c.value, form_values.c.at),
     "presentations": lambda host: _joined(
         host, presentations, *(c for c in presentations.c if c.name not in ("id", "session_id", "detail_json"))

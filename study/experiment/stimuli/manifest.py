@@ -58,6 +58,11 @@ class Manifest:
         """Whether every stimulus has its video."""
         return all(record.id in self.videos for record in self.records)
 
+    @property
+    def blends(self) -> dict[str, tuple[int, float]]:
+        """The blend length of each stimulus, in frames and in seconds."""
+        return {one.id: (one.blend_frames, one.blend_frames / self.fps) for one in self.records}
+
     def record(self, identifier: str) -> StimulusRecord:
         """A stimulus by its id."""
         for record in self.records:

@@ -1,9 +1,9 @@
 """Exports for archives and other programs: the answers of a results folder in, a Psych-DS or BIDS data set out.
 
 Psych-DS: `data/*_data.csv`, and `dataset_description.json` in schema.org's words. BIDS: behavioural data without
-imaging (`sub-*/beh/*_beh.tsv`, a JSON file beside each). Both carry every showing and role, what participants said of
-themselves in the form, and the protocol; Psych-DS also how every stimulus was shown. Parameters of recruiting services,
-tokens and codes stay behind. Simulated answers are called so in title, readme and every row.
+imaging (`sub-*/beh/*_beh.tsv`, a JSON file beside each). Both carry every showing and role, answers to the form, and
+the protocol, but no identities (`anonymous`); Psych-DS also how every stimulus was shown. Simulated answers are called
+so in title, readme and every row.
 """
 
 from __future__ import annotations
@@ -22,18 +22,64 @@ import sqlalchemy as sa
 import study
 from study.counting import counted
 from study.errors import SessionError
+from study.experiment.folder import PROTOCOL
+from study.experiment.form import WRITTEN, asked
 from study.experiment.protocol.whole import Protocol
 from study.experiment.store import tables as stored
-from study.experiment.store.frames import ROLES, answers_frame
+from study.experiment.store.anonymous import without_identities
+from study.experiment.store.frames import ROLES, Blends, answers_frame, with_blends, with_form
 from study.experiment.store.responses import Responses, rows_of
 from study.experiment.store.sessions import session_table
-from study.experiment.store.variables import ANSWERS, PARTICIPANTS, PRESENTATIONS, SHOWN_TO, STIMULI, Variable
+from study.experiment.store.variables import (
+    PARTICIPANTS,
+    PRESENTATIONS,
+    SHARED,
+    SHOWN_TO,
+    STIMULI,
+    Variable,
+    form_columns,
+)
 from study.files import whole_folder
 from study.spreadsheets import safe_table
 
 MADE_BY = "Segue"
 DESCRIPTION = "dataset_description.json"
 BIDS_VERSION = "1.10.0"
+COARSE = " Told by five participants or more, or withheld; numbers are means of five or more."
+
+
+@dataclass(frozen=True)
+class Credit:
+    """Who made a data set, and what others may do with it: names, and a licence's identifier by SPDX."""
+
+    authors: tuple[str, ...] = ()
+    licence: str = ""
+
+    @property
+    def address(self) -> str:
+        """Where the licence can be read."""
+        return f"https://spdx.org/licenses/{self.licence}.html" if self.licence else ""
+
+
+NOBODY = Credit()
+
+
+def credited(authors: Sequence[str], licence: str) -> Credit:
+    """Return a credit.
+
+    Raises
+    ------
+    SessionError
+        For a licence that SPDX does not list.
+    """
+    from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
+
+    try:
+        return Credit(tuple(authors), str(canonicalize_license_expression(licence)) if licence else "")
+    except InvalidLicenseExpression as error:
+        raise SessionError(
+            f"--licence: expected an identifier of spdx.org/licenses, such as CC-BY-4.0, found {licence!r} ({error})."
+        ) from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +89,7 @@ class Shared:
     protocol: Protocol
     tables: Mapping[str, pd.DataFrame]
     variables: Mapping[str, Mapping[str, Variable]]
+    credit: Credit
 
     @property
     def title(self) -> str:
@@ -62,7 +109,7 @@ class Shared:
         """A paragraph on the data set."""
         answers, people = (len(self.tables[name]) for name in ("answers", "participants"))
         size = f"{counted(answers, 'answer')} of {counted(people, 'participant')}"
-        source = f" After {self.protocol.source}." if self.protocol.source else ""
+        source = f" After {self.protocol.source.removeprefix('after ')}." if self.protocol.source else ""
         whose = f" NOT PEOPLE'S ANSWERS ALONE: {self.whose}." if self.whose else ""
         return (
             f"{self.protocol.title}: {size} in {counted(len(self.protocol.studies), 'study', 'studies')} of "
@@ -72,54 +119,53 @@ class Shared:
         )
 
 
-def gather(protocol: Protocol, responses: Responses) -> Shared:
+def gather(protocol: Protocol, responses: Responses, blends: Blends, credit: Credit = NOBODY) -> Shared:
     """Read everything that is exported.
 
-    Raises
-    ------
-    SessionError
-        Where there is no answer.
+    Parameters
+    ----------
+    responses
+        Without identities.
     """
     answers = answers_frame(responses, all_attempts=True, roles=ROLES)
-    if answers.empty:
-        raise SessionError(f"{responses.place}: expected answers to export, found none; collect or simulate some first")
     sessions = session_table(responses)
     names = dict(zip(sessions["id"], sessions["participant"], strict=True))
-    form = rows_of(responses, sa.select(stored.form_values))
+    begun = dict(zip(sessions["participant"], sessions["started_at"], strict=True))
 
     def whole(table: sa.Table, variables: Mapping[str, Variable]) -> pd.DataFrame:
-        wanted = [table.c[name] for name in variables if name in table.c]
-        detail = [table.c.detail_json] if "detail_json" in table.c else []
-        rows = rows_of(responses, sa.select(table.c.session_id, *wanted, *detail))
+        wanted = [column for column in table.c if column.name in {*variables, "session_id", "detail_json", "at"}]
         listed = [
             {**json.loads(row.get("detail_json") or "{}"), **row, "participant": names[row["session_id"]]}
-            for row in rows
+            for row in rows_of(responses, sa.select(*wanted))
         ]
+        for row in listed:
+            row["after_s"] = (row["at"] - begun[row["participant"]]).total_seconds() if "at" in row else None
+            row["blend_frames"], row["blend_s"] = blends.get(row["stimulus"], (None, None))
         return pd.DataFrame(listed, columns=list(variables))
 
+    after = pd.to_datetime(answers["answered_at"], format="ISO8601") - answers["participant"].map(begun)
+    answers = with_blends(answers.assign(answered_after_s=after.dt.total_seconds()), blends)[list(SHARED)]
     stimuli = whole(stored.answer_stimuli, STIMULI)
     presentations = whole(stored.presentations, PRESENTATIONS)
     participants = sessions[list(PARTICIPANTS)].copy()
     for column in SHOWN_TO:
         size = pd.to_numeric(presentations[column.removeprefix("shown_")])
         participants[column] = participants["participant"].map(size.groupby(presentations["participant"]).median())
-    labels = {f"form_{field.name}": field.label for field in protocol.form}
-    labels |= {f"form_{study.name}.{field.name}": field.label for study in protocol.studies for field in study.form}
-    for column in labels:
-        said = {row["session_id"]: row["value"] for row in form if f"form_{row['name']}" == column}
-        participants[column] = sessions["id"].map(said)
-    asked = {column: Variable(f"Asked in the form: {label}") for column, label in labels.items()}
+    form = {name: field for name, field in asked(protocol).items() if field.kind not in WRITTEN}
+    participants = with_form(participants, responses, form)
     variables: dict[str, Mapping[str, Variable]] = {
-        "answers": ANSWERS,
+        "answers": SHARED,
         "stimuli": STIMULI,
         "presentations": PRESENTATIONS,
-        "participants": {**PARTICIPANTS, **SHOWN_TO, **asked},
+        "participants": {**PARTICIPANTS, **SHOWN_TO, **form_columns(form, COARSE)},
     }
     frames = {"answers": answers, "participants": participants, "stimuli": stimuli, "presentations": presentations}
-    return Shared(protocol, {name: safe_table(frame) for name, frame in frames.items()}, variables)
+    return Shared(protocol, {name: safe_table(frame) for name, frame in frames.items()}, variables, credit)
 
 
-def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) -> Path:
+def export(
+    protocol: Protocol, responses: Responses, kind: str, folder: Path, blends: Blends, credit: Credit = NOBODY
+) -> Path:
     """Write a data set as a folder; an earlier export of ours there is replaced.
 
     Parameters
@@ -132,14 +178,18 @@ def export(protocol: Protocol, responses: Responses, kind: str, folder: Path) ->
     SessionError
         Where there is no answer, or the folder holds anything that Segue did not export.
     """
+    refuse_to_replace(folder)
+    with without_identities(protocol, responses) as shown, whole_folder(folder) as unfinished:
+        {"psych-ds": _write_psych_ds, "bids": _write_bids}[kind](gather(protocol, shown, blends, credit), unfinished)
+    return folder
+
+
+def refuse_to_replace(folder: Path) -> None:
+    """Refuse a folder that holds anything that Segue did not export."""
     if folder.exists() and not _replaceable(folder):
         raise SessionError(
             f"{folder}: expected a new or empty folder, or an earlier export of Segue, found other files; name another"
         )
-    shared = gather(protocol, responses)
-    with whole_folder(folder) as unfinished:
-        {"psych-ds": _write_psych_ds, "bids": _write_bids}[kind](shared, unfinished)
-    return folder
 
 
 def _replaceable(folder: Path) -> bool:
@@ -172,7 +222,8 @@ def labels(names: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write JSON that a person can read."""
     path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
@@ -188,37 +239,36 @@ def _by_study(shared: Shared) -> list[tuple[str, pd.DataFrame]]:
 
 
 def _write_psych_ds(shared: Shared, folder: Path) -> None:
+    write_data(shared, folder)
+    (folder / "materials").mkdir()
+    (folder / "materials" / PROTOCOL).write_text(shared.protocol.text, encoding="utf-8")
+
+
+def write_data(shared: Shared, folder: Path) -> None:
+    """Write the tables of a Psych-DS data set, what they and their columns mean, and a readme."""
     data = folder / "data"
     data.mkdir()
-    parts = [(f"task-{name}", part) for name, part in _by_study(shared)]
-    parts += [(f"description-{name}", table) for name, table in shared.tables.items() if name != "answers"]
-    for name, table in parts:
+    parts = [(f"task-{name}", part, "answers") for name, part in _by_study(shared)]
+    parts += [(f"description-{name}", table, name) for name, table in shared.tables.items() if name != "answers"]
+    measured: dict[str, dict[str, Any]] = {}
+    for stem, table, name in parts:
         if len(table):
-            table.to_csv(data / f"{name}_data.csv", index=False, lineterminator="\n")
-    variables = {name: variable for table in shared.variables.values() for name, variable in table.items()}
+            own = {column: one.property(column) for column, one in shared.variables[name].items()}
+            table.to_csv(data / f"{stem}_data.csv", index=False, lineterminator="\n")
+            write_json(data / f"{stem}_data.json", {"variableMeasured": [*own.values()]})
+            measured = own | measured
     description = {
         "@context": "https://schema.org/",
         "@type": "Dataset",
         "name": shared.title,
         "description": shared.words,
         "sdPublisher": {"@type": "Organization", "name": MADE_BY},
-        "variableMeasured": [_property(name, variable) for name, variable in variables.items()],
+        "author": [{"@type": "Person", "name": name} for name in shared.credit.authors],
+        "license": shared.credit.address,
+        "variableMeasured": [*measured.values()],
     }
-    _write_json(folder / DESCRIPTION, description)
+    write_json(folder / DESCRIPTION, {key: value for key, value in description.items() if value})
     (folder / "README.md").write_text(_readme(shared), encoding="utf-8")
-    (folder / "materials").mkdir()
-    (folder / "materials" / "protocol.toml").write_text(shared.protocol.text, encoding="utf-8")
-
-
-def _property(name: str, variable: Variable) -> dict[str, Any]:
-    """A column in schema.org's words."""
-    found: dict[str, Any] = {"@type": "PropertyValue", "name": name, "description": variable.description}
-    if variable.unit:
-        found["unitText"] = variable.unit
-    if variable.levels:
-        levels = variable.levels.items()
-        found["valueReference"] = [{"@type": "DefinedTerm", "name": name, "description": text} for name, text in levels]
-    return found
 
 
 def _readme(shared: Shared) -> str:
@@ -233,31 +283,29 @@ def _readme(shared: Shared) -> str:
 
 def _write_bids(shared: Shared, folder: Path) -> None:
     subjects = labels([str(name) for name in shared.tables["participants"]["participant"]])
+    about = {"Name": shared.title, "BIDSVersion": BIDS_VERSION, "DatasetType": "raw"}
     generated = [{"Name": MADE_BY, "Version": study.__version__}]
-    _write_json(
-        folder / DESCRIPTION,
-        {"Name": shared.title, "BIDSVersion": BIDS_VERSION, "DatasetType": "raw", "GeneratedBy": generated},
-    )
+    credit = {"Authors": list(shared.credit.authors), "License": shared.credit.licence}
+    stated = {name: value for name, value in credit.items() if value}
+    write_json(folder / DESCRIPTION, {**about, "GeneratedBy": generated, **stated})
     (folder / "README.md").write_text(_readme(shared), encoding="utf-8")
     (folder / "code").mkdir()
-    (folder / "code" / "protocol.toml").write_text(shared.protocol.text, encoding="utf-8")
-    people = shared.tables["participants"].rename(columns={"participant": "name"})
-    people.insert(0, "participant_id", [f"sub-{subjects[str(name)]}" for name in people["name"]])
+    (folder / "code" / PROTOCOL).write_text(shared.protocol.text, encoding="utf-8")
+    people = shared.tables["participants"].rename(columns={"participant": "participant_id"})
+    people["participant_id"] = [f"sub-{subjects[str(name)]}" for name in people["participant_id"]]
     _write_tsv(folder / "participants.tsv", people)
-    columns = {"participant_id": Variable("Label of the participant in this data set.")}
-    columns |= {"name": Variable("Name of the session in Segue's database.")}
-    columns |= {name: one for name, one in shared.variables["participants"].items() if name != "participant"}
-    _write_json(folder / "participants.json", {name: variable.entry() for name, variable in columns.items()})
-    described = {name: variable.entry() for name, variable in ANSWERS.items() if name not in ("participant", "study")}
+    columns = zip(people.columns, shared.variables["participants"].values(), strict=True)
+    write_json(folder / "participants.json", {name: variable.entry() for name, variable in columns})
+    described = {name: variable.entry() for name, variable in SHARED.items() if name not in ("participant", "study")}
     for task, part in _by_study(shared):
-        title = next(each.title or each.name for each in shared.protocol.studies if each.name == part["study"].iloc[0])
-        about = {"TaskName": task, "TaskDescription": title}
+        spec = next(each for each in shared.protocol.studies if each.name == part["study"].iloc[0])
+        told = {"TaskName": task, "TaskDescription": spec.title or spec.name, "Instructions": spec.instructions}
         for name, own in part.groupby("participant", sort=False):
             beh = folder / f"sub-{subjects[str(name)]}" / "beh"
             beh.mkdir(parents=True, exist_ok=True)
             file = beh / f"sub-{subjects[str(name)]}_task-{task}_beh.tsv"
             _write_tsv(file, own.drop(columns=["participant", "study"]))
-            _write_json(file.with_suffix(".json"), {**about, **described})
+            write_json(file.with_suffix(".json"), {**{key: text for key, text in told.items() if text}, **described})
 
 
 def _write_tsv(path: Path, table: pd.DataFrame) -> None:

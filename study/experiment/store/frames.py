@@ -1,25 +1,30 @@
-"""Tables of answers: one row an answer, for the analysis and for other programs."""
+"""Tables of answers: one row an answer, for the analysis and for other programs (CSV, Parquet)."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
 from study.errors import SessionError
+from study.experiment.protocol.texts import FormField
 from study.experiment.store.responses import Responses, rows_of
-from study.experiment.store.tables import answer_stimuli, answers, sessions
-from study.experiment.store.variables import ANSWERS
-from study.files import write_whole
+from study.experiment.store.tables import answer_stimuli, answers, form_values, sessions
+from study.experiment.store.variables import ANSWERS, EXPORTED, form_columns
+from study.files import whole_file, write_whole
 from study.spreadsheets import safe_table
 from study.tasks.answer import CONFIDENCE
 from study.tasks.trial import PLACES
 
 if TYPE_CHECKING:
     import pandas as pd
+
+Blends = Mapping[str, tuple[int, float]]
+"""Blend lengths by stimulus, in frames and in seconds (`Manifest.blends`)."""
 
 ROLES = ("trial", "practice", "check")
 ANSWER_COLUMNS = tuple(ANSWERS)
@@ -109,15 +114,48 @@ def _by_slider(responses: Responses, rows: Sequence[sa.RowMapping]) -> list[dict
     return found
 
 
-def answers_csv(responses: Responses) -> str:
-    """All answers, every showing and every role, as CSV (ISO times, empty where nothing is meant)."""
-    return str(safe_table(answers_frame(responses, all_attempts=True, roles=ROLES)).to_csv(index=False))
+def with_blends(table: pd.DataFrame, blends: Blends) -> pd.DataFrame:
+    """A table of answers, and how long the blends of their stimuli were (`variables.BLENDS`)."""
+    import pandas as pd
+
+    columns: dict[str, pd.api.extensions.ExtensionArray] = {}
+    for place in PLACES[:3]:
+        found = [blends.get(stimulus, (pd.NA, float("nan"))) for stimulus in table[place]]
+        columns[f"{place}_blend_frames"] = pd.array([frames for frames, _ in found], dtype="Int64")
+        columns[f"{place}_blend_s"] = pd.array([seconds for _, seconds in found], dtype="float64")
+    return table.assign(**columns)
 
 
-def export_csv(responses: Responses, path: str | Path) -> Path:
+def with_form(table: pd.DataFrame, responses: Responses, form: Mapping[str, FormField]) -> pd.DataFrame:
+    """A table with a participant in each row, and what they filled into the form (`variables.form_columns`)."""
+    import pandas as pd
+
+    query = sa.select(sessions.c.participant, form_values.c.name, form_values.c.value)
+    rows = rows_of(responses, query.join(form_values, form_values.c.session_id == sessions.c.id))
+    said = {(row["participant"], row["name"]): row["value"] for row in rows}
+    columns = {}
+    for name, field in form.items():
+        values = pd.Series([said.get((person, name)) for person in table["participant"]], table.index, dtype="str")
+        columns[f"form_{name}"] = pd.to_numeric(values, errors="coerce") if field.kind == "number" else values
+    return table.assign(**columns)
+
+
+def exported_frame(responses: Responses, blends: Blends, form: Mapping[str, FormField]) -> pd.DataFrame:
+    """All answers for other programs, every showing and every role: `variables.EXPORTED`, then `form_columns`."""
+    table = with_blends(answers_frame(responses, all_attempts=True, roles=ROLES), blends)
+    return safe_table(with_form(table, responses, form))
+
+
+def answers_csv(responses: Responses, blends: Blends, form: Mapping[str, FormField]) -> str:
+    """All answers as CSV (ISO times, empty where nothing is meant)."""
+    return str(exported_frame(responses, blends, form).to_csv(index=False))
+
+
+def export_csv(responses: Responses, path: str | Path, blends: Blends, form: Mapping[str, FormField]) -> Path:
     """Write `answers_csv` to a file, and what its columns mean beside it (`dictionary_beside`)."""
-    write_whole(path, answers_csv(responses))
-    entries = {name: {**ANSWERS[name].entry(), "Type": ANSWERS[name].kind} for name in ANSWER_COLUMNS}
+    write_whole(path, answers_csv(responses, blends, form))
+    columns = {**EXPORTED, **form_columns(form)}
+    entries = {name: {**one.entry(), "Type": one.kind} for name, one in columns.items()}
     write_whole(dictionary_beside(path), json.dumps(entries, indent=2, ensure_ascii=False) + "\n")
     return Path(path)
 
@@ -125,3 +163,42 @@ def export_csv(responses: Responses, path: str | Path) -> Path:
 def dictionary_beside(path: str | Path) -> Path:
     """Where the meaning of a table's columns stands: `answers_columns.json` beside `answers.csv`."""
     return Path(path).with_name(f"{Path(path).stem}_columns.json")
+
+
+def export_parquet(responses: Responses, path: str | Path, blends: Blends, form: Mapping[str, FormField]) -> Path:
+    """Write all answers as Parquet, with the meaning and unit of each column in the metadata of its field.
+
+    Whole numbers, other numbers, truth values and times (UTC) keep their types.
+
+    Raises
+    ------
+    SessionError
+        Where the extra `parquet` is not installed.
+    """
+    try:
+        from arro3 import core, io
+    except ImportError as error:
+        raise SessionError(
+            f"Expected what writes Parquet, found none ({error}); install it: pip install arro3-core arro3-io."
+        ) from error
+    table = exported_frame(responses, blends, form)
+    fields, columns = [], []
+    for name, variable in {**EXPORTED, **form_columns(form)}.items():
+        stored_as = given_as = {
+            "b": core.DataType.bool(),
+            "i": core.DataType.int64(),
+            "f": core.DataType.float64(),
+        }.get(table[name].dtype.kind, core.DataType.utf8())
+        values: list[Any] = [
+            None if missing or value == "" else value
+            for value, missing in zip(table[name], table[name].isna(), strict=True)
+        ]
+        if variable.kind == "time":
+            given_as, stored_as = core.DataType.int64(), core.DataType.timestamp("us", tz="UTC")
+            values = [round(datetime.fromisoformat(value).timestamp() * 1e6) for value in values]
+        columns.append(core.Array(values, given_as).cast(stored_as))
+        entry = {key: value if isinstance(value, str) else json.dumps(value) for key, value in variable.entry().items()}
+        fields.append(core.Field(name, stored_as, metadata=entry))
+    with whole_file(path) as unfinished:
+        io.write_parquet(core.Table.from_arrays(columns, schema=core.Schema(fields)), unfinished)
+    return Path(path)

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+from study.experiment.protocol.texts import FormField
 from study.tasks.registry import NAMES, TASKS
+from study.tasks.trial import PLACES
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,18 @@ class Variable:
         """What a data dictionary says of it, in BIDS's words."""
         found = {"Description": self.description, "Units": self.unit, "Levels": dict(self.levels)}
         return {key: value for key, value in found.items() if value}
+
+    def property(self, name: str) -> dict[str, Any]:
+        """What a data dictionary says of it, in schema.org's words."""
+        found: dict[str, Any] = {"@type": "PropertyValue", "name": name, "description": self.description}
+        if self.unit:
+            found["unitText"] = self.unit
+        if self.levels:
+            levels = self.levels.items()
+            found["valueReference"] = [
+                {"@type": "DefinedTerm", "name": one, "description": text} for one, text in levels
+            ]
+        return found
 
     def line(self, name: str) -> str:
         """What `docs/exporting.md` says of it, a row of its table."""
@@ -81,6 +95,25 @@ ANSWERS: Mapping[str, Variable] = {
     ),
     "expected": Variable("The answer that an attention check asked for."),
 }
+"""What the analysis reads."""
+
+BLENDS: Mapping[str, Variable] = {
+    f"{place}_blend_{unit}": Variable(f"Blend length of the stimulus shown {place}; 0 for a cut.", "number", unit)
+    for place in PLACES[:3]
+    for unit in ("frames", "s")
+}
+"""How long the blends of each answer's stimuli were."""
+
+EXPORTED: Mapping[str, Variable] = {**ANSWERS, **BLENDS}
+"""A table of answers for other programs."""
+
+AFTER = Variable("Time since the session began.", "number", "s")
+
+SHARED: Mapping[str, Variable] = {
+    {"answered_at": "answered_after_s"}.get(name, name): AFTER if name == "answered_at" else variable
+    for name, variable in EXPORTED.items()
+}
+"""The same for archives, which hold no dates."""
 
 STIMULI: Mapping[str, Variable] = {
     "participant": ANSWERS["participant"],
@@ -91,6 +124,8 @@ STIMULI: Mapping[str, Variable] = {
     "stimulus": Variable("The stimulus: the SHA-256 of its content."),
     "member": Variable("Which of its pair's stimuli it was: 0 for the reference or method_a, else 1.", "number"),
     "method": Variable("Method by which its transition was made."),
+    "blend_frames": Variable("Blend length; 0 for a cut.", "number", "frames"),
+    "blend_s": Variable("Blend length; 0 for a cut.", "number", "s"),
 }
 
 SIZE_SHOWN: Mapping[str, Variable] = {
@@ -104,6 +139,19 @@ SIZE_SHOWN: Mapping[str, Variable] = {
     "distance_cm": Variable("Viewing distance, measured or stated; empty where not known.", "number", "cm"),
 }
 """How large a presentation was; kept in its details."""
+
+
+def form_columns(form: Mapping[str, FormField], note: str = "") -> dict[str, Variable]:
+    """The columns of a form's questions; `note` says more of all."""
+    return {
+        f"form_{name}": Variable(
+            f"Asked in the form: {field.label}{note}",
+            "number" if field.kind == "number" else "text",
+            levels={choice: choice for choice in field.choices},
+        )
+        for name, field in form.items()
+    }
+
 
 PRESENTATIONS: Mapping[str, Variable] = {
     "participant": ANSWERS["participant"],
@@ -119,13 +167,12 @@ PRESENTATIONS: Mapping[str, Variable] = {
     "apart_frames": Variable("How far it ran behind the first of the films shown at once.", "number", "frames"),
     "shown_well": Variable("Whether no gap was too long and no frame was missing.", "boolean"),
     **SIZE_SHOWN,
-    "at": Variable("When it was recorded, with its time zone.", "time"),
+    "after_s": AFTER,
 }
 
 PARTICIPANTS: Mapping[str, Variable] = {
     "participant": ANSWERS["participant"],
     "simulated": ANSWERS["simulated"],
-    "started_at": Variable("When the session began, with its time zone.", "time"),
     "segue_version": Variable("Version of Segue that ran the session."),
     "library": Variable("Library of motions that was shown."),
     "library_synthetic": Variable("Whether its motions are synthetic, not captured.", "boolean"),

@@ -49,6 +49,7 @@ WRITES = {
     "database": ["simulate", "STUDY/protocol.toml", "--participants", "2", "--out", "STUDY", "--database", "OUT/x.db"],
     "report": ["report", "STUDY", "--out", "OUT/x"],
     "export": ["export", "STUDY", "--out", "OUT/x.csv"],
+    "parquet": ["export", "STUDY", "--to", "parquet", "--out", "OUT/x.parquet"],
     "psych-ds": ["export", "STUDY", "--to", "psych-ds", "--out", "OUT/x"],
     "bids": ["export", "STUDY", "--to", "bids", "--out", "OUT/x"],
 }  # fmt: skip

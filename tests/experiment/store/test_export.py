@@ -12,6 +12,7 @@ import pytest
 from toys import FakeStimuli, keep_answer
 
 from study.errors import SessionError
+from study.experiment.form import asked
 from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import Protocol
 from study.experiment.simulation import simulate
@@ -20,6 +21,7 @@ from study.experiment.store.export import export, label, labels
 from study.experiment.store.frames import export_csv
 from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import begin_session
+from study.experiment.store.variables import SHARED
 from study.tasks.answer import Answer
 
 
@@ -42,8 +44,8 @@ def rows(path: Path, delimiter: str) -> list[dict[str, str]]:
 
 
 def test_psych_ds_names_and_describes_everything(tmp_path: Path, toy_protocol: Protocol, responses: Responses) -> None:
-    folder = export(toy_protocol, responses, "psych-ds", tmp_path / "out")
-    files = sorted((folder / "data").iterdir())
+    folder = export(toy_protocol, responses, "psych-ds", tmp_path / "out", {})
+    files = sorted((folder / "data").glob("*.csv"))
     assert files
     for file in files:
         assert re.fullmatch(r"([a-z]+-[A-Za-z0-9]+)(_[a-z]+-[A-Za-z0-9]+)*_data\.csv", file.name), file.name
@@ -57,6 +59,8 @@ def test_psych_ds_names_and_describes_everything(tmp_path: Path, toy_protocol: P
     for file in files:
         table = rows(file, ",")
         assert set(table[0]) <= described, file.name
+        own = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))["variableMeasured"]
+        assert [entry["name"] for entry in own] == list(table[0])
         answers += len(table) if file.name.startswith("task-") else 0
     with responses.engine.connect() as connection:
         assert answers == connection.exec_driver_sql("SELECT count(*) FROM answers").scalar()
@@ -66,7 +70,7 @@ def test_psych_ds_names_and_describes_everything(tmp_path: Path, toy_protocol: P
 def test_the_table_has_a_dictionary_beside_it_in_the_words_of_the_standards(
     tmp_path: Path, toy_protocol: Protocol, responses: Responses
 ) -> None:
-    table = rows(export_csv(responses, tmp_path / "answers.csv"), ",")
+    table = rows(export_csv(responses, tmp_path / "answers.csv", {}, asked(toy_protocol)), ",")
     columns = json.loads((tmp_path / "answers_columns.json").read_text(encoding="utf-8"))
     assert list(columns) == list(table[0])
     assert all(entry["Description"] for entry in columns.values())
@@ -74,10 +78,10 @@ def test_the_table_has_a_dictionary_beside_it_in_the_words_of_the_standards(
     for name, entry in columns.items():
         assert not entry.get("Levels") or {row[name] for row in table} <= set(entry["Levels"]), name
     sidecar = json.loads(
-        next(export(toy_protocol, responses, "bids", tmp_path / "bids").glob("sub-*/beh/*.json")).read_text()
+        next(export(toy_protocol, responses, "bids", tmp_path / "bids", {}).glob("sub-*/beh/*.json")).read_text()
     )
     assert {entry.pop("Type") for entry in columns.values()} == {"text", "number", "boolean", "time"}
-    assert {name: columns[name] for name in columns if name not in ("participant", "study")} == {
+    assert {name: columns[name] for name in SHARED if name in columns and name not in ("participant", "study")} == {
         name: entry for name, entry in sidecar.items() if name in columns
     }
 
@@ -95,11 +99,12 @@ def test_no_text_in_any_export_begins_like_a_formula(
         shown = Presentation(1, 1, "first", "x", said, 9, 9, 1.0, True)
         keep_answer(opened, record, Answer(1, "", 1, "same", 0.75), [shown])
         if kind == "csv":
-            files = [export_csv(opened, tmp_path / "answers.csv")]
+            files = [export_csv(opened, tmp_path / "answers.csv", {}, asked(toy_protocol))]
         else:
-            files = [*export(toy_protocol, opened, kind, tmp_path / "out").rglob("*.[ct]sv")]
+            files = [*export(toy_protocol, opened, kind, tmp_path / "out", {}).rglob("*.[ct]sv")]
     cells = [cell for file in files for row in rows(file, "\t" if kind == "bids" else ",") for cell in row.values()]
-    assert sum("HYPERLINK" in cell for cell in cells) >= (1 if kind == "csv" else 2)
+    # Of these, archives take only what the browser sent; BIDS has no table for it.
+    assert sum("HYPERLINK" in cell for cell in cells) >= {"csv": 1, "psych-ds": 1, "bids": 0}[kind]
     assert not [cell for cell in cells if cell.lstrip(" \ufeff")[:1] in "=+-@＝\t\r" and "HYPERLINK" in cell]
     differences = [
         row.get("difference_frames") for file in files for row in rows(file, "\t" if kind == "bids" else ",")
@@ -110,12 +115,12 @@ def test_no_text_in_any_export_begins_like_a_formula(
 def test_bids_has_a_file_a_participant_and_study_with_its_sidecar(
     tmp_path: Path, toy_protocol: Protocol, responses: Responses
 ) -> None:
-    folder = export(toy_protocol, responses, "bids", tmp_path / "out")
+    folder = export(toy_protocol, responses, "bids", tmp_path / "out", {})
     description = json.loads((folder / "dataset_description.json").read_text(encoding="utf-8"))
     assert description["BIDSVersion"] == "1.10.0"
     people = rows(folder / "participants.tsv", "\t")
-    assert [row["participant_id"] for row in people] == ["sub-sim001", "sub-sim002", "sub-ab1"]
-    assert [row["simulated"] for row in people] == ["True", "True", "False"]
+    assert [row["participant_id"] for row in people] == ["sub-p001", "sub-sim001", "sub-sim002"]
+    assert [row["simulated"] for row in people] == ["False", "True", "True"]
     assert set(people[0]) == set(json.loads((folder / "participants.json").read_text(encoding="utf-8")))
     files = sorted(folder.glob("sub-*/beh/*"))
     assert len(files) == 2 * len([file for file in files if file.suffix == ".tsv"])
@@ -127,7 +132,7 @@ def test_bids_has_a_file_a_participant_and_study_with_its_sidecar(
         assert set(table[0]) <= set(sidecar)
         assert sidecar["TaskName"] in file.name
         assert all(value != "" for row in table for value in row.values()), "BIDS writes n/a for what is missing"
-    first, second = rows(next(folder.glob("sub-ab1/beh/*.tsv")), "\t")
+    first, second = rows(next(folder.glob("sub-p001/beh/*.tsv")), "\t")
     assert (first["answer"], first["missed"], first["response_s"]) == ("n/a", "True", "n/a")
     assert (second["answer"], float(second["response_s"])) == ("same", 0.75)
 
@@ -136,13 +141,13 @@ def test_an_export_is_written_again_but_nothing_else_is_overwritten(
     tmp_path: Path, toy_protocol: Protocol, responses: Responses
 ) -> None:
     for kind in ("psych-ds", "bids", "psych-ds"):
-        folder = export(toy_protocol, responses, kind, tmp_path / "out")
+        folder = export(toy_protocol, responses, kind, tmp_path / "out", {})
     assert not list(folder.glob("sub-*"))
     other = tmp_path / "thesis"
     other.mkdir()
     (other / "chapter.txt").write_text("years of work")
     with pytest.raises(SessionError, match="expected a new or empty folder, or an earlier export of Segue"):
-        export(toy_protocol, responses, "bids", other)
+        export(toy_protocol, responses, "bids", other, {})
     assert (other / "chapter.txt").read_text() == "years of work"
     assert not list(tmp_path.glob(".*.part"))
 
@@ -152,7 +157,7 @@ def test_no_answers_are_refused(tmp_path: Path, toy_protocol: Protocol) -> None:
         open_responses(tmp_path / "empty.sqlite") as opened,
         pytest.raises(SessionError, match="expected answers to export, found none"),
     ):
-        export(toy_protocol, opened, "bids", tmp_path / "out")
+        export(toy_protocol, opened, "bids", tmp_path / "out", {})
     assert not (tmp_path / "out").exists()
 
 
@@ -181,8 +186,8 @@ def test_the_size_of_each_presentation_is_exported_with_its_meaning(
             Presentation(1, 1, "second", "y", "swap", 9, 9, 1.0, True),  # as older versions stored it
         ]
         keep_answer(opened, record, Answer(1, "", 1, "same", 0.75), shown)
-        folder = export(toy_protocol, opened, "psych-ds", tmp_path / "out")
-        bids = export(toy_protocol, opened, "bids", tmp_path / "bids")
+        folder = export(toy_protocol, opened, "psych-ds", tmp_path / "out", {})
+        bids = export(toy_protocol, opened, "bids", tmp_path / "bids", {})
     first, second = rows(folder / "data" / "description-presentations_data.csv", ",")
     assert (first["width_px"], first["height_px"], first["height_degrees"]) == ("1344.0", "756.0", "15.5")
     assert (first["px_per_cm"], second["height_px"]) == ("", "")

@@ -29,6 +29,7 @@ from study.experiment.store.answers import (
 from study.experiment.store.frames import ANSWER_COLUMNS, answers_frame, export_csv
 from study.experiment.store.responses import Responses, open_responses
 from study.experiment.store.sessions import all_sessions, begin_session, find_session, session_table
+from study.experiment.store.variables import EXPORTED
 from study.tasks.answer import Answer
 from study.tasks.trial import Trial
 
@@ -278,7 +279,7 @@ def test_csv_holds_every_showing(responses: Responses, toy_protocol: Protocol, p
     record = begin_session(responses, toy_protocol, plan)
     keep_answer(responses, record, answer(1, "same", shown_well=False))
     keep_answer(responses, record, answer(1, "different", attempt=2))
-    table = pd.read_csv(export_csv(responses, tmp_path / "answers.csv"))
-    assert tuple(table.columns) == ANSWER_COLUMNS
+    table = pd.read_csv(export_csv(responses, tmp_path / "answers.csv", {}, {}))
+    assert tuple(table.columns) == tuple(EXPORTED)
     assert list(table["attempt"]) == [1, 2]
     assert not list(tmp_path.glob("*.part"))
