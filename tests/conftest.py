@@ -53,7 +53,7 @@ class VirtualDisplay:
     def __init__(self, size: str, *options: str) -> None:
         read, write = os.pipe()
         self.server = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size}x24", "-nolisten", "tcp", *options],
+            ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size}x24", "-noreset", "-nolisten", "tcp", *options],
             pass_fds=(write,),
             stderr=subprocess.DEVNULL,
         )

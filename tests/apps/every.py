@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 import sqlalchemy as sa
+from serving import PROTOCOL
 
 from study.experiment.procedures.registry import PROCEDURES
 from study.experiment.protocol.whole import Protocol
@@ -113,6 +114,12 @@ def every_study() -> str:
     return "".join(map(study_of, TASKS)) + BESIDE
 
 
+def every_page() -> str:
+    """The same in a session with everything else that a page can be: consent, form, breaks, debriefing."""
+    head = PROTOCOL[: PROTOCOL.index("[[studies]]")].replace("answer_s = 3.0", "answer_s = 30.0\nshow_again = 0")
+    return head + every_study()
+
+
 def track(name: str, procedure: str, most_trials: int = 8) -> str:
     """A study whose task's levels are chosen by a procedure."""
     catch = 4 if 0 in OF_TASK[name].steps else 0
@@ -151,7 +158,7 @@ def check_walked(responses: Responses, protocol: Protocol) -> pd.DataFrame:
     forms = {"consent", "form", *(f"form/{study.name}" for study in protocol.studies)}
     stimuli = {}
     with open_responses("sqlite://") as simulated:
-        own = begin_session(simulated, protocol, record.plan, library=record.library)
+        own = begin_session(simulated, protocol, record.plan)
         session = open_session(protocol, record.plan, passed=forms)
         for trial, again in walk(session, respond, lambda _trial, _step: answer.shown_well):
             record_answer(simulated, own, trial, again)

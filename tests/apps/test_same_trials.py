@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 import pytest
 import sqlalchemy as sa
-from every import every_study
+from every import every_page
 from scripted import Act, ScriptedWindow, press
 from serving import PROTOCOL, Person, make_host, prepared, protocol_of, unfilmed
 from starlette.testclient import TestClient
@@ -46,7 +46,7 @@ OF_THE_ANSWER = ("answer", "missed", "correct", "chose_a", "confidence", "respon
 MARKS = ("simulated", "answered_at")
 AGE = "33"
 
-TEXT = PROTOCOL[: PROTOCOL.index("[[studies]]")] + every_study()
+TEXT = every_page()
 """Every task, kind of answer and layout; practice, attention checks, breaks, orders by group."""
 
 Read = list[tuple[str, str]]

@@ -128,13 +128,3 @@ def test_no_difference_how_sure_sliders_and_free_text(
     record = find_session(site.responses, table["participant"][0])
     assert record is not None
     assert stored_form(site.responses, record.id) == {"liking.remarks": "The feet,\nmostly."}
-
-
-def test_firefox_gives_every_kind_of_answer(make_site: Callable[..., Site], firefox_tab: Any) -> None:
-    site = make_site(ANSWERS)
-    firefox_tab.open(site.address)
-    go_on(firefox_tab)
-    table = answers(site)
-    assert list(table["answer"][:2]) == ["first", "first"]
-    assert table["confidence"].notna().sum() == 2
-    assert all(abs(int(value) - 20) <= 1 for value in table["answer"][2:])

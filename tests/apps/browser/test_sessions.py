@@ -8,17 +8,15 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-import sqlalchemy as sa
 from devtools import Tab
+from every import check_walked, every_page
 from serving import PROTOCOL, QUESTIONS, TOKEN, Site
 from walking import (
     KEPT,
-    LOOK,
-    QUEST,
     QUESTION,
     ROLES,
     SHORT,
-    STAIRCASES,
+    TRACKS,
     answers,
     check_frames,
     details,
@@ -27,15 +25,13 @@ from walking import (
     happened,
     press,
     read_on,
+    reloading,
     to_question,
 )
 
-from study.experiment.session import advanced, current, open_session
 from study.experiment.store.answers import stored_answers
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.sessions import all_sessions
-from study.experiment.store.tables import presentations
-from study.tasks.trial import PLACES
 
 pytestmark = pytest.mark.gl
 
@@ -46,79 +42,54 @@ TRIALS = 4  # of SHORT
 def test_a_whole_session_of_every_task(
     make_site: Callable[..., Site], make_tab: Callable[..., Tab], keys: bool
 ) -> None:
-    site, tab = make_site(completion_code="C0DE"), make_tab()
+    """Loaded again at every kind of question, it leaves the table that a simulation with the same answers has."""
+    site, tab = make_site(every_page(), completion_code="C0DE"), make_tab()
     tab.size(1280, 640)
     scrolled = []
+    reload = reloading(tab)
 
     def look() -> None:
         if tab.run("document.documentElement?.scrollHeight > window.innerHeight"):
             scrolled.append(tab.text())
+        reload()
 
     tab.open(site.address)
     slowest = go_on(tab, keys, on_step=look)
     assert "C0DE" in tab.text()
     assert scrolled == []
-    table = answers(site)
-    assert len(table) == QUESTIONS
-    assert set(table["task"]) == {"same-different", "preference", "rating"}
+    table = check_walked(site.responses, site.host.protocol)
+    assert set(table["role"]) == {"trial", "practice", "check"}
     assert not table["missed"].any()
     assert ((table["response_s"] > 0) & (table["response_s"] < slowest + 1)).all()
-    with site.responses.engine.connect() as connection:
-        shown = connection.execute(sa.select(presentations)).mappings().all()
-    check_frames(shown)
+    check_frames(details(site))
     display = happened(site, "display")[0]
     assert display["viewport"] == [1280, 640]
     assert display["refresh_hz"] > 10
     assert happened(site, "finished") == [{}]
 
 
-def test_reloads_lose_nothing(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
-    site, tab = make_site(SHORT), make_tab()
-    tab.open(site.address)
-    for number in range(1, 4):
-        to_question(tab)
-        press(tab, keys=True)
-        tab.wait("document.querySelector('video.now') !== null || document.querySelector('main button') !== null")
-        tab.reload()
-        # An answer that was still on its way goes out again from the page's storage.
-        tab.wait(f"({LOOK}) !== '' && !({KEPT})")
-        assert len(answers(site)) == number
-    go_on(tab)
-    table = answers(site)
-    assert len(table) == TRIALS
-    assert not table.duplicated(["trial", "item"]).any()
-
-
-@pytest.mark.parametrize("text", [STAIRCASES, QUEST], ids=["staircase", "quest-plus"])
-def test_staircases_go_on_with_the_trial_that_was_due(
-    make_site: Callable[..., Site], make_tab: Callable[..., Tab], text: str
-) -> None:
+def test_tracks_go_on_with_the_trial_that_was_due(make_site: Callable[..., Site], make_tab: Callable[..., Tab]) -> None:
     """Levels are rendered as they are due; the page is loaded again, the server started again, and every trial is the
     one that the responses before led to."""
-    site, tab = make_site(text, on_demand=True), make_tab()
+    site, tab = make_site(TRACKS, on_demand=True), make_tab()
     tab.open(site.address)
-    for number in range(6):
+    for number in range(12):
         to_question(tab)
         press(tab, which=int(number % 3 != 0))
-        eventually(lambda number=number: len(answers(site, all_attempts=True)) > number)
-        if number == 1:
+        eventually(lambda number=number: len(stored(site)) > number)
+        if number % 5 == 1:
             tab.reload()
-        if number == 3:
+        if number % 5 == 3:
             site.stop()
             site.start()
     go_on(tab)
+    table = check_walked(site.responses, site.host.protocol)
+    assert (table.groupby("study")["difference_frames"].nunique() > 2).all()
+
+
+def stored(site: Site) -> Any:
     (record,) = all_sessions(site.responses)
-    given = stored_answers(site.responses, record.id)
-    shown = {(row["trial"], row["attempt"], row["place"]): row["stimulus"] for row in details(site)}
-    for place, answer in enumerate(given):
-        state = open_session(site.host.protocol, record.plan, given[:place], passed=("debrief",))
-        while current(state).kind != "answer":
-            state = advanced(state)
-        assert (current(state).trial, current(state).attempt) == (answer.trial, answer.attempt)
-        for name, stimulus in zip(PLACES, state.trial(answer.trial).stimuli, strict=False):
-            assert shown[answer.trial, answer.attempt, name] == stimulus
-    assert current(open_session(site.host.protocol, record.plan, given, passed=("debrief",))).kind == "done"
-    assert len(set(answers(site)["difference_frames"])) > 2
+    return stored_answers(site.responses, record.id)
 
 
 def test_a_restarted_server_gets_the_answer_that_waited(

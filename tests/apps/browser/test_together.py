@@ -100,12 +100,3 @@ def test_six_films_with_sliders_and_two_beside_each_other(
     check_together(first, 6)
     check_together([row for row in shown_of(site, 2) if row["attempt"] == 1], 2)
     assert happened(site, "fault") == []
-
-
-def test_firefox_shows_several_at_once(make_site: Callable[..., Site], firefox_tab: Any) -> None:
-    site = make_site(TOGETHER)
-    firefox_tab.open(site.address)
-    go_on(firefox_tab)
-    assert set(answers(site).study) == {"page", "beside"}
-    check_together([row for row in shown_of(site, 1) if row["attempt"] == 1], 6)
-    assert happened(site, "fault") == []

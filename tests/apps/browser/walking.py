@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import sqlalchemy as sa
+from every import HEAD, track
 from serving import PROTOCOL, Site
 
 from study.experiment.store.frames import answers_frame
@@ -74,35 +75,8 @@ question = "How noticeable was the passage?"
 """
 )
 
-STAIRCASES = (
-    SHORT.replace('differences_frames = [-2, 0]\norder = "both"\n', "")
-    + """
-[studies.procedure]
-name = "staircase"
-start_frames = 3
-most_frames = 4
-steps_frames = [2, 1]
-side = "longer"
-reversals = 3
-averaged = 2
-most_trials = 10
-catch_every = 4
-"""
-)
-
-QUEST = (
-    STAIRCASES[: STAIRCASES.index("[studies.procedure]")]
-    + """
-[studies.procedure]
-name = "quest-plus"
-most_frames = 9
-threshold_frames = 3.0
-side = "longer"
-least_trials = 6
-most_trials = 8
-catch_every = 4
-"""
-)
+TRACKS = HEAD + track("same-different", "staircase") + track("yes-no", "quest-plus")
+"""Two studies whose trials follow from the answers."""
 
 # For what happens when the time to answer is over.
 HURRIED = SHORT.replace("answer_s = 20.0", "answer_s = 3.0")
@@ -189,6 +163,21 @@ def go_on(tab: Any, keys: bool = True, on_step: Any = lambda: None, at_most: int
             unasked = looked
             read_on(tab, keys)
     return slowest
+
+
+def reloading(tab: Any) -> Any:
+    """For `go_on`: at each new question the page is loaded again, in turn just after it is answered and before."""
+    seen = set()
+
+    def reload() -> None:
+        asked = tab.run("document.querySelector('h1.question')?.innerText")
+        if tab.run(LOOK) == "question" and asked not in seen:
+            seen.add(asked)
+            if len(seen) % 2:
+                press(tab)  # what is still on its way goes out again from the page's storage
+            tab.reload()
+
+    return reload
 
 
 def eventually(happens: Any, at_most: int = 60) -> None:

@@ -8,32 +8,40 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from every import HEAD, check_walked, every_study, track
 from playing import Playing
 
-from study.experiment.plan import draw_plan
 from study.experiment.protocol.whole import load_protocol
-from study.experiment.session import advanced, current, open_session
 from study.experiment.store.answers import has_event, stored_answers
-from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
 from study.experiment.store.sessions import find_session
 
 Start = Callable[..., Playing]
 
 
-def test_a_session_from_start_to_end(
-    start: Start, protocol_file: Path, tmp_path: Path, make_small: Any, texts: Any
+KEYS = "space", "s", "1", "y", "7", "Left", "Tab", "Return"
+"""What answers any question, and goes on past any page."""
+
+
+def test_a_session_of_every_task_that_is_killed_loses_nothing(
+    start: Start, protocol_file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
-    more = texts["rating"] + texts["compared"]
-    protocol_file.write_text(texts["small"] + more)
-    playing = start(protocol_file, "--participant", "p1", "--out", out, "--json")
-    playing.opened()
-    playing.press_all(("space", "s", "7", "3", "Left", "Return"), 120)
+    protocol_file.write_text(HEAD + every_study())
+    stored: set[tuple[int, str, int]] = set()
+    for answers in (3, 6, 1_000_000):
+        playing = start(protocol_file, "--participant", "p1", "--out", out, "--json")
+        playing.opened()
+        playing.press_all(KEYS, 120, answers=answers)
+        if killed := playing.running:
+            playing.kill()
+        assert not stored & set(playing.stored), "asked again"
+        stored |= set(playing.stored)
+        check_against(stored, out, "p1")
+    assert not killed
     result = json.loads(playing.ended())
     assert playing.process.returncode == 0, playing.said
     assert result["end"] == "finished"
@@ -41,23 +49,10 @@ def test_a_session_from_start_to_end(
     assert result["window"]["viewport"] == [800, 600]
     assert not result["window"]["timing_measured"]
     assert any("TIMING WAS NOT MEASURED" in line for line in playing.said)
-    small = make_small(more)
     with open_responses(out) as responses:
-        record = find_session(responses, "p1")
-        assert record is not None
-        assert not record.simulated
-        assert has_event(responses, record, "finished")
-        # The same seed gives the same trial table as a simulation's plan.
-        assert record.plan.trials == draw_plan(small.protocol, small.stimuli.pairs, "p1").trials
-        table = answers_frame(responses, all_attempts=True)
-        given = Counter((row.trial, row.item) for row in table.itertuples() if row.attempt == 1)
-        assert given == Counter(
-            (trial.trial, item)
-            for trial in record.plan.trials
-            for item in [item.name for item in small.protocol.study(trial.study).items] or [""]
-        )
-        assert set(table.answer[table.task == "same-different"]) <= {"same", "different", None}
-        assert (table.response_s.dropna() > 0).all()
+        table = check_walked(responses, load_protocol(protocol_file))
+    assert not table["simulated"].any()
+    assert (table["response_s"].dropna() > 0).all()
 
 
 def test_clicks_answer_and_closing_asks_first(start: Start, protocol_file: Path, tmp_path: Path) -> None:
@@ -165,48 +160,18 @@ def kill_again_and_again(times: int, start: Start, protocol: Path, out: Path, se
     return kills, finished + 1
 
 
-def test_a_killed_session_loses_nothing_and_goes_on(start: Start, protocol_file: Path, tmp_path: Path) -> None:
-    kills, _ = kill_again_and_again(3, start, protocol_file, tmp_path / "results")
-    assert kills == 3
-
-
-def test_a_killed_staircase_goes_on_with_the_trial_that_was_due(
-    start: Start, protocol_file: Path, texts: Any, tmp_path: Path
-) -> None:
-    small = texts["small"].replace('differences_frames = [-3, 0, 4]\norder = "both"\n', "")
-    protocol_file.write_text(small + STAIRCASE)
+def test_killed_tracks_go_on_with_the_trial_that_was_due(start: Start, protocol_file: Path, tmp_path: Path) -> None:
+    protocol_file.write_text(HEAD + track("same-different", "staircase") + track("yes-no", "quest-plus"))
     out = tmp_path / "results"
-    for answers in (3, 4, 100):
+    for answers in (3, 18, 100):
         playing = start(protocol_file, "--participant", "p1", "--out", out)
         playing.opened()
-        playing.press_all(("space", "s", "d"), 60, answers=answers)
+        playing.press_all(KEYS, 120, answers=answers)
         playing.kill() if playing.running else playing.ended()
     assert is_finished(out, "p1")
-    protocol = load_protocol(protocol_file)
     with open_responses(out) as responses:
-        record = find_session(responses, "p1")
-        assert record is not None
-        given = stored_answers(responses, record.id)
-    assert len(given) > 7
-    for place, answer in enumerate(given):
-        state = open_session(protocol, record.plan, given[:place], passed=("debrief",))
-        while (step := current(state)).kind != "answer":
-            state = advanced(state)
-        assert (step.trial, step.attempt) == (answer.trial, answer.attempt)
-    assert current(open_session(protocol, record.plan, given, passed=("debrief",))).kind == "done"
-
-
-STAIRCASE = """
-[studies.procedure]
-name = "staircase"
-start_frames = 3
-most_frames = 5
-steps_frames = [1]
-side = "longer"
-reversals = 3
-averaged = 2
-most_trials = 10
-"""
+        table = check_walked(responses, load_protocol(protocol_file))
+    assert set(table["task"]) == {"same-different", "yes-no"}
 
 
 @pytest.mark.slow
