@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from every import BESIDE, HEAD, track
 from serving import TOKEN, Person, prepared, protocol_of
 from starlette.testclient import TestClient
-from test_same_tracks import TEXTS
 
 from study.apps.server.hosting import Host
 from study.apps.server.settings import Settings
@@ -19,7 +19,7 @@ from study.experiment.stimuli.manifest import read_manifest
 from study.experiment.stimuli.rendering import RenderAhead, known_beforehand, render
 from study.experiment.store.responses import open_responses
 
-TEXT = TEXTS["quest-plus"].replace("most_frames = 5", "most_frames = 9")
+TEXT = HEAD + track("same-different", "quest-plus", most_trials=20) + BESIDE
 
 
 @pytest.fixture(scope="module")
@@ -100,8 +100,6 @@ def test_a_film_that_cannot_be_rendered_is_a_fault_and_comes_when_it_can(
 ) -> None:
     person = serving()
     view = person.until(person.begin(parameters={"participant": "p01"}), "trial")
-    while view["label"]:  # practice
-        view = after(person, view)
     folder, away = tmp_path / "stimuli", tmp_path / "away"
     with monkeypatch.context() as broken:
 
