@@ -92,9 +92,7 @@ def coarsened(fields: Mapping[str, FormField], given: Mapping[int, Mapping[str, 
 def _groups(field: FormField, values: Mapping[int, str]) -> list[tuple[str, list[int]]]:
     """Groups of people with the answer that stands for theirs."""
     if field.kind == "number":
-        values = _means({person: float(value) for person, value in values.items() if value}) | {
-            person: "" for person, value in values.items() if not value
-        }
+        values = {**values, **_means({person: float(value) for person, value in values.items() if value})}
     named = {value: [one for one in values if values[one] == value] for value in dict.fromkeys(values.values())}
     together = told_together({value: len(people) for value, people in named.items()})
     if field.kind in WRITTEN:

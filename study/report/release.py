@@ -40,13 +40,14 @@ def release(protocol: Protocol, manifest: Manifest, responses: Responses, folder
             f"{'no licence' if credit.authors else 'no author'}; add --author NAME and --licence, such as CC-BY-4.0. "
             "Choose a licence that the motions allow, too."
         )
-    if not manifest.complete:
-        missing = len(manifest.records) - len(manifest.videos)
+    films = [str(video["file"]) for video in manifest.videos.values()]
+    if missing := len(manifest.records) - sum((manifest.folder / film).is_file() for film in films):
         raise SessionError(f"{manifest.folder}: expected all stimuli rendered, found {missing} without; render first.")
     refuse_to_replace(folder)
     with whole_folder(folder) as unfinished:
-        for video in manifest.videos.values():
-            _copy(manifest.folder, unfinished, str(video["file"]))
+        for film in films:
+            (unfinished / film).parent.mkdir(exist_ok=True)
+            shutil.copyfile(manifest.folder / film, unfinished / film)
         write_whole(unfinished / PROTOCOL, protocol.text)
         known = json.loads((manifest.folder / MANIFEST).read_text(encoding="utf-8"))
         write_json(unfinished / MANIFEST, {**known, "library": Path(manifest.library).name})
@@ -55,16 +56,9 @@ def release(protocol: Protocol, manifest: Manifest, responses: Responses, folder
         write_data(shared, unfinished)
         write_report(unfinished, out=unfinished / "results")
         _write_words(shared, manifest, unfinished)
-        paths = sorted(path for path in unfinished.rglob("*") if path.is_file())
-        sums = [
-            f"{hashlib.sha256(one.read_bytes()).hexdigest()}  {one.relative_to(unfinished).as_posix()}" for one in paths
-        ]
-        write_whole(unfinished / SUMS, "\n".join(sums) + "\n")
-
-
-def _copy(source: Path, target: Path, name: str) -> None:
-    (target / name).parent.mkdir(exist_ok=True)
-    shutil.copyfile(source / name, target / name)
+        names = sorted(path.relative_to(unfinished).as_posix() for path in unfinished.rglob("*") if path.is_file())
+        sums = (f"{hashlib.sha256((unfinished / name).read_bytes()).hexdigest()}  {name}\n" for name in names)
+        write_whole(unfinished / SUMS, "".join(sums))
 
 
 def _write_words(shared: Shared, manifest: Manifest, folder: Path) -> None:
@@ -84,19 +78,15 @@ def _write_words(shared: Shared, manifest: Manifest, folder: Path) -> None:
     lines = [f"{key}: {json.dumps(text, ensure_ascii=False)}" for key, text in about.items()]
     lines += ["authors:", *(f"  - {_cited(name)}" for name in credit.authors)]
     write_whole(folder / "CITATION.cff", "\n".join(lines) + "\n")
-    readme = folder / "README.md"
-    write_whole(
-        readme,
-        readme.read_text(encoding="utf-8") + GUIDE.format(version=study.__version__, licence=credit.licence, sums=SUMS),
-    )
+    guide = GUIDE.format(version=study.__version__, licence=credit.licence, sums=SUMS)
+    write_whole(folder / "README.md", shared.readme + guide)
 
 
 def _cited(name: str) -> str:
     """An author in the words of the Citation File Format: a person where there is a comma, else a group."""
-    family, comma, given = name.partition(",")
-    if not comma:
-        return json.dumps({"name": name}, ensure_ascii=False)
-    return json.dumps({"family-names": family.strip(), "given-names": given.strip()}, ensure_ascii=False)
+    family, _, given = (part.strip() for part in name.partition(","))
+    parts = {"family-names": family, "given-names": given} if given else {"name": name}
+    return json.dumps(parts, ensure_ascii=False)
 
 
 GUIDE = """

@@ -54,33 +54,41 @@ def without_identities(
     SessionError
         Where there is no answer.
     """
-    found = {table.name: _rows(responses, table) for table in _TABLES}
-    if not (answered := {row["session_id"] for row in found["answers"]}):
+    found = {table: _rows(responses, table) for table in _TABLES}
+    if not (answered := {row["session_id"] for row in found[stored.answers]}):
         raise SessionError(f"{responses.place}: expected answers to export, found none; collect or simulate some first")
-    sessions = _renamed(
-        [row for row in _rows(responses, stored.sessions) if row["id"] in answered], shuffle or SystemRandom().shuffle
-    )
+    found[stored.form_values] = _coarse_form(protocol, found[stored.form_values])
+    sessions = [row for row in found.pop(stored.sessions) if row["id"] in answered]
+    sessions = _renamed(sessions, shuffle or SystemRandom().shuffle)
     begun = {row["id"]: row["started_at"] for row in sessions}
     numbers = {session: number for number, session in enumerate(begun, start=1)}
-    found["form_values"] = _coarse_form(protocol, found["form_values"])
 
     def copied(row: Row) -> Row:
-        session = row["session_id"]
+        session, shown = row["session_id"], "place" in row
         times = {name: BEGINNING + (at - begun[session]) for name, at in row.items() if isinstance(at, datetime)}
-        return {**{name: value for name, value in row.items() if name != "id"}, **times, "session_id": numbers[session]}
+        kept = {name: value for name, value in row.items() if name not in ("id", "detail_json")}
+        detail = json.loads(row["detail_json"] or "{}") if shown else {}  # of other tables', a browser's or a link's
+        size = {"detail_json": json.dumps({name: detail[name] for name in PRESENTATIONS if name in detail})}
+        return {**kept, **times, "session_id": numbers[session], **(size if shown else {})}
 
     with scratch_folder("export") as passing, open_responses(place or passing / "responses.sqlite") as copy:
         with alone(copy.engine) as connection:
-            tables = {stored.sessions: [{**row, "id": numbers[row["id"]], "started_at": BEGINNING} for row in sessions]}
-            for table in _TABLES:
-                tables[table] = [copied(_told(row)) for row in found[table.name] if row["session_id"] in numbers]
-            for table, kept in tables.items():
-                if kept:
+            begins = [{**row, "id": numbers[row["id"]], "started_at": BEGINNING} for row in sessions]
+            connection.execute(sa.insert(stored.sessions), begins)
+            for table, rows in found.items():
+                if kept := [copied(row) for row in rows if row["session_id"] in numbers]:
                     connection.execute(sa.insert(table), kept)
         yield copy
 
 
-_TABLES = (stored.answers, stored.answer_stimuli, stored.presentations, stored.form_values, stored.events)
+_TABLES = (
+    stored.sessions,
+    stored.answers,
+    stored.answer_stimuli,
+    stored.presentations,
+    stored.form_values,
+    stored.events,
+)
 
 
 def _rows(responses: Responses, table: sa.Table) -> list[Row]:
@@ -108,12 +116,3 @@ def _coarse_form(protocol: Protocol, rows: list[Row]) -> list[Row]:
     told = [coarsened(part, {one: said for one, said in given.items() if set(said) & set(part)}) for part in parts]
     coarse = {(person, name): value for part in told for person, said in part.items() for name, value in said.items()}
     return [{**row, "value": coarse.get((row["session_id"], row["name"]), "")} for row in rows]
-
-
-def _told(row: Row) -> Row:
-    """A row with only those of its details that `PRESENTATIONS` lists."""
-    if "detail_json" not in row:
-        return row
-    detail = json.loads(row["detail_json"] or "{}") if "stimulus" in row else {}
-    kept = {name: value for name, value in detail.items() if name in PRESENTATIONS}
-    return {**row, "detail_json": json.dumps(kept) if kept else None}

@@ -118,6 +118,14 @@ class Shared:
             f"{MADE_BY} {study.__version__}."
         )
 
+    @property
+    def readme(self) -> str:
+        """What to know before reading the tables."""
+        return (
+            f"# {self.title}\n\n{self.words}\n\nEmpty cells (n/a in BIDS): missed, or without a meaning for that task. "
+            "Rows whose `role` is not `trial` count in no analysis, nor does any but the last `attempt` of a trial.\n"
+        )
+
 
 def gather(protocol: Protocol, responses: Responses, blends: Blends, credit: Credit = NOBODY) -> Shared:
     """Read everything that is exported.
@@ -153,14 +161,15 @@ def gather(protocol: Protocol, responses: Responses, blends: Blends, credit: Cre
         participants[column] = participants["participant"].map(size.groupby(presentations["participant"]).median())
     form = {name: field for name, field in asked(protocol).items() if field.kind not in WRITTEN}
     participants = with_form(participants, responses, form)
-    variables: dict[str, Mapping[str, Variable]] = {
-        "answers": SHARED,
-        "stimuli": STIMULI,
-        "presentations": PRESENTATIONS,
-        "participants": {**PARTICIPANTS, **SHOWN_TO, **form_columns(form, COARSE)},
+    of_participants = {**PARTICIPANTS, **SHOWN_TO, **form_columns(form, COARSE)}
+    parts: dict[str, tuple[pd.DataFrame, Mapping[str, Variable]]] = {
+        "answers": (answers, SHARED),
+        "participants": (participants, of_participants),
+        "stimuli": (stimuli, STIMULI),
+        "presentations": (presentations, PRESENTATIONS),
     }
-    frames = {"answers": answers, "participants": participants, "stimuli": stimuli, "presentations": presentations}
-    return Shared(protocol, {name: safe_table(frame) for name, frame in frames.items()}, variables, credit)
+    tables = {name: safe_table(frame) for name, (frame, _) in parts.items()}
+    return Shared(protocol, tables, {name: variables for name, (_, variables) in parts.items()}, credit)
 
 
 def export(
@@ -268,14 +277,7 @@ def write_data(shared: Shared, folder: Path) -> None:
         "variableMeasured": [*measured.values()],
     }
     write_json(folder / DESCRIPTION, {key: value for key, value in description.items() if value})
-    (folder / "README.md").write_text(_readme(shared), encoding="utf-8")
-
-
-def _readme(shared: Shared) -> str:
-    return (
-        f"# {shared.title}\n\n{shared.words}\n\nEmpty cells (n/a in BIDS): missed, or without a meaning for that task. "
-        "Rows whose `role` is not `trial` count in no analysis, nor does any but the last `attempt` of a trial.\n"
-    )
+    (folder / "README.md").write_text(shared.readme, encoding="utf-8")
 
 
 # BIDS
@@ -288,7 +290,7 @@ def _write_bids(shared: Shared, folder: Path) -> None:
     credit = {"Authors": list(shared.credit.authors), "License": shared.credit.licence}
     stated = {name: value for name, value in credit.items() if value}
     write_json(folder / DESCRIPTION, {**about, "GeneratedBy": generated, **stated})
-    (folder / "README.md").write_text(_readme(shared), encoding="utf-8")
+    (folder / "README.md").write_text(shared.readme, encoding="utf-8")
     (folder / "code").mkdir()
     (folder / "code" / PROTOCOL).write_text(shared.protocol.text, encoding="utf-8")
     people = shared.tables["participants"].rename(columns={"participant": "participant_id"})

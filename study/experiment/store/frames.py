@@ -181,21 +181,15 @@ def export_parquet(responses: Responses, path: str | Path, blends: Blends, form:
         raise SessionError(
             f"Expected what writes Parquet, found none ({error}); install it: pip install arro3-core arro3-io."
         ) from error
-    table = exported_frame(responses, blends, form)
+    table = exported_frame(responses, blends, form).replace("", None)
+    kinds = {"b": core.DataType.bool(), "i": core.DataType.int64(), "f": core.DataType.float64()}
     fields, columns = [], []
     for name, variable in {**EXPORTED, **form_columns(form)}.items():
-        stored_as = given_as = {
-            "b": core.DataType.bool(),
-            "i": core.DataType.int64(),
-            "f": core.DataType.float64(),
-        }.get(table[name].dtype.kind, core.DataType.utf8())
-        values: list[Any] = [
-            None if missing or value == "" else value
-            for value, missing in zip(table[name], table[name].isna(), strict=True)
-        ]
+        given_as = stored_as = kinds.get(table[name].dtype.kind, core.DataType.utf8())
+        values = [None if missing else value for value, missing in zip(table[name], table[name].isna(), strict=True)]
         if variable.kind == "time":
             given_as, stored_as = core.DataType.int64(), core.DataType.timestamp("us", tz="UTC")
-            values = [round(datetime.fromisoformat(value).timestamp() * 1e6) for value in values]
+            values = [round(datetime.fromisoformat(str(value)).timestamp() * 1e6) for value in values]
         columns.append(core.Array(values, given_as).cast(stored_as))
         entry = {key: value if isinstance(value, str) else json.dumps(value) for key, value in variable.entry().items()}
         fields.append(core.Field(name, stored_as, metadata=entry))
