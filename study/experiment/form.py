@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from study.errors import SessionError
 from study.experiment.protocol.texts import FormField
 
-LONGEST_TEXT = 1000
-"""Characters of a text that a participant may write in the form."""
-
 if TYPE_CHECKING:
     from study.experiment.protocol.whole import Protocol
+
+LONGEST_TEXT = 1000
+"""Characters of a text that a participant may write in the form."""
 
 WRITTEN = ("text", "free-text")
 """Kinds of questions that are answered in one's own words."""

@@ -83,16 +83,12 @@ def gather(folder: Path, database: str | None = None) -> Material:
 
 def _form(responses: Responses, participants: Collection[str]) -> dict[str, tuple[str, ...]]:
     """What these participants filled in, by question."""
-    import sqlalchemy as sa
+    from study.experiment.store.frames import form_given
 
-    from study.experiment.store.responses import rows_of
-    from study.experiment.store.tables import form_values, sessions
-
-    query = sa.select(sessions.c.participant, form_values.c.name, form_values.c.value)
     found: dict[str, tuple[str, ...]] = {}
-    for row in rows_of(responses, query.join(form_values, form_values.c.session_id == sessions.c.id)):
-        if str(row["participant"]) in participants:
-            found[row["name"]] = (*found.get(row["name"], ()), str(row["value"]))
+    for (person, name), value in form_given(responses).items():
+        if person in participants:
+            found[name] = (*found.get(name, ()), value)
     return found
 
 

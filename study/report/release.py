@@ -90,15 +90,10 @@ def _cited(name: str) -> str:
 
 
 GUIDE = """
-| where | what |
-|---|---|
-| `data/`, `dataset_description.json` | answers ([Psych-DS](https://psych-ds.github.io)), and what each column means |
-| `stimuli/`, `manifest.json` | the films, and what each of them is |
-| `protocol.toml` | the study as it was planned |
-| `results/` | the report (`report.html`), its tables, figures and Methods section |
-| `responses.sqlite` | the answers as Segue reads them |
-| `LICENSE`, `CITATION.cff` | {licence}; how to cite these data |
-| `{sums}` | checksums: `sha256sum -c {sums}` |
+- `data/`: the answers; `dataset_description.json` says what each column means ([Psych-DS](https://psych-ds.github.io))
+- `stimuli/`, `manifest.json`: the films, and what each of them is; `protocol.toml`: the study as it was planned
+- `results/`: the report (`report.html`), its tables, figures and Methods section
+- `LICENSE`, `CITATION.cff`: {licence}; how to cite these data. Checksums: `sha256sum -c {sums}`
 
 To get the results again, install Segue {version} and run `segue analyse .`,
 `segue report . --out again`, or `segue fit data/TASK_data.csv` in this folder.

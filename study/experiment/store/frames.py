@@ -126,14 +126,18 @@ def with_blends(table: pd.DataFrame, blends: Blends) -> pd.DataFrame:
     return table.assign(**columns)
 
 
+def form_given(responses: Responses) -> dict[tuple[str, str], str]:
+    """What was filled into the form, by participant and question."""
+    query = sa.select(sessions.c.participant, form_values.c.name, form_values.c.value)
+    rows = rows_of(responses, query.join(form_values, form_values.c.session_id == sessions.c.id))
+    return {(row["participant"], row["name"]): row["value"] for row in rows}
+
+
 def with_form(table: pd.DataFrame, responses: Responses, form: Mapping[str, FormField]) -> pd.DataFrame:
     """A table with a participant in each row, and what they filled into the form (`variables.form_columns`)."""
     import pandas as pd
 
-    query = sa.select(sessions.c.participant, form_values.c.name, form_values.c.value)
-    rows = rows_of(responses, query.join(form_values, form_values.c.session_id == sessions.c.id))
-    said = {(row["participant"], row["name"]): row["value"] for row in rows}
-    columns = {}
+    said, columns = form_given(responses), {}
     for name, field in form.items():
         values = pd.Series([said.get((person, name)) for person in table["participant"]], table.index, dtype="str")
         columns[f"form_{name}"] = pd.to_numeric(values, errors="coerce") if field.kind == "number" else values
