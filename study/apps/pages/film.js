@@ -80,7 +80,7 @@ function once(target, good, milliseconds, what) {
   });
 }
 
-async function seek(video, seconds) {
+export async function seek(video, seconds) {
   const there = once(video, "seeked", STALL_MS, `frame at ${seconds.toFixed(2)} s`);
   video.currentTime = seconds;
   await there;

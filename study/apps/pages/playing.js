@@ -69,14 +69,6 @@ export class Frames {
   }
 }
 
-// Back to the first frame, and there before anything is played.
-export function rewind(video) {
-  return new Promise((resolve) => {
-    video.addEventListener("seeked", resolve, { once: true });
-    video.currentTime = 0;
-  });
-}
-
 // Plays a loaded film once; resolves with how it was shown.
 export function play(video, film, fps) {
   return new Promise((resolve, reject) => {
@@ -119,6 +111,8 @@ export function play(video, film, fps) {
   });
 }
 
+export const median = (values) => [...values].sort((one, other) => one - other)[Math.floor(values.length / 2)];
+
 // The display's refresh rate, from the time between animation frames; null where it can't be determined.
 export function refreshRate(samples = 40) {
   return new Promise((resolve) => {
@@ -131,8 +125,7 @@ export function refreshRate(samples = 40) {
         return;
       }
       clearTimeout(timer);
-      const steps = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
-      const middle = steps[Math.floor(steps.length / 2)];
+      const middle = median(times.slice(1).map((time, i) => time - times[i]));
       resolve(middle > 0 ? Math.round(10000 / middle) / 10 : null);
     };
     requestAnimationFrame(tick);

@@ -3,8 +3,8 @@
 import { attend, faults, filmsOn, unseen, visible } from "./attention.js";
 import { fromHex, surround } from "./colours.js";
 import { ask, drawn, element, heading, secondClick, show, sleep, status } from "./dom.js";
-import { FilmFault, forget, load, loadAhead, release } from "./film.js";
-import { play, rewind } from "./playing.js";
+import { FilmFault, forget, load, loadAhead, release, seek } from "./film.js";
+import { median, play } from "./playing.js";
 import { tell } from "./server.js";
 import { cellSize, stage } from "./sizes.js";
 
@@ -97,7 +97,7 @@ const MOST_APART = 1; // frames between films that start together
 async function together(view, videos, restarts) {
   for (const video of videos) video.classList.add("now");
   await drawn();
-  if (videos.some((video) => video.currentTime > 0)) await Promise.all(videos.map(rewind));
+  if (videos.some((video) => video.currentTime > 0)) await Promise.all(videos.map((video) => seek(video, 0)));
   const all = await Promise.all(videos.map((video, at) => play(video, view.films[at], view.fps)));
   if (restarts && unseen()) throw new Unseen();
   const began = all.map(({ times_ms, frames }) => median(times_ms.map((time, at) => time - (frames[at] * 1000) / view.fps).slice(1)));
@@ -106,10 +106,6 @@ async function together(view, videos, restarts) {
   const close = apart.every((frames) => frames === null || frames <= MOST_APART);
   const shown = all.map(({ last, ...how }, at) => ({ slot: view.films[at].slot, ...how, apart_frames: apart[at], shown_well: how.shown_well && close }));
   return { shown, last: Math.max(...all.map((one) => one.last)) };
-}
-
-function median(values) {
-  return values.length ? [...values].sort((one, other) => one - other)[Math.floor(values.length / 2)] : NaN;
 }
 
 async function showFilms(view, study, { restarts, pauseOver, onFault }) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from serving import Site
 from test_pages import CONTRASTS, LAPTOP
 from walking import LOOK, SHORT, answers, go_on, read_on, slide
 
-from study.experiment.store.answers import stored_form
+from study.experiment.store.answers import stored_answers, stored_form
 from study.experiment.store.sessions import find_session
 
 pytestmark = pytest.mark.gl
@@ -98,13 +99,16 @@ def test_no_difference_how_sure_sliders_and_free_text(
         to(tab, "document.querySelectorAll('button.answer:not(.point)').length === 3")
         if trial == 1:
             looked_at(tab, "equal")
+        time.sleep(1.0)
         tab.key("0" if trial == 1 else "2")
-        tab.wait("document.body.innerText.includes('How sure')")
+        chosen_s = time.monotonic()
+        tab.wait("document.body.innerText.includes('How sure')", every=0.01)
         if trial == 1:
             looked_at(tab, "sure")
             tab.reload()  # the films come again, then the question that is left
             to(tab, "document.body.innerText.includes('How sure')")
         tab.key(str(trial))
+        sure_s = time.monotonic() - chosen_s
     tab.wait("!!document.querySelector('textarea')")
     looked_at(tab, "free-text")
     tab.run("document.querySelector('textarea').value = 'The feet,\\nmostly.'")
@@ -127,4 +131,8 @@ def test_no_difference_how_sure_sliders_and_free_text(
     ] * 2
     record = find_session(site.responses, table["participant"][0])
     assert record is not None
+    # A further question is timed from when it was asked, not from the end of the films.
+    choice, sure = (answer for answer in stored_answers(site.responses, record.id) if answer.trial == 2)
+    assert sure.response_s < sure_s
+    assert choice.response_s > 1.0
     assert stored_form(site.responses, record.id) == {"liking.remarks": "The feet,\nmostly."}
