@@ -21,6 +21,8 @@ from renderer.jobs import RenderJob, render_many
 from renderer.workers import Workers, run_jobs
 from study.motion.clip import joint_positions
 from study.motion.synthetic import synthesize
+from study.transitions.one_hop.build import build_table
+from study.transitions.one_hop.problem import Alignment, Problem, Settings, Switch
 
 ROOT = Path(__file__).parents[1]
 PROGRAM = """
@@ -82,6 +84,17 @@ def test_films_come_back_as_bytes_and_are_those_of_one_process_and_of_two(cluste
         made[name] = [(one.frames_sha256, one.file_sha256) for one in videos]
     assert len(set(made["one"])) == 5
     assert made["one"] == made["two"] == made["dask"]
+
+
+def test_one_hop_tables_are_those_of_one_process(cluster: str) -> None:
+    clips = tuple(synthesize(name, seconds=3, fps=30.0) for name in ("walk", "box", "run"))
+    switches = tuple(Switch(a, b, Alignment(offset=0)) for a in range(3) for b in range(3) if a != b)
+    problem = Problem(clips, switches, Settings.at(30.0), 1000)
+    # On a cluster the bound is for each worker, so the products are cut up as for one.
+    alone, far = (build_table(problem, workers=where) for where in (1, cluster))
+    assert sha256(alone.entries.tobytes()).digest() == sha256(far.entries.tobytes()).digest()
+    assert alone.costs.tobytes() == far.costs.tobytes()
+    assert (alone.entries[:, 0] >= 0).sum() > 200
 
 
 def test_a_wrong_address_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from renderer.workers import cores
 from study.arrays import CountArray
 from study.errors import TransitionError
 from study.motion import quaternions as quat
 from study.motion.clip import Clip, joint_positions
 from study.motion.skeleton import Skeleton
-from study.transitions.one_hop import build, jobs
+from study.transitions.one_hop import build, jobs, plan
 from study.transitions.one_hop.parts import part_weights
 from study.transitions.one_hop.problem import (
     Alignment,
@@ -256,7 +257,7 @@ def test_pieces_of_hops_in_any_order_on_two_workers_change_nothing(seed: int, mo
             for start in range(job.start, job.stop, 7)
         ]
         np.random.default_rng(k).shuffle(pieces)  # type: ignore[arg-type]
-        monkeypatch.setattr(build, "make_jobs", lambda *_, pieces=pieces: tuple(pieces))
+        monkeypatch.setattr(plan, "make_jobs", lambda *_, pieces=pieces: tuple(pieces))
         assert_same_as_exhaustive(problem, costs, workers=2)
 
 
@@ -298,8 +299,8 @@ def test_real_distances_never_cost_more_than_direct_and_a_memory_bound_changes_n
     assert known.sum() > 200
     assert (whole.costs[known] <= whole.direct_costs[known]).all()
     assert (whole.costs[known] < whole.direct_costs[known]).mean() > 0.5
-    monkeypatch.setattr(build, "make_jobs", lambda given, _: jobs.make_jobs(given, 40_000))
-    assert len(build.make_jobs(problem, 0)) > 10
+    monkeypatch.setattr(plan, "make_jobs", lambda given, _: jobs.make_jobs(given, 40_000))
+    assert len(plan.make_jobs(problem, 0)) > 10
     pieces = build.build_table(problem)
     assert np.array_equal(np.isfinite(pieces.costs), np.isfinite(whole.costs))
     some = np.isfinite(whole.costs)
@@ -335,9 +336,10 @@ def test_work_goes_on_after_an_interruption(tmp_path: Path, monkeypatch: pytest.
 def test_a_checkpoint_of_another_problem_is_left_aside(tmp_path: Path) -> None:
     checkpoint = tmp_path / "work.npz"
     first, second = moving_problem(Alignment(offset=0)), moving_problem(Alignment(offset=0), weight=1e-3)
-    state = build._State(first, jobs.make_jobs(first, 2**30))
+    (block,) = plan.make_blocks(first, build.MEMORY_BYTES, cores())
+    state = build._State(first, block.jobs, {})
     state.done[:] = True
-    state.write(checkpoint, build._fingerprint(first, jobs.make_jobs(first, build.MEMORY_BYTES)))
+    state.write(checkpoint, build._fingerprint(first, (block,)), 0)
     assert np.array_equal(build.build_table(second, checkpoint=checkpoint).entries, build.build_table(second).entries)
 
 

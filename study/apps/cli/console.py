@@ -79,7 +79,9 @@ def together(*options: Callable[[Any], Any]) -> Callable[[Command], Command]:
 def workers_options(verb: Command) -> Command:
     """Adds `--workers` and `--cluster`, of which one may be given; the verb is handed it as `workers`."""
 
-    @click.option("--workers", type=click.IntRange(min=1), help="Number of processes (default: one a core).")
+    @click.option(
+        "--workers", type=click.IntRange(min=1), help="Number of workers on this machine (default: one a core)."
+    )
     @click.option(
         "--cluster",
         metavar="ADDRESS",

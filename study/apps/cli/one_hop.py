@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.apps.cli.clips import clips_options, find_entry, load_clip
-from study.apps.cli.console import FILE, READABLE, emit, json_option, progress, say, together
+from study.apps.cli.console import FILE, READABLE, emit, json_option, progress, say, together, workers_options
 from study.counting import counted
 
 if TYPE_CHECKING:
@@ -98,7 +98,10 @@ search_options = together(
 @one_hop.command()
 @click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
 @search_options
-@click.option("--out", type=FILE, required=True, help="File to write: X.npz, or X.bin with X.json, for engines.")
+@click.option(
+    "--out", type=FILE, help="File to write: X.npz, or X.bin with X.json, for engines (default: none, with --plan)."
+)
+@click.option("--plan", is_flag=True, help="Only say what the build will take: operations, memory, processor time.")
 @click.option(
     "--pair", "pairs", type=(str, str), multiple=True, metavar="SRC DST", help="A transition to build (default: all)."
 )
@@ -138,9 +141,9 @@ search_options = together(
     help="The hop is DST itself, shifted by at most this many frames (default: any hop).",
 )
 @click.option("--runs", is_flag=True, help="X.bin holds neighbouring entries together, without loss.")
-@click.option("--workers", type=click.IntRange(min=1), help="Number of threads (default: one a core).")
+@workers_options
 @json_option
-def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **options: Any) -> None:
+def build(clips: tuple[str, ...], library: str | None, out: Path | None, fps: float, **options: Any) -> None:
     """Find the best transition between clips for every triggered frame, and write a table of them.
 
     Every clip may be a hop. The same command resumes an interrupted build.
@@ -151,15 +154,20 @@ def build(clips: tuple[str, ...], library: str | None, out: Path, fps: float, **
     from study.transitions.one_hop.runs import to_runs
     from study.transitions.one_hop.table import write_table
 
-    if out.suffix not in (".npz", ".bin", ".json"):
+    if out is None and not options["plan"]:
+        raise click.UsageError("expected --out, the file to write, or --plan, found neither; give one.")
+    if out is not None and out.suffix not in (".npz", ".bin", ".json"):
         raise click.UsageError(f"expected --out as a name that ends in .npz, .bin or .json, found {str(out)!r}.")
-    if options["runs"] and out.suffix == ".npz":
+    if options["runs"] and out is not None and out.suffix == ".npz":
         raise click.UsageError("expected --out X.bin with --runs; .npz holds every entry, with its costs.")
     loaded = load_clips(clips, library, fps)
-    check_place(out)
     options["known_beats"] = known_beats(clips, library, loaded)
     options["genres"] = [find_entry(spec, library)[1].kind for spec in clips]
-    table = built(loaded, out, options)
+    if out is None or options["plan"]:
+        _tell_plan(asked(loaded, {**options, "weight": options["weight"] or 0.0}), options)
+        return
+    check_place(out)
+    table = built(asked(loaded, options), out, options)
     files = write_table(table, out, as_runs=options["runs"])
     size = to_runs(table.entries).nbytes if options["runs"] else table.entries.nbytes
     both = np.isfinite(table.costs) & np.isfinite(table.direct_costs)
@@ -209,13 +217,12 @@ def settings_of(fps: float, options: dict[str, Any]) -> Settings:
     return Settings(blend, stay, stay, None if longest is None else longest - 2 * blend, lengths)
 
 
-def built(clips: tuple[Clip, ...], out: Path, options: dict[str, Any]) -> OneHopTable:
+def asked(clips: tuple[Clip, ...], options: dict[str, Any]) -> Problem:
     """The search of the paper, with the variants that leave its structure as it is."""
     from dataclasses import replace
 
     from study.transitions.one_hop.adaptive import adaptive
     from study.transitions.one_hop.beats import genre_costs
-    from study.transitions.one_hop.build import build_table
 
     if options["adaptive"] and options["longest"]:
         raise click.UsageError("expected no --longest with --adaptive; it bounds both stays, whatever the blends take.")
@@ -225,14 +232,45 @@ def built(clips: tuple[Clip, ...], out: Path, options: dict[str, Any]) -> OneHop
     genre = options["genre"]
     costs = {} if genre is None else genre_costs(options["genres"], genre[0], genre[1], problem.distance)
     problem = replace(problem, offsets=offsets, hop_costs=costs, nearest_to_direct=options["near_direct"])
+    return adaptive(problem) if options["adaptive"] else problem
+
+
+def built(problem: Problem, out: Path, options: dict[str, Any]) -> OneHopTable:
+    """The table, with progress on standard error."""
+    from study.transitions.one_hop.build import build_table
+
     with progress("hops") as report:
         return build_table(
-            adaptive(problem) if options["adaptive"] else problem,
+            problem,
             workers=options["workers"],
             memory_bytes=memory_of(options),
             checkpoint=out.with_name(f"{out.stem}.unfinished.npz"),
             progress=lambda done, total: report(done / total, f"{done} of {total}"),
         )
+
+
+def _tell_plan(problem: Problem, options: dict[str, Any]) -> None:
+    from dataclasses import asdict
+
+    from renderer.workers import cores
+    from study.transitions.one_hop.plan import plan
+
+    workers = options["workers"] if isinstance(options["workers"], int) else cores()
+    found = plan(problem, memory_of(options), workers)
+    held, clips, block, table = (
+        f"{size / 2**30:.2f} GB" for size in (found.peak_bytes, found.clips_bytes, found.block_bytes, found.table_bytes)
+    )
+    place = "in memory too" if found.blocks == 1 else "on the disk"
+    emit(
+        {**asdict(found), "peak_bytes": found.peak_bytes, "workers": workers},
+        f"{counted(found.clips, 'clip')}, {counted(found.transitions, 'transition')}, "
+        f"{counted(found.triggered_frames, 'triggered frame')}\n"
+        f"work: {found.window_pairs:.3g} distances, {found.sums:.3g} sums, in {counted(found.jobs, 'job')} of "
+        f"{counted(found.blocks, 'block')}\n"
+        f"memory: {held} at most, without the program itself: clips {clips}, a block with {counted(workers, 'worker')} "
+        f"{block}; the table is {table}, {place}\n"
+        f"time: {found.core_s:.3g} s of processor, by a trial on this machine; the weight of Eq. 5 is not counted",
+    )
 
 
 def memory_of(options: dict[str, Any]) -> int:

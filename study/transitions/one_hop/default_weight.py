@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from renderer.workers import Where
 from study.counting import counted
 from study.errors import TransitionError
 from study.motion.clip import Clip
@@ -39,7 +40,7 @@ def default_weight(
     conditions: int = CONDITIONS,
     settings: Settings | None = None,
     distance: Distance | None = None,
-    workers: int | None = None,
+    workers: Where = None,
     memory_bytes: int = MEMORY_BYTES,
 ) -> DefaultWeight:
     """The weight of Eq. 5 for a set of clips.

@@ -8,7 +8,7 @@ don't depend on each other, so they run in any order, on any number of cores or 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 
 from study.arrays import CountArray, IntArray
 from study.transitions.one_hop import search
-from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem, Switch
+from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem, Settings, Switch
 from study.transitions.one_hop.search import Best, Table
 
 
@@ -51,11 +51,7 @@ def make_jobs(problem: Problem, memory_bytes: int) -> tuple[Job, ...]:
     The cost of the direct transition, known from the destination as hop, saves much of the work for the others.
     """
     blends = problem.settings.blends
-    rows = sum(max(clip.frames - blend + 1, 0) for clip in _used_clips(problem) for blend in blends)
-    longest = max((clip.frames for clip in problem.clips), default=0)
-    overhang = blends[-1] + problem.settings.longest_stay_hop
-    # Matrices of all clips in use, then a second leg, a masked first leg, and what sums and bounds take.
-    width = max(16, memory_bytes // (4 * (rows + 4 * longest)) - overhang)
+    width = max(16, memory_bytes // bytes_a_column(problem, _ends(problem)) - overhang(problem.settings))
     jobs = []
     destinations = {switch.destination for switch in problem.switches}
     for hop in sorted(problem.hop_numbers, key=lambda number: (number not in destinations, number)):
@@ -66,12 +62,47 @@ def make_jobs(problem: Problem, memory_bytes: int) -> tuple[Job, ...]:
     return tuple(jobs)
 
 
-def _used_clips(problem: Problem) -> list[Any]:
-    numbers = {number for switch in problem.switches for number in (switch.source, switch.destination)}
-    return [problem.clips[number] for number in sorted(numbers)]
+def overhang(settings: Settings) -> int:
+    """How many frames of the hop a job needs beyond its own."""
+    return settings.blends[-1] + settings.longest_stay_hop
 
 
-def run_job(problem: Problem, prepared: Sequence[Any], job: Job, limits: Mapping[int, Best]) -> list[Found]:
+def bytes_a_column(problem: Problem, clips: Iterable[int]) -> int:
+    """The memory of a job for each frame of the hop, where transitions have these sources and destinations.
+
+    Matrices of all these clips, then a second leg, a masked first leg, and what sums and bounds take.
+    """
+    return 4 * (_windows(problem, clips) + 4 * max((clip.frames for clip in problem.clips), default=0))
+
+
+def _windows(problem: Problem, clips: Iterable[int]) -> int:
+    return sum(max(problem.clips[n].frames - blend + 1, 0) for n in clips for blend in problem.settings.blends)
+
+
+def _ends(problem: Problem) -> list[int]:
+    """The clips that are sources or destinations."""
+    return sorted({number for switch in problem.switches for number in (switch.source, switch.destination)})
+
+
+def prepared_for(problem: Problem, jobs: Iterable[Job]) -> dict[int, Any]:
+    """`distance.prepare` of the clips that these jobs need, by number."""
+    needed = {*_ends(problem), *(job.hop for job in jobs)}
+    return {n: problem.distance.prepare(problem.clips[n], problem.settings.blend_frames) for n in sorted(needed)}
+
+
+def work_a_column(problem: Problem) -> tuple[int, int, int]:
+    """For each frame of a hop, at most: windows to compare it with, second legs, and sums of two legs."""
+    settings, blends = problem.settings, len(problem.settings.blends)
+    stays = {True: 1, False: settings.longest_stay_source + 1}
+    second = [
+        problem.clips[number].frames + settings.longest_stay_hop if alignment.offset is not None else stays[False]
+        for number, alignment in _by_destination(problem)
+    ]
+    sums = sum(len(problem.triggers(one)) * stays[one.alignment.offset is not None] for one in problem.switches)
+    return _windows(problem, _ends(problem)), blends * sum(second), blends * sums
+
+
+def run_job(problem: Problem, prepared: Mapping[int, Any], job: Job, limits: Mapping[int, Best]) -> list[Found]:
     """What a job finds, by switch and length of the first blend.
 
     Parameters
@@ -79,12 +110,12 @@ def run_job(problem: Problem, prepared: Sequence[Any], job: Job, limits: Mapping
     problem, job
         What to do.
     prepared
-        `distance.prepare` of each clip.
+        `prepared_for` this job, or others as well.
     limits
         The best known so far, by switch: only what may beat it needs to be found. Older knowledge does no harm.
     """
     blends = problem.settings.blends
-    legs = {blend: _legs(problem, prepared, job, blend) for blend in blends}
+    legs = {blend: legs_to_hop(problem, prepared, job, blend) for blend in blends}
     groups = _by_destination(problem)
     to_hop = {clip: _to_hop(problem, {blend: legs[blend][clip] for blend in blends}) for clip, _ in groups}
     found: list[Found] = []
@@ -98,10 +129,10 @@ def run_job(problem: Problem, prepared: Sequence[Any], job: Job, limits: Mapping
     return found
 
 
-def _legs(problem: Problem, prepared: Sequence[Any], job: Job, blend: int) -> dict[int, Table]:
+def legs_to_hop(problem: Problem, prepared: Mapping[int, Any], job: Job, blend: int) -> dict[int, Table]:
     """Costs of blends of one length between each clip in use (rows) and the hop (columns)."""
     settings, hop_windows = problem.settings, problem.clips[job.hop].frames - blend + 1
-    last = min(job.stop + settings.blends[-1] + settings.longest_stay_hop, hop_windows)
+    last = min(job.stop + overhang(settings), hop_windows)
     columns = range(job.start, max(job.start, last))
     legs = {}
     for number, rows in _needed_rows(problem, blend).items():

@@ -18,16 +18,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.arrays import CountArray, FloatArray
 from study.errors import TransitionError
 from study.files import whole_file, write_whole
-from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem
+from study.transitions.one_hop.problem import FORBIDDEN, Alignment, Problem, Switch
 from study.transitions.one_hop.runs import KINDS, from_runs, to_runs
 from study.transitions.one_hop.search import Best
 
 FORMAT, VERSION = "segue one-hop table", 1
 VERSION_OF_RUNS = 2
+_ROWS_AT_ONCE = 2**20
 COLUMNS = ("hop", "offset", "stay_source", "stay_hop")
 # Two more where each transition has blend lengths of its own.
 BLEND_COLUMNS = ("blend_first", "blend_second")
@@ -129,21 +131,32 @@ class OneHopTable:
         return self.clips[number] if 0 <= number < len(self.clips) else f"clip {number}"
 
 
-def table_of(problem: Problem, best: Mapping[int, Best], direct: Mapping[int, CountArray]) -> OneHopTable:
-    """The table of what a search found, by the switches' numbers."""
-    rows, entries, costs, directs = [], [], [], []
-    first_entry = 0
-    for number, switch in enumerate(problem.switches):
-        triggers, found = problem.triggers(switch), best[number]
-        offset = np.arange(triggers.start, triggers.stop) + found.stay_source - found.frame
-        columns = [found.hop, offset, found.stay_source, found.stay_hop]
-        if problem.settings.lengths:
-            columns += [found.blend_first, found.blend_second]
-        entry = np.stack(columns, axis=1)
-        entry[found.hop < 0] = (-1, *(0,) * (len(columns) - 1))
-        entries.append(entry.astype(np.int32))
-        costs.append(_in_units(found.cost, problem.distance.unit))
-        directs.append(_in_units(direct[number], problem.distance.unit))
+def kind_of(problem: Problem) -> np.dtype[Any]:
+    """How a triggered frame is held while a table is built: its entry and both costs."""
+    integers = len(COLUMNS) + (len(BLEND_COLUMNS) if problem.settings.lengths else 0)
+    return np.dtype([("entry", np.int32, (integers,)), ("cost", np.float64), ("direct_cost", np.float64)])
+
+
+def filled(problem: Problem, switch: Switch, found: Best, direct: CountArray) -> NDArray[Any]:
+    """The triggered frames of a transition, `(n,)` of `kind_of`, from what a search found."""
+    triggers, out = problem.triggers(switch), np.empty(len(found.hop), dtype=kind_of(problem))
+    offset = np.arange(triggers.start, triggers.stop) + found.stay_source - found.frame
+    columns = [found.hop, offset, found.stay_source, found.stay_hop]
+    if problem.settings.lengths:
+        columns += [found.blend_first, found.blend_second]
+    entry = out["entry"]
+    entry[:] = np.stack(columns, axis=1)
+    entry[found.hop < 0] = (-1, *(0,) * (len(columns) - 1))
+    out["cost"] = _in_units(found.cost, problem.distance.unit)
+    out["direct_cost"] = _in_units(direct, problem.distance.unit)
+    return out
+
+
+def table_of(problem: Problem, found: NDArray[Any]) -> OneHopTable:
+    """The table of all transitions, one after another, `(n,)` of `kind_of`."""
+    rows, first_entry = [], 0
+    for switch in problem.switches:
+        triggers = problem.triggers(switch)
         rows.append(
             Row(switch.source, switch.destination, switch.alignment, triggers.start, len(triggers), first_entry)
         )
@@ -154,9 +167,9 @@ def table_of(problem: Problem, best: Mapping[int, Best], direct: Mapping[int, Co
         problem.clips[0].fps,
         problem.settings.blend_frames,
         tuple(rows),
-        np.concatenate(entries) if entries else np.zeros((0, 4), dtype=np.int32),
-        np.concatenate(costs) if costs else np.zeros(0),
-        np.concatenate(directs) if directs else np.zeros(0),
+        found["entry"],
+        found["cost"],
+        found["direct_cost"],
         problem.weight * problem.distance.unit,
         problem.distance.words,
     )
@@ -207,7 +220,9 @@ def write_table(table: OneHopTable, path: Path, *, as_runs: bool = False) -> tup
         content = to_runs(table.entries)
         own = {"version": VERSION_OF_RUNS, "runs": len(content), "bytes": int(content.size * 4), "kinds": KINDS}
         text = json.dumps({**header(table), **own}, indent=2)
-    write_whole(flat, content.astype("<i4").tobytes())
+    with whole_file(flat) as unfinished, unfinished.open("wb") as file:
+        for at in range(0, len(content), _ROWS_AT_ONCE):
+            file.write(content[at : at + _ROWS_AT_ONCE].astype("<i4").tobytes())
     write_whole(words, text)
     return flat, words
 
