@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from functools import partial
 from pathlib import Path
 
 import calibration_psychometric as psychometric
@@ -24,6 +25,7 @@ import pandas as pd
 from scipy.special import ndtr
 from scipy.stats import beta
 
+from renderer.workers import run_jobs
 from study.analysis.preference.participants import participant_tests
 from study.analysis.preference.published import published_test
 from study.analysis.psychometric.analyse import analyse_psychometric
@@ -103,9 +105,10 @@ def run_psychometric(options):
     if "prior" in options.cells:
         for task in ("2afc", "yes-no"):
             kept.add([psychometric.run_prior(task, options.studies, options.seed)], columns)
-    for cell in chosen(PSYCHOMETRIC, wanted, psychometric.drawn_cells) if wanted or not options.cells else ():
-        if not kept.has(cell.name, options.studies, options.seed):
-            kept.add([psychometric.run(cell, options.studies, options.seed, options.profile)], columns)
+    cells = chosen(PSYCHOMETRIC, wanted, psychometric.drawn_cells) if wanted or not options.cells else ()
+    run = partial(psychometric.run, studies=options.studies, seed=options.seed, profile=options.profile)
+    for row in done(run, cells, kept, options):
+        kept.add([row], columns)
 
 
 def run_same_different(options):
@@ -113,9 +116,15 @@ def run_same_different(options):
                ("sd", 6), ("se", 6), ("covers", 6), ("error", 6), ("open", 6), ("ms mixed", 8)]  # fmt: skip
     head(columns)
     kept = Kept(options.out)
-    for group in chosen(SAME_DIFFERENT, options.cells):
-        if not kept.has(group.name, options.studies, options.seed):
-            kept.add(same_different.run(group, options.studies, options.seed), columns)
+    run = partial(same_different.run, studies=options.studies, seed=options.seed)
+    for rows in done(run, chosen(SAME_DIFFERENT, options.cells), kept, options):
+        kept.add(rows, columns)
+
+
+def done(run, cells, kept, options):
+    """What cells give that were not run before, as they finish."""
+    todo = [cell for cell in cells if not kept.has(cell.name, options.studies, options.seed)]
+    return (found for _, found in run_jobs(run, todo, options.cluster or options.workers))
 
 
 def run_preference(options):
@@ -228,6 +237,8 @@ if __name__ == "__main__":
     parser.add_argument("--studies", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--profile", action="store_true", help="profile-likelihood intervals too (psychometric; slow)")
+    parser.add_argument("--workers", type=int, default=1, help="processes for cells")
+    parser.add_argument("--cluster", help="a Dask scheduler, whose workers have this folder on their PYTHONPATH")
     parser.add_argument("--out", help="a file of JSON lines to which rows are added")
     asked = parser.parse_args()
     PARTS[asked.part](asked)

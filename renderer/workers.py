@@ -127,8 +127,8 @@ class Workers:
 
     @property
     def count(self) -> int:
-        """How many jobs are done at a time."""
-        return self._local or max(sum(self._client.nthreads().values()), 1)
+        """How many jobs keep the workers at work; on a cluster two a thread, since they and their results travel."""
+        return self._local or max(2 * sum(self._client.nthreads().values()), 1)
 
     def submit(self, function: Callable[[Job], Result], job: Job) -> Future[Result]:
         """One job; the future raises what the job raises, and `BrokenExecutor` where its process was killed."""

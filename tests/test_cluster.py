@@ -19,8 +19,12 @@ from renderer.figure import make_figure
 from renderer.framing import frame_group
 from renderer.jobs import RenderJob, render_many
 from renderer.workers import Workers, run_jobs
+from study.experiment.protocol.whole import find_protocol, load_protocol
+from study.experiment.stimuli.prepare import prepare
 from study.motion.clip import joint_positions
+from study.motion.library import open_library
 from study.motion.synthetic import synthesize
+from study.power.planned import plan_power
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.problem import Alignment, Problem, Settings, Switch
 
@@ -95,6 +99,18 @@ def test_one_hop_tables_are_those_of_one_process(cluster: str) -> None:
     assert sha256(alone.entries.tobytes()).digest() == sha256(far.entries.tobytes()).digest()
     assert alone.costs.tobytes() == far.costs.tobytes()
     assert (alone.entries[:, 0] >= 0).sum() > 200
+
+
+def test_power_is_that_of_one_process(cluster: str) -> None:
+    protocol = load_protocol(find_protocol("demo"))
+    study = next(one for one in protocol.studies if one.task == "preference")
+    pairs = prepare(protocol, open_library("synthetic")).pairs
+    alone, far = (
+        plan_power(protocol, study, pairs, [6, 20], {"studies": 600, "share": 0.7}, workers=where)
+        for where in (1, cluster)
+    )
+    assert alone == far
+    assert alone.points[0].found < alone.points[1].found
 
 
 def test_a_wrong_address_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from renderer.workers import Where, run_jobs
 from study.analysis.estimates import Interval, wilson_interval
-from study.arrays import BoolArray
+from study.arrays import BoolArray, IntArray
 from study.counting import counted
 from study.errors import AnalysisError
 
@@ -56,6 +58,7 @@ def power_curve(
     target: float = 0.8,
     seed: int = 0,
     at_once: int = 1,
+    workers: Where = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Power:
     """Simulate studies and count those that find what is there.
@@ -73,6 +76,8 @@ def power_curve(
         Power asked for.
     seed, at_once
         The same seed and number of studies at once give the same numbers.
+    workers
+        Processes or the address of a Dask scheduler, as `renderer.workers.run_jobs` takes them; `run` is sent to them.
 
     Raises
     ------
@@ -85,17 +90,25 @@ def power_curve(
     if studies < 1 or not 0 < target < 1:
         raise AnalysisError(f"expected studies from 1 on and a power between 0 and 1, found {studies} and {target:g}")
     found = np.zeros(len(wanted), dtype=int)
-    for done in range(0, studies, at_once):
-        count = min(at_once, studies - done)
-        found += run(np.random.default_rng([seed, done]), count, wanted).sum(axis=0)
+    batches = [(first, min(at_once, studies - first)) for first in range(0, studies, at_once)]
+    done = 0
+    for number, told in run_jobs(partial(_batch, run, wanted, seed), batches, workers):
+        found += told
+        done += batches[number][1]
         if progress:
-            progress(done + count, studies)
+            progress(done, studies)
     points = tuple(
         PowerPoint(size, int(count), studies, count / studies, wilson_interval(int(count), studies))
         for size, count in zip(wanted, found, strict=True)
     )
     needed, note = _needed(points, target)
     return Power(points, target, needed, note)
+
+
+def _batch(run: Run, sizes: Sequence[int], seed: int, batch: tuple[int, int]) -> IntArray:
+    """How many studies of a batch (its first, and how many) found it, by size."""
+    first, count = batch
+    return np.asarray(run(np.random.default_rng([seed, first]), count, sizes).sum(axis=0))
 
 
 def _needed(points: Sequence[PowerPoint], target: float) -> tuple[int | None, str]:

@@ -6,13 +6,19 @@ In: a protocol, its pairs of stimuli, and effects. Out: power by number of parti
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from renderer.workers import Where
 from study.analysis.exclusions import rules_of
+from study.arrays import BoolArray
 from study.errors import AnalysisError
 from study.experiment.plan import draw_plan
-from study.power.curve import power_curve
-from study.power.design import Design, MotionsPoint, PlannedStudy
+from study.power.curve import Run, power_curve
+from study.power.design import Design, Effect, MotionsPoint, PlannedStudy
 from study.power.registry import effect_of
 from study.power.sessions import whole_sessions
 from study.power.usual import USUAL
@@ -48,6 +54,39 @@ def chosen_study(protocol: Protocol, name: str | None) -> StudySpec:
     raise AnalysisError(f"{protocol.name}: expected one of the studies {names}, found {name!r}")
 
 
+@dataclass(frozen=True, eq=False)
+class _Studies:
+    """Simulated studies of a protocol, as plain data that other processes can be sent; a `Run`."""
+
+    protocol: Protocol
+    study: StudySpec
+    pairs: Sequence[Pair]
+    participants: int
+    options: Mapping[str, Any]
+    motions: int | None = None
+
+    def __call__(self, rng: np.random.Generator, studies: int, sizes: Sequence[int]) -> BoolArray:
+        """What each study found."""
+        return _run_of(self)(rng, studies, sizes)
+
+
+@lru_cache(maxsize=4)
+def _planned(asked: _Studies) -> tuple[Design, Effect]:
+    effect = effect_of(asked.study, asked.options, asked.protocol.analysis)
+    plans = plans_of(asked.protocol, asked.pairs, asked.participants)
+    rules = rules_of(asked.protocol.analysis.exclusions)
+    return Design(asked.protocol, asked.study, plans, effect.observer, rules), effect
+
+
+@lru_cache(maxsize=4)
+def _run_of(asked: _Studies) -> Run:
+    design, effect = _planned(asked)
+    if asked.motions is not None:
+        assert effect.with_motions is not None, "refused before"
+        return effect.with_motions(design, asked.motions)
+    return whole_sessions(design, effect) if asked.options["sessions"] else effect.study(design)
+
+
 def plan_power(
     protocol: Protocol,
     study: StudySpec,
@@ -55,8 +94,9 @@ def plan_power(
     sizes: Sequence[int],
     options: Mapping[str, Any],
     progress: Callable[[int, int], None] | None = None,
+    workers: Where = 1,
 ) -> PlannedStudy:
-    """Power for numbers of participants; `options` replace those of `USUAL`.
+    """Power for numbers of participants; `options` replace those of `USUAL`, `workers` are as for `power_curve`.
 
     Raises
     ------
@@ -64,22 +104,19 @@ def plan_power(
         Where other numbers of motions are asked for, and the study is planned with its own alone.
     """
     options = {**USUAL, **options}
-    effect = effect_of(study, options, protocol.analysis)
-    rules = rules_of(protocol.analysis.exclusions)
-    design = Design(protocol, study, plans_of(protocol, pairs, max(sizes)), effect.observer, rules)
+    asked = _Studies(protocol, study, pairs, max(sizes), options)
+    design, effect = _planned(asked)
     slow = options["sessions"] or effect.slow
     studies = options["studies"] or (200 if slow else 1000)
-    with_motions = effect.with_motions
-    if options["motions"] and with_motions is None:
+    if options["motions"] and effect.with_motions is None:
         raise AnalysisError(f"{study.name}: expected no --motions for this study, which is planned with its own alone")
     settings: dict[str, Any] = {"studies": studies, "target": options["target"], "seed": options["seed"]}
     settings["at_once"] = 10 if slow else AT_ONCE
-    run = whole_sessions(design, effect) if options["sessions"] else effect.study(design)
-    found = power_curve(run, sizes, **settings, progress=progress)
+    settings["workers"] = workers
+    found = power_curve(asked, sizes, **settings, progress=progress)
     surface = []
     for count in options["motions"]:
-        assert with_motions is not None, "refused above"
-        own = power_curve(with_motions(design, count), sizes, **settings)
+        own = power_curve(replace(asked, motions=count), sizes, **settings)
         surface.append(MotionsPoint(count, own.points, own.needed))
     return PlannedStudy(
         protocol=protocol.name,

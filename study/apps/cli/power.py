@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from study.analysis.to_json import to_json
-from study.apps.cli.console import FOLDER, emit, json_option, library_option, progress
+from study.apps.cli.console import FOLDER, emit, json_option, library_option, progress, workers_options
 from study.counting import counted
 from study.errors import AnalysisError
 from study.power.usual import USUAL
@@ -84,9 +84,16 @@ def _sizes(text: str, option: str = "--participants", example: str = "10,20,40")
 @click.option("--out", type=FOLDER,
               help="Results folder for power_STUDY.json and .csv, which its report shows (default: none).")  # fmt: skip
 @library_option
+@workers_options
 @json_option
 def power(
-    protocol: str, name: str | None, participants: str, library: str | None, out: Path | None, **options: Any
+    protocol: str,
+    name: str | None,
+    participants: str,
+    library: str | None,
+    out: Path | None,
+    workers: int | str | None,
+    **options: Any,
 ) -> None:
     """How many participants a protocol needs for given effects, by simulation."""
     from study.apps.cli.shared import load, prepare_stimuli
@@ -101,7 +108,13 @@ def power(
     pairs = prepare_stimuli(checked, library).pairs
     with progress("studies") as report:
         result = plan_power(
-            checked, study, pairs, sizes, options, lambda done, total: report(done / total, f"{done} of {total}")
+            checked,
+            study,
+            pairs,
+            sizes,
+            options,
+            lambda done, total: report(done / total, f"{done} of {total}"),
+            workers,
         )
     if out is not None:
         _write(out, result)
