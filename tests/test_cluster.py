@@ -20,11 +20,10 @@ from renderer.framing import frame_group
 from renderer.jobs import RenderJob, render_many
 from renderer.workers import Workers, run_jobs
 from study.experiment.protocol.whole import find_protocol, load_protocol
-from study.experiment.stimuli.prepare import prepare
 from study.motion.clip import joint_positions
-from study.motion.library import open_library
 from study.motion.synthetic import synthesize
 from study.power.planned import plan_power
+from study.tasks.trial import Pair
 from study.transitions.one_hop.build import build_table
 from study.transitions.one_hop.problem import Alignment, Problem, Settings, Switch
 
@@ -102,11 +101,15 @@ def test_one_hop_tables_are_those_of_one_process(cluster: str) -> None:
 
 
 def test_power_is_that_of_one_process(cluster: str) -> None:
-    protocol = load_protocol(find_protocol("demo"))
-    study = next(one for one in protocol.studies if one.task == "preference")
-    pairs = prepare(protocol, open_library("synthetic")).pairs
+    protocol = load_protocol(find_protocol("geodesic_vs_fixed"))
+    (study,) = protocol.studies
+    methods = ("geodesic", "fixed")
+    pairs = [
+        Pair(f"{study.name}/{name}", study.name, study.task, name, name, (f"{name}-a", f"{name}-b"), methods)
+        for name in (one.name for one in protocol.transitions)
+    ]
     alone, far = (
-        plan_power(protocol, study, pairs, [6, 20], {"studies": 600, "share": 0.7}, workers=where)
+        plan_power(protocol, study, pairs, [4, 12], {"studies": 300, "share": 0.7}, workers=where)
         for where in (1, cluster)
     )
     assert alone == far
