@@ -1,14 +1,16 @@
 """How long an answer takes when many browsers answer at once: `python benchmarks/serve.py [--browsers 200]`.
 
-A server runs in a process of its own, on a study without films; this process is the browsers, each a connection that
-stays open. Two loads: in a `burst` all of them answer at the same instant; in a `spread` each answers once at some time
-within a second, as people do. Every answer carries the times of all frames of two films, as a browser's does. A round
-trip runs from the send of an answer to the word that it is on disk.
+With `--servers 2` there are two of them behind nginx, on a PostgreSQL of their own (or `--database`). A server runs in
+a process of its own, on a study without films; this process is the browsers, each a connection that stays open. Two
+loads: in a `burst` all of them answer at the same instant; in a `spread` each answers once at some time within a
+second, as people do. Every answer carries the times of all frames of two films, as a browser's does. A round trip runs
+from the send of an answer to the word that it is on disk.
 
 Round by round the same requests go to a peer that does nothing (the same HTTP server, a fixed reply), which shows how
-much is HTTP, this process and the machine. The browsers only send bytes made beforehand and keep those that come; what
-they cost is printed too. At the end the server is killed with SIGKILL, and every acknowledged answer is looked for in
-the database, where it has to be once; the exit status is 1 if one is not. Processor times come from /proc (Linux).
+much is HTTP, this process and the machine (it is one process, without nginx). The browsers only send bytes made
+beforehand and keep those that come; what they cost is printed too. At the end the servers are killed with SIGKILL, and
+every acknowledged answer is looked for in the database, where it has to be once; the exit status is 1 if one is not.
+Processor times come from /proc (Linux).
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "apps")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "apps"), str(ROOT / "tests")]
 
 PROTOCOL = """
 name = "load"
@@ -221,25 +223,28 @@ HEAD = f"{'':19s}answers" + "".join(
 )
 
 
-def measure(into: Measured, browsers: Sequence[Browser], process: subprocess.Popen[bytes], within_s: float) -> None:
+Processes = Sequence[subprocess.Popen[bytes]]
+
+
+def measure(into: Measured, browsers: Sequence[Browser], processes: Processes, within_s: float) -> None:
     """One round."""
     delays = [random.uniform(0, within_s) for _ in browsers]
-    server_s, browsers_s = processor_s(process.pid), time.process_time()
+    server_s, browsers_s = processor_s(processes), time.process_time()
     into.rounds.append(exchange(browsers, delays))
     into.browsers_s += time.process_time() - browsers_s
-    into.server_s += processor_s(process.pid) - server_s
+    into.server_s += processor_s(processes) - server_s
 
 
-def processor_s(pid: int) -> float:
-    """Processor seconds that a process took, in all its threads."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def processor_s(processes: Processes) -> float:
+    """Processor seconds that processes took, in all their threads."""
+    stats = [Path(f"/proc/{one.pid}/stat").read_text().rpartition(")")[2].split() for one in processes]
+    return sum(int(fields[11]) + int(fields[12]) for fields in stats) / os.sysconf("SC_CLK_TCK")
 
 
 @contextlib.contextmanager
 def started(command: Sequence[str], port: int) -> Iterator[subprocess.Popen[bytes]]:
     """A server in a process of its own; killed at the end, not asked to stop."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path[:2])}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path[:3])}
     process = subprocess.Popen([sys.executable, *command], env=environment)
     try:
         while True:
@@ -271,21 +276,23 @@ def do_nothing(port: int, reply: bytes) -> None:
     serve(app, listen("127.0.0.1", port))
 
 
-def load(folder: Path, database: str, count: int, rounds: int) -> list[Key]:
-    """All rounds, printed; what was acknowledged. The server is killed at the end."""
+def load(folder: Path, database: str, count: int, rounds: int, servers: int) -> list[Key]:
+    """All rounds, printed; what was acknowledged. The servers are killed at the end."""
+    import nginx
     from serving import free_port
 
-    ports = free_port(), free_port()
-    commands = (
-        [str(ROOT / "tests" / "apps" / "server_child.py"), str(folder), str(ports[0]), database],
-        [__file__, "--do-nothing", str(ports[1])],
-    )
+    aside, *ports = [free_port() for _ in range(1 + servers)]
+    child = str(ROOT / "tests" / "apps" / "server_child.py")
     found = {(pattern, name): Measured() for pattern in ("burst", "spread") for name in ("segue", "does nothing")}
-    with started(commands[0], ports[0]) as segue, started(commands[1], ports[1]) as peer:
-        browsers = [Browser(ports[0], number) for number in range(count)]
-        others = [Browser(ports[1], number) for number in range(count)]
-        for browser in browsers:
-            browser.begin()
+    with contextlib.ExitStack() as stack:
+        segue = [stack.enter_context(started([child, str(folder), str(port), database], port)) for port in ports]
+        peer = [stack.enter_context(started([__file__, "--do-nothing", str(aside)], aside))]
+        address = ports[0] if servers == 1 else stack.enter_context(nginx.proxy(folder, ports, limited=False))
+        browsers = []
+        for number in range(count):  # one after another: a server does not wait long for a first request
+            browsers.append(Browser(address, number))
+            browsers[-1].begin()
+        others = [Browser(aside, number) for number in range(count)]
         for _ in range(rounds):
             for pattern, within_s in (("burst", 0.0), ("spread", 1.0)):
                 for browser, other in zip(browsers, others, strict=True):
@@ -319,19 +326,27 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--browsers", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--servers", type=int, default=1)
     parser.add_argument("--database", metavar="URL", help="an empty PostgreSQL database, instead of a SQLite file")
     parser.add_argument("--do-nothing", type=int, metavar="PORT", help="be the peer at this port")
     options = parser.parse_args()
     if options.do_nothing:
         do_nothing(options.do_nothing, b'{"kind":"nothing","text":"%s"}' % (b"x" * 1000))
         return 0
+    from postgres_server import PostgresServer, find_binaries
     from serving import unfilmed
 
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         database = options.database or str(folder / "responses.sqlite")
+        if options.servers > 1 and not options.database:
+            binaries = find_binaries()
+            assert binaries is not None, "PostgreSQL is installed"
+            server = PostgresServer(binaries)
+            stack.callback(server.remove)
+            database = server.url("study")
         unfilmed(folder, PROTOCOL)
-        return int(lost(database, load(folder, database, options.browsers, options.rounds)) > 0)
+        return int(lost(database, load(folder, database, options.browsers, options.rounds, options.servers)) > 0)
 
 
 if __name__ == "__main__":

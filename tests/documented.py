@@ -46,8 +46,7 @@ NOT_RUN = {
 }
 # Blocks of pages that are neither commands nor Python nor TOML, by a line of theirs, with the reason.
 OTHER_BLOCKS = {
-    "upstream segue {": "the configuration of another program, nginx",
-    "[Unit]": "the configuration of another program, systemd",
+    "docker compose": "commands of another program, Docker; tests/test_deploy.py reads its file",
     "createuser --pwprompt segue": "commands of another program, PostgreSQL",
     "GRANT SELECT, INSERT, DELETE": "commands of another program, PostgreSQL",
     "scripts/test ": "scripts of the repository, which tests/test_scripts.py reads",

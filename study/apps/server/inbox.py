@@ -19,8 +19,19 @@ from typing import Any
 from pydantic_core import to_json
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from study.apps.server.hosting import Host, LiveSession
-from study.apps.server.messages import LONGEST_PAGE, SHORTEST_PAGE, Answered, Begin, Done, Happened, Withdrawal, read
+from study.apps.server.hosting import Host
+from study.apps.server.live import LiveSession
+from study.apps.server.messages import (
+    LONGEST_PAGE,
+    SHORTEST_PAGE,
+    Answered,
+    Begin,
+    Done,
+    Happened,
+    RefusedError,
+    Withdrawal,
+    read,
+)
 from study.errors import SegueError
 from study.experiment.store.databases import AWAY
 
@@ -41,14 +52,6 @@ SMALLEST_MESSAGE = 1_000
 DATABASE_AWAY = "The database can't be reached now; send this again."
 
 log = logging.getLogger("segue.serve")
-
-
-class RefusedError(Exception):
-    """A request that is answered with an error: a status and one sentence."""
-
-    def __init__(self, status: int, why: str) -> None:
-        self.status, self.why = status, why
-        super().__init__(why)
 
 
 @dataclass(frozen=True)
@@ -144,9 +147,8 @@ async def alive(host: Host, letter: Letter) -> Reply:
 async def leave(host: Host, letter: Letter) -> Reply:
     """The page was closed. A beacon can't carry our header: its body is the page's name, and it only ends the hold."""
     _same_origin(letter)
-    live = host.in_memory(letter.cookie(host.cookie))
-    if live is not None:
-        host.leave(live, (await letter.body(SMALLEST_MESSAGE)).decode("latin-1"))
+    if token := letter.cookie(host.cookie):
+        await host.leave(token, (await letter.body(SMALLEST_MESSAGE)).decode("latin-1"))
     return Reply({})
 
 
@@ -223,8 +225,7 @@ async def _from_participant(host: Host, letter: Letter, largest: int) -> tuple[L
     if live is None:
         raise RefusedError(401, "Expected a participant of this study; open the link again.")
     body = await letter.body(largest)
-    if not host.has_tab(live, letter.page):
-        raise RefusedError(409, "This session is open in another tab.")
+    await host.refuse_other_tabs(live, letter.page)
     return live, body
 
 

@@ -25,6 +25,14 @@ Text = Annotated[str, Field(max_length=400)]
 Milliseconds = Annotated[float, Field(ge=0, lt=1e9)]
 
 
+class RefusedError(Exception):
+    """A request that is answered with an error: a status and one sentence."""
+
+    def __init__(self, status: int, why: str) -> None:
+        self.status, self.why = status, why
+        super().__init__(why)
+
+
 class Message(BaseModel):
     """What all messages share."""
 

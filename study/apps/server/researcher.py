@@ -16,7 +16,8 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from study.apps.server.hosting import Host, LiveSession
+from study.apps.server.hosting import Host
+from study.apps.server.live import LiveSession
 from study.experiment.form import asked
 from study.experiment.plan import questions
 from study.experiment.session import current

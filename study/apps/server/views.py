@@ -8,6 +8,7 @@ they are loaded.
 from __future__ import annotations
 
 import hmac
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -55,6 +56,15 @@ def films_due(session: Session) -> list[Step]:
 def to_view(session: Session) -> Session:
     """Past what a page does by itself: the pause, which belongs to the trial before it."""
     while current(session).kind == "pause":
+        session = advanced(session)
+    return session
+
+
+def ahead(session: Session, fits: Callable[[Session], bool]) -> Session | None:
+    """The session at the first step that fits, past what a page shows by itself; None where something is due before."""
+    while not fits(session):
+        if current(session).kind in ("answer", "done", "form", "consent"):
+            return None
         session = advanced(session)
     return session
 

@@ -21,9 +21,10 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from study.apps.server.hosting import Host
-from study.apps.server.inbox import DATABASE_AWAY, Inbox, RefusedError, cookie
+from study.apps.server.inbox import DATABASE_AWAY, Inbox, cookie
 from study.apps.server.limits import Limits
 from study.apps.server.memory import hand_back
+from study.apps.server.messages import RefusedError
 from study.apps.server.researcher import researcher_routes
 from study.errors import SegueError
 from study.experiment.protocol.stimuli import StimulusSettings

@@ -2,7 +2,8 @@
 
 Rows come in; the caller goes on once they are on disk. One group is committed at a time, in a thread of its own, so the
 event loop never waits for the disk; what comes meanwhile is the next group. When two hundred answers arrive together,
-the disk is waited for once or twice. Rows that fail take no others with them.
+the disk is waited for once or twice. Rows that fail take no others with them. Answers are committed only while the tab
+that sent them shows the session, whichever server another tab asked.
 """
 
 from __future__ import annotations
@@ -15,15 +16,22 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
+from study.errors import SegueError
 from study.experiment.store.answers import Row, insert_rows
 from study.experiment.store.databases import AWAY
+from study.experiment.store.participants import shown_elsewhere
 
 LARGEST_GROUP = 256
+
+
+class ElsewhereError(SegueError):
+    """Another tab shows the session, or it was withdrawn; nothing was stored."""
 
 
 @dataclass(frozen=True)
 class _Job:
     rows: Sequence[Row]
+    pages: dict[int, str]
     done: asyncio.Future[None]
 
 
@@ -36,10 +44,16 @@ class Writer:
         self._busy = False
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="writer")
 
-    async def put(self, rows: Sequence[Row]) -> None:
-        """Insert rows; returns when they are committed, raises what went wrong."""
+    async def put(self, rows: Sequence[Row], pages: dict[int, str] | None = None) -> None:
+        """Insert rows; returns when they are committed, raises what went wrong.
+
+        Parameters
+        ----------
+        pages
+            The tab that has to show a session, if any has.
+        """
         loop = asyncio.get_running_loop()
-        job = _Job(rows, loop.create_future())
+        job = _Job(rows, pages or {}, loop.create_future())
         self._waiting.append(job)
         if not self._busy:
             # Not at once: requests that arrived at the same moment are read first, and join the group.
@@ -84,6 +98,9 @@ def _commit(engine: sa.Engine, group: list[_Job]) -> list[Exception | None]:
     try:
         with engine.begin() as connection:
             insert_rows(connection, [row for job in group for row in job.rows])
+            pages = {session: page for job in group for session, page in job.pages.items()}
+            if pages and shown_elsewhere(connection, pages):
+                raise ElsewhereError("Expected the tab that shows this session.")
     except Exception as error:  # whatever it was, the page has to be told
         # One of them failed, and the whole group was rolled back: each on its own now. Not where the database is away:
         # each would wait for it in turn.

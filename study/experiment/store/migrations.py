@@ -51,9 +51,15 @@ def list_stimuli_of_answers(connection: sa.Connection) -> None:
     _guard(connection, answer_stimuli.name, "session_id")
 
 
+def name_the_page(connection: sa.Connection) -> None:
+    """Add the column for the tab that shows a session; a new database has it."""
+    if "page" not in {column["name"] for column in sa.inspect(connection).get_columns("participants")}:
+        connection.exec_driver_sql("ALTER TABLE participants ADD COLUMN page TEXT NOT NULL DEFAULT ''")
+
+
 _FIRST_TABLES = [sessions, answers, events, presentations, form_values, participants, withdrawals]
 # The column that names the session whose withdrawal allows its rows to be deleted. Rows of participants also change
-# (token, last seen).
+# (token, last seen, page).
 _SESSION_OF = {
     "answers": "session_id",
     "events": "session_id",
@@ -105,7 +111,7 @@ def _guard_postgresql(connection: sa.Connection, table: str, column: str) -> Non
 
 # No database of a version below 6 was ever released.
 FIRST_VERSION = 6
-MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (make_tables, list_stimuli_of_answers)
+MIGRATIONS: tuple[Callable[[sa.Connection], None], ...] = (make_tables, list_stimuli_of_answers, name_the_page)
 VERSION = FIRST_VERSION + len(MIGRATIONS) - 1
 
 

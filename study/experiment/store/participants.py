@@ -65,12 +65,17 @@ def hashed(token: str) -> str:
 
 @dataclass(frozen=True)
 class Participant:
-    """A participant in the browser: the session, the secret that addresses are made from, and what the link said."""
+    """A participant in the browser: the session, the secret that addresses are made from, and what the link said.
+
+    `page` names the tab that shows the session, and is empty while none does; it was `seen_at` then.
+    """
 
     session_id: int
     secret: str
     group: int
     parameters: Mapping[str, str]
+    page: str
+    seen_at: datetime
 
     @property
     def withdrawal_code(self) -> str:
@@ -87,7 +92,7 @@ def _code(secret: str) -> str:
 
 @dataclass(frozen=True)
 class Newcomer:
-    """Who asks to take part: a name, a new token, and what the link said.
+    """Who asks to take part: a name, a new token, what the link said, and in which tab (`page`).
 
     `identifying` are those of the `parameters` that name one person, who takes part once.
     """
@@ -96,6 +101,7 @@ class Newcomer:
     token: str
     parameters: Mapping[str, str] = field(default_factory=dict)
     identifying: Mapping[str, str] = field(default_factory=dict)
+    page: str = ""
 
 
 @dataclass(frozen=True)
@@ -149,7 +155,7 @@ def admit(
             clock=clock,
             within=connection,
         )
-        return _enrol(connection, record.id, newcomer, group, began_at=clock(), seen_at=heard_at)
+        return _enrol(connection, record.id, newcomer, group, clock(), heard_at)
 
 
 def _has_parameters(connection: sa.Connection, identifying: Mapping[str, str]) -> bool:
@@ -158,7 +164,7 @@ def _has_parameters(connection: sa.Connection, identifying: Mapping[str, str]) -
 
 
 def _enrol(
-    connection: sa.Connection, session_id: int, newcomer: Newcomer, group: int, **times: datetime
+    connection: sa.Connection, session_id: int, newcomer: Newcomer, group: int, began_at: datetime, seen_at: datetime
 ) -> Participant:
     """Store a participant's tokens (as hashes), group and parameters."""
     secret = secrets.token_hex(32)
@@ -170,10 +176,12 @@ def _enrol(
         "group_number": group,
         "parameters_json": json.dumps(dict(newcomer.parameters), sort_keys=True),
         "parameters_sha256": _parameters_key(newcomer.identifying) if newcomer.identifying else None,
-        **times,
+        "began_at": began_at,
+        "seen_at": seen_at,
+        "page": newcomer.page,
     }
     connection.execute(sa.insert(participants).values(row))
-    return Participant(session_id, secret, group, newcomer.parameters)
+    return Participant(session_id, secret, group, newcomer.parameters, newcomer.page, seen_at)
 
 
 def _parameters_key(parameters: Mapping[str, str]) -> str:
@@ -195,22 +203,46 @@ def _find(responses: Responses, condition: sa.ColumnElement[bool]) -> Participan
         row = connection.execute(sa.select(participants).where(condition)).mappings().one_or_none()
     if row is None:
         return None
-    return Participant(row["session_id"], row["secret"], row["group_number"], json.loads(row["parameters_json"]))
+    parameters = json.loads(row["parameters_json"])
+    return Participant(row["session_id"], row["secret"], row["group_number"], parameters, row["page"], row["seen_at"])
 
 
-def give_token(responses: Responses, participant: Participant, token: str) -> None:
+def give_token(responses: Responses, participant: Participant, token: str, page: str = "") -> None:
     """Replace a participant's token: the same person in another browser; the old token is of no use any more."""
     change = sa.update(participants).where(participants.c.session_id == participant.session_id)
     with responses.engine.begin() as connection:
-        connection.execute(change.values(token_sha256=hashed(token)))
+        connection.execute(change.values(token_sha256=hashed(token), page=page))
+
+
+def take_page(responses: Responses, participant: Participant, page: str, *, clock: Clock = _utc_now) -> bool:
+    """Let a tab show a session in place of the participant's `page`; False where a third one took it meanwhile."""
+    own = (participants.c.session_id == participant.session_id) & (participants.c.page == participant.page)
+    with responses.engine.begin() as connection:
+        return connection.execute(sa.update(participants).where(own).values(page=page, seen_at=clock())).rowcount == 1
+
+
+def close_page(responses: Responses, token: str, page: str) -> None:
+    """A tab was closed: if it showed the session, any other one may."""
+    own = (participants.c.token_sha256 == hashed(token)) & (participants.c.page == page)
+    with responses.engine.begin() as connection:
+        connection.execute(sa.update(participants).where(own).values(page=""))
+
+
+def shown_elsewhere(connection: sa.Connection, pages: Mapping[int, str]) -> bool:
+    """Whether one of these sessions is shown by another tab than this, or is gone; so it stays until the commit."""
+    query = sa.select(participants.c.session_id, participants.c.page).where(participants.c.session_id.in_(pages))
+    # All who lock several rows do so in this order: none waits for another in a circle.
+    found = connection.execute(query.order_by(participants.c.session_id).with_for_update(read=True)).all()
+    return len(found) < len(pages) or any(page not in ("", pages[number]) for number, page in found)
 
 
 def seen(responses: Responses, session_ids: Collection[int], *, clock: Clock = _utc_now) -> None:
     """Record that participants are active now."""
     if session_ids:
-        change = sa.update(participants).where(participants.c.session_id.in_(session_ids))
+        change = sa.update(participants).where(participants.c.session_id == sa.bindparam("number"))
+        now = clock()
         with responses.engine.begin() as connection:
-            connection.execute(change.values(seen_at=clock()))
+            connection.execute(change, [{"number": one, "seen_at": now} for one in sorted(session_ids)])
 
 
 def finished_sessions() -> sa.Select[tuple[int]]:

@@ -179,6 +179,8 @@ participants = sa.Table(
     sa.Column("parameters_sha256", StoredText, unique=True),
     sa.Column("began_at", UtcTime, nullable=False),
     sa.Column("seen_at", UtcTime, nullable=False),
+    # The tab that shows the session, as it named itself; empty while none does.
+    sa.Column("page", StoredText, nullable=False, server_default=""),
 )
 
 # What is left of a session whose participant withdrew.

@@ -13,16 +13,20 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import nginx
 import pytest
+import sqlalchemy as sa
+from parts import unavailable
 from postgres_server import PostgresServer
 from serving import answer_to, free_port, unfilmed
 
 from study.experiment.store.frames import answers_frame
 from study.experiment.store.responses import open_responses
+from study.experiment.store.tables import events, participants
 
 ROLES = ("trial", "practice", "check")
 CLIENTS = 3
@@ -59,7 +63,7 @@ class Client:
                         self.cookie = cookie.split(";")[0]
                     return json.loads(response.read())
             except urllib.error.HTTPError as refusal:
-                if refusal.code == 503:  # the database is away: pages send again
+                if refusal.code in (502, 503):  # the database or a server is away: pages send again
                     time.sleep(0.05)
                     continue
                 self.wrong.append(f"{path}: {refusal.code} {refusal.read()!r}")
@@ -134,28 +138,40 @@ def wait_for(what: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def run_clients(folder: Path, database: str, kills: int, kill: Callable[[Running], object]) -> None:
-    """Serve a study while clients answer, kill again and again, then look at what is stored."""
+def run_clients(
+    folder: Path,
+    database: str,
+    kills: int,
+    kill: Callable[[Running], object],
+    ports: Sequence[int] = (),
+    address: int = 0,
+) -> None:
+    """Serve a study while clients answer, kill again and again, then look at what is stored.
+
+    With several `ports` there are as many servers, behind a proxy at the port `address`.
+    """
     unfilmed(folder)
-    port, stop = free_port(), threading.Event()
+    ports = ports or (free_port(),)
+    port, stop = address or ports[0], threading.Event()
     clients = [Client(f"http://127.0.0.1:{port}", number, stop) for number in range(CLIENTS)]
     threads = [threading.Thread(target=client.run) for client in clients]
     dice = random.Random(5)
-    running = Running(folder, port, database)
+    running = [Running(folder, own, database) for own in ports]
     for thread in threads:
         thread.start()
     try:
         for _ in range(kills):
             time.sleep(dice.uniform(0.02, 0.6))
             before = sum(len(client.acknowledged) for client in clients)
-            kill(running)
+            kill(dice.choice(running))
             wait_for(lambda: sum(len(client.acknowledged) for client in clients) > before + 3 or stop.is_set())  # noqa: B023
         time.sleep(0.3)
     finally:
         stop.set()
         for thread in threads:
             thread.join()
-        running.kill()
+        for server in running:
+            server.kill()
     assert [wrong for client in clients for wrong in client.wrong] == []
     compare([key for client in clients for key in client.acknowledged], database, kills)
 
@@ -172,11 +188,29 @@ def compare(acknowledged: list[tuple[str, int, str, int, str | None]], database:
     assert set(acknowledged) <= set(stored)
     assert len(acknowledged) == len(set(acknowledged))
     assert len(stored) - len(acknowledged) <= CLIENTS * 2
+    number, finished = participants.c.group_number, events.c.kind == "finished"
+    with open_responses(database) as responses, responses.engine.connect() as connection:
+        groups = [connection.execute(sa.select(sa.func.count()).where(number == one)).scalar_one() for one in (0, 1)]
+        ended = connection.execute(sa.select(events.c.session_id).where(finished)).scalars().all()
+    assert max(groups) - min(groups) <= 1
+    assert len(ended) == len(set(ended))
 
 
 @pytest.mark.parametrize("kills", [4, pytest.param(200, marks=pytest.mark.slow)])
 def test_acknowledged_answers_survive_kills_of_the_server(tmp_path: Path, database: str, kills: int) -> None:
     run_clients(tmp_path, database, kills, Running.kill_and_start)
+
+
+@pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.slow)])
+def test_two_servers_behind_nginx_lose_nothing_when_one_is_killed(
+    tmp_path: Path, postgres_url: str, kills: int
+) -> None:
+    """Each message goes to the server whose turn it is, so a session is at both of them all the time."""
+    if nginx.program() is None:
+        unavailable("nginx", "install it (Debian, Ubuntu: apt install nginx-light)")
+    ports = free_port(), free_port()
+    with nginx.proxy(tmp_path, ports, sticky=False) as address:
+        run_clients(tmp_path, postgres_url, kills, Running.kill_and_start, ports, address)
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.slow)])

@@ -14,7 +14,7 @@ import pytest
 import sqlalchemy as sa
 from serving import Serving, answer_to
 
-from study.apps.server import hosting, web
+from study.apps.server import hosting, live, web
 from study.apps.server.hosting import MOST_EVENTS
 from study.experiment.store import participants as people
 from study.experiment.store.responses import Responses
@@ -237,7 +237,7 @@ def test_who_left_in_the_middle_leaves_the_memory_and_comes_back_from_the_databa
     serving.client.portal.call(serving.host.note_who_is_here)
     assert len(serving.host.live_sessions) == 1
     now = time.monotonic()
-    monkeypatch.setattr(time, "monotonic", lambda: now + hosting.GONE_SECONDS + 1)
+    monkeypatch.setattr(time, "monotonic", lambda: now + live.GONE_SECONDS + 1)
     serving.client.portal.call(serving.host.note_who_is_here)
     monkeypatch.undo()
     assert serving.host.live_sessions == {}

@@ -192,8 +192,13 @@ def test_two_servers_on_one_database_share_places_and_count_an_answer_once(stimu
             assert Person(TestClient(second.app)).begin()["kind"] == "full"
             message = answer_to(view)
             values = [option["value"] for option in view["question"]["options"]]
-            assert person.post("/api/answer", message).json()["counted"]
-            # The other server has the session in memory as it was before.
-            assert again.post("/api/answer", {**message, "value": values[1]}).json()["counted"] is False
+            # The first server has the session in memory as it was before the other tab took it over.
+            assert person.post("/api/answer", message).status_code == 409
+            assert person.post("/api/alive", {}).status_code == 409
             assert again.post("/api/answer", message).json()["counted"] is True
+            view = person.until(person.begin(page="page-three", force=True), "trial")
+            # Now it is the other server that has it as it was before.
+            assert again.post("/api/answer", answer_to(view)).status_code == 409
+            assert person.post("/api/answer", {**message, "value": values[1]}).json()["counted"] is False
+            assert person.post("/api/answer", message).json()["counted"] is True
         assert len(answers_frame(one, roles=("trial", "practice", "check"))) == 1

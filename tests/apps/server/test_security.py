@@ -305,7 +305,7 @@ def test_who_is_long_gone_is_taken_up_from_the_database(
     view = person.until(person.answer(view), "trial")
     serving.client.portal.call(serving.host.note_who_is_here)
     assert len(serving.host.live_sessions) == 1
-    monkeypatch.setattr(hosting, "GONE_SECONDS", -1.0)
+    monkeypatch.setattr("study.apps.server.live.GONE_SECONDS", -1.0)
     serving.client.portal.call(serving.host.note_who_is_here)
     assert serving.host.live_sessions == {}
     assert person.answer(view)["counted"] is True

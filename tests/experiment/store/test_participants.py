@@ -78,7 +78,7 @@ def test_a_participant_is_known_by_token_and_no_token_is_stored(responses: Respo
 def test_tokens_and_codes_do_not_repeat() -> None:
     assert len({people.new_token() for _ in range(1000)}) == 1000
     assert len(people.new_token()) == 43
-    codes = {people.Participant(1, str(secret), 0, {}).withdrawal_code for secret in range(1000)}
+    codes = {people.Participant(1, str(secret), 0, {}, "", NOW).withdrawal_code for secret in range(1000)}
     assert len(codes) == 1000
     assert all(re.fullmatch(r"([a-z2-9]{4}-){3}[a-z2-9]{4}", code) for code in codes)
 
