@@ -43,8 +43,9 @@ class QuestPlus:
     """`(points,)`: adds to one."""
 
     @cached_property
-    def _logs(self) -> tuple[FloatArray, FloatArray]:
-        return np.log(self.chances), np.log1p(-self.chances)
+    def _logs(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        with np.errstate(divide="ignore"):
+            return np.log(self.chances), np.log1p(-self.chances), np.log(self.prior)
 
     @cached_property
     def _entropies(self) -> FloatArray:
@@ -56,8 +57,7 @@ class QuestPlus:
 
     def posterior(self, yes: IntArray, no: IntArray) -> FloatArray:
         """Return the mass at each point, shape (points,), after so many answers at each level, shape (levels,)."""
-        with np.errstate(divide="ignore"):
-            log = np.log(self.prior) + self.likelihood(yes, no)
+        log = self._logs[2] + self.likelihood(yes, no)
         mass = np.exp(log - log.max())
         return np.asarray(mass / mass.sum())
 
@@ -67,11 +67,12 @@ class QuestPlus:
 
     def information_on(self, axis: int, posterior: FloatArray) -> FloatArray:
         """Return what an answer is expected to tell of one parameter, whatever it tells of the others (Prins 2013)."""
-        joint = (self.chances * posterior).reshape(len(self.chances), *map(len, self.axes))
-        others = tuple(place + 1 for place in range(len(self.axes)) if place != axis)
-        mass = self.marginal(posterior, axis)
-        yes = joint.sum(axis=others) / np.maximum(mass, TINY)
-        return entropy(yes @ mass) - entropy(yes) @ mass
+        sizes = [*map(len, self.axes)]
+        chances = np.moveaxis(self.chances.reshape(-1, *sizes), axis + 1, 1).reshape(len(self.chances), sizes[axis], -1)
+        split = np.moveaxis(posterior.reshape(sizes), axis, 0).reshape(sizes[axis], -1)
+        mass = split.sum(axis=1)
+        yes = np.einsum("lpo,po->lp", chances, split) / np.maximum(mass, TINY)
+        return np.asarray(entropy(yes @ mass) - entropy(yes) @ mass)
 
     def next_level(self, posterior: FloatArray) -> int:
         """Return the number of the level to ask; of several that tell as much, the first."""
@@ -125,6 +126,8 @@ class Asked:
     wrong: tuple[int, ...]
     trials: int = 0
     """Of its own, those without an answer among them."""
+    left: tuple[int, ...] | None = None
+    """The levels of the constant stimuli that are still to come; None before they began."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ class QuestRule(Rule):
     """`criterion`, `criterion_spread`: mean and standard deviation of the prior, for same-different; yes-no takes
     half of both (`models.detection`)."""
     most_lapses: float
-    """Lapse rates up to this are as likely as one another."""
+    """The prior of the lapse rate falls in a straight line, to nothing just beyond this."""
     slope_spread: float
     """In forced choices d' grows with the difference to a power; its median is 1, this its natural logarithm's
     standard deviation."""
@@ -158,11 +161,21 @@ class QuestRule(Rule):
     narrow: float
     """`least_trials`, `trials`, `narrow`: a track stops after at least and at most so many trials, between them once
     the upper end of its threshold's 95% interval is at most so many times the lower; 1 for never."""
+    shared: bool = False
+    then_constant: tuple[float, ...] = ()
+    then_repeats: int = 1
+    """`then_constant`, `then_repeats`: constant stimuli at the end, among `trials`: at which multiples of the threshold
+    found, and how often each."""
 
     @property
     def target(self) -> float:
         """Half of the way from chance to never wrong."""
         return DECIDING[self.task].target
+
+    @property
+    def adaptive_trials(self) -> int:
+        """The most trials before constant stimuli."""
+        return self.trials - len(self.then_constant) * self.then_repeats
 
     @property
     def estimate(self) -> str:
@@ -181,13 +194,16 @@ class QuestRule(Rule):
         return Asked(none, none)
 
     def due(self, track: Asked) -> int:
-        """The level that is expected to tell most."""
-        return _summary(self, track.right, track.wrong)[0]
+        """The level that is expected to tell most, or the next of the constant stimuli."""
+        return track.left[0] if track.left else _most_telling(self, track.right, track.wrong)
 
     def after(self, track: Asked, level: int, right: bool | None) -> Asked:
         """One answer more at this level."""
         place = self.levels.index(level) + 1
-        return replace(self._counted(track, place, right), trials=track.trials + 1)
+        later = replace(self._counted(track, place, right), trials=track.trials + 1)
+        if track.left is not None:
+            return replace(later, left=track.left[1:])
+        return replace(later, left=self._constant(later)) if self.then_constant and self._knows(later) else later
 
     def beside(self, track: Asked, right: bool) -> Asked:
         """One answer more where there was no difference."""
@@ -201,9 +217,20 @@ class QuestRule(Rule):
         return replace(track, right=tuple(counts)) if right else replace(track, wrong=tuple(counts))
 
     def over(self, track: Asked) -> bool:
-        """After its most trials, or once it knows enough."""
-        if track.trials >= self.trials or track.trials < self.least_trials:
-            return track.trials >= self.trials
+        """After its most trials or once it knows enough, and after the constant stimuli then."""
+        return track.left == () if self.then_constant else self._knows(track)
+
+    def _constant(self, track: Asked) -> tuple[int, ...]:
+        """Levels around the threshold, in an order that the answers so far decide as a seed does."""
+        wanted = np.repeat(self.then_constant, self.then_repeats) * self.found(track).frames
+        nearest = np.array(self.levels)[np.abs(np.subtract.outer(wanted, self.levels)).argmin(axis=1)]
+        return tuple(np.random.default_rng([*track.right, *track.wrong]).permutation(nearest).tolist())
+
+    def _knows(self, track: Asked) -> bool:
+        if track.trials >= self.adaptive_trials:
+            return True
+        if track.trials < self.least_trials or self.narrow == 1:
+            return False
         found = self.found(track)
         return (found.high or np.inf) <= self.narrow * (found.low or 0.0)
 
@@ -213,7 +240,13 @@ class QuestRule(Rule):
 
     def found(self, track: Asked) -> Found:
         """Median and standard deviation of the posterior of the threshold; 95% interval by its profile likelihood."""
-        return _summary(self, track.right, track.wrong)[1]
+        return _found(self, track.right, track.wrong)
+
+    def posterior(self, track: Asked) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The values of the threshold's grid, and the posterior of each, whatever the nuisances are."""
+        quest = _grid(self)
+        mass = quest.marginal(quest.posterior(np.array(track.right), np.array(track.wrong)), 0)
+        return tuple(np.exp(quest.axes[0]).round(3).tolist()), tuple(mass.round(5).tolist())
 
 
 @dataclass(frozen=True)
@@ -256,20 +289,24 @@ criterion's goes up, since strict participants say little of theirs and an inter
 LOOSE_CRITERION, LOOSE_SLOPE = 4.0, 2.0
 """In intervals their priors count as if they were so many times as wide. As they are, they say more than most answers
 do: intervals of participants who are stricter than the prior says held 99% of the thresholds instead of 95%. Without
-them intervals would be too short of participants who never lapse."""
+them intervals would be too short of participants who never lapse. There all lapse rates are as likely."""
 
 
 @lru_cache(maxsize=64)
 def _grid(rule: QuestRule) -> QuestPlus:
-    """The grid of a rule: the logarithm of the threshold, the criterion or else the slope, the lapse rate."""
+    """The grid of a rule: the logarithm of the threshold, the criterion or else the slope, the lapse rate.
+
+    Most people hardly lapse. Were all rates as likely, thresholds of those who never do would come out 10% low.
+    """
     steps = np.linspace(-WIDE, WIDE, THRESHOLDS)
     logs = np.log(rule.threshold_frames) + rule.threshold_spread * steps
     lapses = np.linspace(0, rule.most_lapses, LAPSES)
+    seldom = LAPSES - 0.5 - np.arange(LAPSES)
     others, off = _criteria(rule) if DECIDING[rule.task].has_criterion else _slopes(rule)
     threshold, other, lapse = (part.ravel() for part in np.meshgrid(np.exp(logs), others, lapses, indexing="ij"))
     frames = np.array([0, *rule.levels], dtype=np.float64)[:, None]
     right = DECIDING[rule.task].right(frames / threshold, other, lapse)
-    prior = np.exp(-0.5 * (steps[:, None, None] ** 2 + off[:, None] ** 2 + 0 * lapses)).ravel()
+    prior = (np.exp(-0.5 * (steps[:, None, None] ** 2 + off[:, None] ** 2)) * seldom).ravel()
     return QuestPlus((logs, others, lapses), np.clip(right, 1e-9, 1 - 1e-9), prior / prior.sum())
 
 
@@ -287,18 +324,24 @@ def _slopes(rule: QuestRule) -> tuple[FloatArray, FloatArray]:
 
 
 @lru_cache(maxsize=20_000)
-def _summary(rule: QuestRule, right: tuple[int, ...], wrong: tuple[int, ...]) -> tuple[int, Found]:
-    """The level to ask next, and the threshold so far: remembered, since a session is folded anew at each answer."""
+def _most_telling(rule: QuestRule, right: tuple[int, ...], wrong: tuple[int, ...]) -> int:
+    """The level to ask next: remembered, since a session is folded anew at each answer."""
+    quest = _grid(rule)
+    told = quest.information_on(0, quest.posterior(np.array(right), np.array(wrong)))[1:]
+    return rule.levels[int(np.argmax(np.round(told, ROUNDED)))]
+
+
+@lru_cache(maxsize=20_000)
+def _found(rule: QuestRule, right: tuple[int, ...], wrong: tuple[int, ...]) -> Found:
+    """The threshold so far, remembered likewise."""
     quest = _grid(rule)
     counts = np.array(right), np.array(wrong)
-    posterior = quest.posterior(*counts)
-    told = np.round(quest.information_on(0, posterior)[1:], ROUNDED)
-    mass, frames = quest.marginal(posterior, 0), np.exp(quest.axes[0])
+    mass, frames = quest.marginal(quest.posterior(*counts), 0), np.exp(quest.axes[0])
     spread = float(np.sqrt(mass @ frames**2 - (mass @ frames) ** 2))
     criterion = DECIDING[rule.task].has_criterion
     off = _criteria(rule)[1] / LOOSE_CRITERION if criterion else _slopes(rule)[1] / LOOSE_SLOPE
-    loose = np.repeat(-0.5 * off**2, len(quest.axes[2]))
+    loose = np.repeat(-0.5 * off**2, LAPSES)
     likely = quest.likelihood(*counts) + np.tile(loose, len(frames))
     ends = likelihood_interval(quest.axes[0], quest.profile(likely, 0))
     middle, low, high = map(float, np.exp([median(quest.axes[0], mass), *ends]))
-    return rule.levels[int(np.argmax(told))], Found(middle, spread, low, high)
+    return Found(middle, spread, low, high)

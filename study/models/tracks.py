@@ -28,6 +28,8 @@ class Rule(ABC):
     """What a track is called: "staircase"."""
     trials: int
     """A track stops after so many trials in any case."""
+    shared: bool
+    """Whether a track asks about shorter and longer blends in turn, whose threshold is one."""
 
     @property
     @abstractmethod
@@ -71,6 +73,11 @@ class Rule(ABC):
     @abstractmethod
     def found(self, track: Any) -> Found | None:
         """The threshold, in units of the level; None where the track is too short for one."""
+
+    def posterior(self, track: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Thresholds in frames, and the probability of each; none without a posterior."""
+        del track
+        return (), ()
 
     def turns(self, track: Any) -> int:
         """How often its direction has changed, where that means anything."""

@@ -39,6 +39,7 @@ class UpDown(Rule):
     """`reversals`, `trials`: a staircase stops after so many changes of direction, or after so many trials."""
     averaged: int = 6
     """Its threshold is the mean of so many reversals, the last ones."""
+    shared: bool = False
 
     @property
     def target(self) -> float:

@@ -7,7 +7,9 @@ their responses as it reads stored ones. How tracks are interleaved changes noth
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, partial
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -16,15 +18,13 @@ from study.analysis.analyse import Analysis
 from study.analysis.exclusions import exclude
 from study.analysis.oddity.analyse import ForcedChoice
 from study.analysis.same_different.analyse import SameDifferent
-from study.analysis.same_different.counts import SIGNS
 from study.analysis.same_different.staircases import Staircases, staircase_thresholds
 from study.analysis.yes_no.analyse import YesNo
 from study.arrays import BoolArray, FloatArray
 from study.counting import counted
 from study.errors import AnalysisError
 from study.experiment.observers import person
-from study.experiment.procedures.interleaved import SIGNS as SIGNS_OF
-from study.experiment.procedures.interleaved import Interleaving
+from study.experiment.procedures.interleaved import SIGNS, Interleaving
 from study.experiment.protocol.studies import AnalysisSettings
 from study.experiment.protocol.whole import StudySpec
 from study.models.forced import FORCED
@@ -98,6 +98,7 @@ def against_constant(design: Design) -> str:
     rule, rng = _procedure(design).rule_of(design.study.task), np.random.default_rng(0)
     if not isinstance(rule, QuestRule):
         return ""
+    rule = replace(rule, trials=rule.adaptive_trials, then_constant=())
     levels = [rule.levels[place] for place in np.linspace(0, len(rule.levels) - 1, SPACED).round().astype(int)]
     taken, wanted = [], []
     for who in range(PEOPLE):
@@ -115,7 +116,7 @@ def against_constant(design: Design) -> str:
 
 def _rightly(design: Design, name: str, rng: np.random.Generator) -> Callable[[int], bool]:
     """Whether a simulated participant is right at a difference to the longer side, or the side that there is."""
-    observer, sign = person(design.settings, name, 0).settings.same_different, max(SIGNS_OF[_procedure(design).side])
+    observer, sign = person(design.settings, name, 0).settings.same_different, SIGNS[_procedure(design).side][-1][-1]
     probability, _ = RIGHT[design.study.task]
 
     def right(level: int) -> bool:
@@ -180,7 +181,7 @@ def _responses(design: Design, seed: int, who: int, rng: np.random.Generator) ->
     observer = person(design.settings, name, seed).settings.same_different
     probability, hardest = RIGHT[design.study.task]
     course = next(course for course in design.plans[who].courses if course.study == design.study.name)
-    asked = {(pair.motion, pair.difference_frames > 0) for pair in course.pairs if pair.difference_frames}
+    motions = sorted({pair.motion for pair in course.pairs if pair.difference_frames})
 
     @cache
     def right_at(difference: int) -> float:
@@ -199,8 +200,8 @@ def _responses(design: Design, seed: int, who: int, rng: np.random.Generator) ->
 
     trial = 0
     for repeat in range(1, course.repeats + 1):
-        for motion, longer in sorted(asked):
-            track, sign = rule.begin(), SIGNS["longer" if longer else "shorter"]
+        for motion, signs in product(motions, SIGNS[procedure.side]):
+            track = rule.begin()
             while not rule.over(track):
                 trial += 1
                 if procedure.catch_every and trial % procedure.catch_every == 0:
@@ -209,6 +210,6 @@ def _responses(design: Design, seed: int, who: int, rng: np.random.Generator) ->
                         track = rule.beside(track, bool(response["correct"]))
                 else:
                     level = rule.due(track)
-                    response = row(motion, repeat, sign * level)
+                    response = row(motion, repeat, signs[int(rng.integers(len(signs)))] * level)
                     track = rule.after(track, level, response["correct"])  # type: ignore[arg-type]
                 yield {**response, "trial": trial}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class StaircaseRun:
 
     participant: str
     motion: str
-    side: Side
+    side: Side | Literal["both"]
     repeat: int
     """`participant`, `motion`, `side`, `repeat`: whose it is, and what it asked."""
     trials: int
@@ -46,6 +46,8 @@ class StaircaseRun:
     """The difference that each trial showed, in frames without a sign."""
     turns: tuple[int, ...]
     """The trials, from 1, at which the direction changed."""
+    posterior: tuple[float, ...] = ()
+    """The probability of each of `Staircases.grid`; none for staircases."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ class Staircases:
     """Mean spread of a track, in frames, by side."""
     runs: tuple[StaircaseRun, ...]
     """Each track."""
+    grid: tuple[float, ...] = ()
+    """Thresholds in frames that posteriors are about."""
 
     def in_words(self) -> str:
         """Return the thresholds in a sentence."""
@@ -102,15 +106,15 @@ def staircase_thresholds(
     thresholds: dict[Side, Threshold] = {}
     spread: dict[Side, float] = {}
     for side in SIGNS:
-        own = [run for run in runs if run.side == side]
+        own = [run for run in runs if run.side in (side, "both")]
         if own:
             thresholds[side] = _threshold(side, own, rule, confidence)
             spreads = [run.spread for run in own if run.spread is not None]
             if spreads:
                 spread[side] = float(np.mean(spreads))
     averaged = rule.averaged if isinstance(rule, UpDown) else None
-    meaning = rule.meaning(right)
-    return Staircases(rule.title, rule.target, averaged, rule.estimate, meaning, thresholds, spread, runs)
+    meaning, grid = rule.meaning(right), rule.posterior(rule.begin())[0]
+    return Staircases(rule.title, rule.target, averaged, rule.estimate, meaning, thresholds, spread, runs, grid)
 
 
 def _runs(answers: pd.DataFrame, rule: Rule) -> Iterator[StaircaseRun]:
@@ -119,7 +123,7 @@ def _runs(answers: pd.DataFrame, rule: Rule) -> Iterator[StaircaseRun]:
     moved_rows = answers[differs]
     beside = answers[~differs & answers["answer"].notna()].groupby(answers["participant"].astype(str))["correct"]
     same = {str(participant): [bool(right) for right in own] for participant, own in beside}
-    longer = moved_rows["difference_frames"] > 0
+    longer = (moved_rows["difference_frames"] > 0) & (not rule.shared)
     keys = [moved_rows["participant"].astype(str), moved_rows["motion"].astype(str), longer, moved_rows["repeat"]]
     for (participant, motion, _, _), part in moved_rows.groupby(keys, sort=False):
         track = rule.begin()
@@ -137,7 +141,7 @@ def _runs(answers: pd.DataFrame, rule: Rule) -> Iterator[StaircaseRun]:
         yield StaircaseRun(
             str(participant),
             str(motion),
-            "longer" if part["difference_frames"].iloc[0] > 0 else "shorter",
+            "both" if rule.shared else "longer" if part["difference_frames"].iloc[0] > 0 else "shorter",
             int(part["repeat"].iloc[0]),
             len(part),
             rule.turns(track),
@@ -147,6 +151,7 @@ def _runs(answers: pd.DataFrame, rule: Rule) -> Iterator[StaircaseRun]:
             found.high if found else None,
             levels,
             tuple(turns),
+            rule.posterior(track)[1],
         )
 
 

@@ -1,6 +1,7 @@
 """Interleaved tracks: each transition of a study has a track of its own, and one for each side where shorter and longer
-blends are both asked about. Which track a trial asks is drawn at random, and trials that show no difference can stand
-among them. A rule (`study.models.tracks`) says which difference a track shows, and when it stops.
+blends are both asked about, unless they share it. Which track a trial asks, and which side of a shared one, is drawn at
+random, and trials that show no difference can stand among them. A rule (`study.models.tracks`) says which difference a
+track shows, and when it stops.
 """
 
 from __future__ import annotations
@@ -19,8 +20,14 @@ from study.tasks.registry import TASKS, right_answer, task_of
 from study.tasks.task import Asked
 from study.tasks.trial import Pair, Trial, trial_of
 
-Side = Literal["both", "shorter", "longer"]
-SIGNS: Mapping[Side, tuple[int, ...]] = {"both": (-1, 1), "shorter": (-1,), "longer": (1,)}
+Side = Literal["both", "shared", "shorter", "longer"]
+SIGNS: Mapping[Side, tuple[tuple[int, ...], ...]] = {
+    "both": ((-1,), (1,)),
+    "shared": ((-1, 1),),
+    "shorter": ((-1,),),
+    "longer": ((1,),),
+}
+"""The signs of the differences that each track of a transition shows."""
 
 
 @dataclass(frozen=True)
@@ -28,14 +35,14 @@ class Key:
     """Which track it is."""
 
     motion: str
-    longer: bool
+    signs: tuple[int, ...]
     repeat: int
 
 
 @dataclass(frozen=True)
 class Turn:
-    """What chance decides of a trial beforehand: which of the running tracks it asks (from 0 to 1), the order of its
-    stimuli, and the pair that it shows where it shows no difference.
+    """What chance decides of a trial beforehand: which of the running tracks it asks and on which side (from 0 to 1),
+    the order of its stimuli, and the pair that it shows where it shows no difference.
     """
 
     which: float
@@ -51,7 +58,6 @@ class Interleaving(Adaptive):
 
     side: Side
     catch_every: int
-    most_trials: int
 
     @abstractmethod
     def levels(self) -> tuple[int, ...]:
@@ -83,13 +89,13 @@ class Interleaving(Adaptive):
 
     def differences(self) -> tuple[int, ...]:
         """All differences that may come, signed; 0 where trials without one are among them."""
-        signed = {sign * level for sign in SIGNS[self.side] for level in self.levels()}
+        signed = {sign * level for signs in SIGNS[self.side] for sign in signs for level in self.levels()}
         return tuple(sorted(signed | ({0} if self.catch_every else set())))
 
     def trials(self, transitions: int, repeats: int) -> tuple[int, int]:
         """The fewest and the most trials, those without a difference among them."""
         count = transitions * repeats * len(SIGNS[self.side])
-        fewest, most = count * self.fewest(), count * self.most_trials
+        fewest, most = count * self.fewest(), count * self.rule_of("").trials
         if not self.catch_every:
             return fewest, most
         between = self.catch_every - 1
@@ -111,12 +117,13 @@ class Interleaving(Adaptive):
     def begun(self, course: Course, rng: np.random.Generator) -> Interleaved:
         """The tracks of a stored course."""
         ladders: dict[Key, dict[int, Pair]] = {}
+        signs_of = {sign: signs for signs in SIGNS[self.side] for sign in signs}
         same = [pair for pair in course.pairs if not pair.difference_frames]
         for repeat in range(1, course.repeats + 1):
             for pair in course.pairs:
                 if difference := pair.difference_frames:
-                    key = Key(pair.motion, difference > 0, repeat)
-                    ladders.setdefault(key, {})[abs(difference)] = pair
+                    key = Key(pair.motion, signs_of[1 if difference > 0 else -1], repeat)
+                    ladders.setdefault(key, {})[difference] = pair
         places = self._catch_places(course.most, rng)
         which, members = rng.random(course.most), rng.integers(0, len(course.arrangements), course.most)
         shown = rng.integers(0, max(len(same), 1), course.most)
@@ -147,7 +154,7 @@ def _signed(frames: int) -> str:
 class Interleaved:
     """The interleaved tracks of one study (`Procedure`).
 
-    `ladders` has the pairs of each track by their level, `turns` what was drawn for each trial, `right` the right
+    `ladders` has the pairs of each track by their difference, `turns` what was drawn for each trial, `right` the right
     answer to each pair in each order.
     """
 
@@ -195,8 +202,9 @@ class Interleaved:
         turn, running = self.turns[number], self._running(tracks)
         if turn.same is not None:
             return None, turn.same
-        key = running[int(turn.which * len(running))]
-        return key, self.ladders[key][self.rule.due(tracks[key])]
+        which, on_side = divmod(turn.which * len(running), 1)
+        key = running[int(which)]
+        return key, self.ladders[key][key.signs[int(on_side * len(key.signs))] * self.rule.due(tracks[key])]
 
     def _trials(self, tracks: Tracks, number: int) -> tuple[Trial, ...]:
         """The trial of this place; none where all tracks have stopped."""

@@ -51,9 +51,11 @@ class Quest(Interleaving):
         "standard deviation of its natural logarithm; 0 for exactly 1.",
     )
     most_lapses: Annotated[float, Ge(0.001), Le(0.5)] = setting(
-        0.1, "Prior of the lapse rate: all values up to this one are as likely."
+        0.1, "Prior of the lapse rate: falls in a straight line from 0 to nothing just beyond this value."
     )
-    side: Literal["both", "shorter", "longer"] = setting("both", "Which blends are compared with the reference.")
+    side: Literal["both", "shared", "shorter", "longer"] = setting(
+        "both", "Which blends are compared with the reference; `shared`: both, with one threshold and one track."
+    )
     narrow: Annotated[float, Ge(1), Le(100)] = setting(
         1.0,
         "A track stops once the upper end of its threshold's 95% interval is at most so many times the lower; 1 for "
@@ -61,8 +63,12 @@ class Quest(Interleaving):
     )
     least_trials: Annotated[int, Ge(1), Le(1000)] = setting(12, "Trials before which no track stops. [trials]")
     most_trials: Annotated[int, Ge(2), Le(1000)] = setting(40, "Trials after which a track stops. [trials]")
+    then_constant: tuple[Annotated[float, Gt(0), Le(10)], ...] = setting(
+        (), "Constant stimuli that a track shows once QUEST+ has stopped, at so many times the threshold found."
+    )
+    then_repeats: Annotated[int, Ge(1), Le(100)] = setting(8, "How often a track shows each of these.")
     catch_every: Annotated[int, Ge(0), Le(1000)] = setting(
-        4, "One trial in this number shows no difference; 0 for none. [trials]"
+        3, "One trial in this number shows no difference; 0 for none. [trials]"
     )
 
     def __post_init__(self) -> None:
@@ -85,8 +91,13 @@ class Quest(Interleaving):
         return (*stepped, self.most_frames)
 
     def fewest(self) -> int:
-        """The trials of a track that soon knows enough."""
-        return self.least_trials if self.narrow > 1 else self.most_trials
+        """The trials of a track that soon knows enough, constant stimuli among them."""
+        return (self.least_trials if self.narrow > 1 else self.most_trials) + self._constant
+
+    @property
+    def _constant(self) -> int:
+        """How many constant stimuli a track shows."""
+        return len(self.then_constant) * self.then_repeats
 
     def rule_of(self, task: str) -> QuestRule:
         """The rule of its tracks."""
@@ -100,8 +111,11 @@ class Quest(Interleaving):
             self.most_lapses,
             self.slope_spread,
             self.least_trials,
-            self.most_trials,
+            self.most_trials + self._constant,
             self.narrow,
+            self.side == "shared",
+            self.then_constant,
+            self.then_repeats,
         )
 
     def in_words(self) -> str:
@@ -109,11 +123,18 @@ class Quest(Interleaving):
         stops = f"after {counted(self.most_trials, 'trial')}"
         if self.narrow > 1:
             stops = f"once the 95% interval of its threshold was narrower than a factor of {self.narrow:g}, or {stops}"
+        then = ""
+        if self.then_constant:
+            times = ", ".join(f"{times:g}" for times in self.then_constant)
+            then = (
+                "; constant stimuli followed in random order, "
+                f"{self.then_repeats} at each of {times} times the threshold that the track had found"
+            )
         return (
             f"QUEST+ with {self.range_in_words()}, a log-normal prior of the threshold (median "
             f"{self.threshold_frames:g} frames, standard deviation {self.threshold_spread:g} in natural logarithms), "
-            f"and as nuisance parameters the lapse rate (up to {100 * self.most_lapses:g}%, all as likely) and the "
-            f"criterion (same-different; normal prior, {self.criterion:g} ± {self.criterion_spread:g}, half of both in "
-            f"yes-no) or the slope "
-            f"(oddity, 2AFC; log-normal prior, median 1, {self.slope_spread:g}); each track stopped {stops}"
+            f"and as nuisance parameters the lapse rate (up to {100 * self.most_lapses:g}%, smaller ones likelier) and "
+            f"the criterion (same-different; normal prior, {self.criterion:g} ± {self.criterion_spread:g}, half of "
+            f"both in yes-no) or the slope "
+            f"(oddity, 2AFC; log-normal prior, median 1, {self.slope_spread:g}); each track stopped {stops}{then}"
         )

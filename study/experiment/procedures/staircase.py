@@ -43,7 +43,9 @@ class Staircase(Interleaving):
     up_times: Annotated[int, Ge(1), Le(20)] = setting(
         1, "How many times as large as steps down the steps up are; with `down = 1`, 3 aims at 75% and 4 at 80%."
     )
-    side: Literal["both", "shorter", "longer"] = setting("both", "Which blends are compared with the reference.")
+    side: Literal["both", "shared", "shorter", "longer"] = setting(
+        "both", "Which blends are compared with the reference; `shared`: both, with one threshold and one track."
+    )
     reversals: Annotated[int, Ge(2), Le(100)] = setting(8, "Number of reversals after which a staircase stops.")
     averaged: Annotated[int, Ge(1), Le(100)] = setting(6, "Number of last reversals whose mean is the threshold.")
     most_trials: Annotated[int, Ge(2), Le(1000)] = setting(
@@ -85,6 +87,7 @@ class Staircase(Interleaving):
             self.reversals,
             self.most_trials,
             self.averaged,
+            self.side == "shared",
         )
 
     def levels(self) -> tuple[int, ...]:

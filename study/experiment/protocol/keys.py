@@ -99,7 +99,8 @@ def _annotation(annotation: Any) -> str:
     if origin is tuple:
         if inner[-1] is not Ellipsis:
             return "two numbers, 0 to 1"
-        return {"text": "list of texts", "whole number": "list of whole numbers"}.get(_annotation(inner[0]), "tables")
+        member = _annotation(inner[0])
+        return f"list of {member}s" if member in ("text", "number", "whole number") else "tables"
     return _WORDS.get(annotation, "table")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from toys import TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
+from toys import QUEST, TOY_PROTOCOL, FakeStimuli, pairs_of, with_staircases
 
 from study.errors import SessionError
 from study.experiment.observers import person, respond, shown_well
@@ -31,6 +31,7 @@ TEXTS = {
     "random order": TEXT.replace("seed = 5", 'seed = 5\nstudy_order = "random"'),
     "alone": with_staircases(TOY_PROTOCOL.split('\n[[studies]]\nname = "liking"')[0]),
     "by group": with_staircases(keys='order = "by-group"\n'),
+    "then constant": with_staircases(table=QUEST + 'side = "shared"\nthen_constant = [0.5, 1.5]\nthen_repeats = 3\n'),
 }
 
 

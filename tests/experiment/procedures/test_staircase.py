@@ -201,7 +201,7 @@ def test_settings_say_what_is_wrong() -> None:
         ({"steps_frames": [4, 0]}, "steps_frames", "expected at least 1 in frames, found 0"),
         ({"start_frames": 1.5}, "start_frames", "expected a whole number in frames, found 1.5"),
         ({"start_frames": True}, "start_frames", "expected a whole number in frames, found True"),
-        ({"side": "left"}, "side", "'both', 'shorter' or 'longer', found 'left'"),
+        ({"side": "left"}, "side", "'both', 'shared', 'shorter' or 'longer', found 'left'"),
         ({"side": "longest"}, "side", "did you mean 'longer'"),
         ({"name": "staircases"}, "name", "did you mean 'staircase'"),
         ({"revesals": 3}, "revesals", "unknown key; did you mean 'reversals'"),
