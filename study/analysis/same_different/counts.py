@@ -172,13 +172,6 @@ def count_answers(answers: pd.DataFrame, *, by_motion: bool = False) -> Counts:
     )
 
 
-def all_motions(counts: Counts) -> Counts:
-    """Return counts of levels that are differences of one motion as counts of differences."""
-    levels, place = np.unique(counts.differences, return_inverse=True)
-    at = (place[:, None] == np.arange(len(levels))).astype(np.float64)
-    return Counts(counts.participants, levels, counts.different @ at, counts.shown @ at)
-
-
 def both_sides(differences: FloatArray) -> FloatArray:
     """Return sizes of the differences, shape (levels, 2): where it is shorter, and where longer; 0 elsewhere."""
     return np.column_stack([np.maximum(-differences, 0.0), np.maximum(differences, 0.0)])

@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from study.analysis.same_different.analyse import analyse_jnd
-from study.analysis.same_different.counts import Counts, all_motions, count_answers
+from study.analysis.same_different.counts import Counts, count_answers
 from study.analysis.same_different.mixed import MixedThresholds, fit_mixed_thresholds
 from study.analysis.same_different.model import ModelFit, fit_model
 from study.models.differencing import criterion_free_delta
@@ -178,7 +178,8 @@ def several_motions(rng: np.random.Generator, scales: list[float], count: int, a
 def test_motions_that_differ_do_not_flatten_the_curve() -> None:
     """The median observer's threshold is the geometric mean over motions; one curve for all lies further out."""
     counts = several_motions(np.random.default_rng(8), [0.5, 1.0, 2.0], 150, 12)
-    found, together = fitted(counts), fitted(all_motions(counts))
+    summed = (tables.reshape(150, 3, -1).sum(axis=1) for tables in (counts.different, counts.shown))
+    found, together = fitted(counts), fitted(Counts(counts.participants, LEVELS, *summed))
     for side, slope in (("shorter", 0.4), ("longer", 0.45)):
         assert found.these_motions[side].frames == pytest.approx(crossing(slope), rel=0.05)
         assert found.typical[side].frames == found.these_motions[side].frames
