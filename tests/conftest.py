@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `segue` has it; read when numpy is loaded
+os.environ["SEGUE_CACHE"] = os.devnull  # a test takes nothing that another kept, under other circumstances
 
 # Tests are imported by path, without packages: this makes the modules beside this file importable.
 sys.path.append(str(Path(__file__).parent))

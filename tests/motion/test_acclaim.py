@@ -14,6 +14,7 @@ from study.motion import quaternions as quat
 from study.motion.clip import global_rotations, joint_positions
 from study.motion.readers.amc import read_amc
 from study.motion.readers.bvh import read_bvh
+from study.motion.readers.registry import with_their_parts
 
 ASF = """# a comment
 :version 1.10
@@ -144,6 +145,7 @@ def test_a_single_skeleton_in_the_folder_serves(acclaim: Writer, tmp_path: Path)
     path = acclaim(ASF, AMC)
     (tmp_path / "07.asf").rename(tmp_path / "body.ASF")
     assert read_amc(path).frames == 2
+    assert with_their_parts([path]) == [path, tmp_path / "body.ASF"], "stimuli are made anew where it changes"
     (tmp_path / "other.asf").write_text(ASF)
     with pytest.raises(
         MotionFileError, match=r"Expected its skeleton beside it as 07\.asf.*found body\.ASF, other\.asf"

@@ -20,7 +20,7 @@ from study.motion.clip import Clip, joint_positions, resample, retarget
 from study.motion.library import open_library
 from study.motion.readers.bvh_writing import write_bvh
 from study.motion.readers.gltf_writing import write_glb
-from study.motion.readers.registry import read_clip
+from study.motion.readers.registry import read_clip, with_their_parts
 from tests.walks import make_walk
 
 # -- A small writer and a reader by matrices, which share no code with ours -------------------------------------------
@@ -285,6 +285,8 @@ def test_the_data_may_lie_in_a_file_beside_it(tmp_path: Path) -> None:
     (tmp_path / "my walk.bin").write_bytes(made.data)
     (tmp_path / "beside.gltf").write_text(json.dumps(made.json))
     assert np.array_equal(read_clip(tmp_path / "beside.gltf").rotations, whole.rotations)
+    parts = with_their_parts([tmp_path / "beside.gltf", tmp_path / "walk.glb"])
+    assert parts[2:] == [tmp_path / "my walk.bin"], "stimuli are made anew where it changes"
 
 
 def test_another_size_than_a_person_s_is_told_and_mended(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -81,14 +82,18 @@ class Manifest:
 def made_from(protocol: Protocol, library: Library) -> str:
     """Hash of all that stimuli are made from: the protocol's text and given files, the library's, this program's own.
 
-    Files count by path, size and time of change, so that asking costs milliseconds.
+    Files count by path, size and times of writing and of change, so that asking costs milliseconds. (The latter can't
+    be set: it shows where a file was replaced by one as large and as old.)
     """
+    from study.motion.readers.registry import with_their_parts
+
     digest = hashlib.sha256(f"{protocol.sha256} {library.name}\n".encode())
-    for path in (*program_files(), *library.files(), *protocol.files_read()):
-        # Python writes what it compiled under passing names, at any time.
-        if path.parent.name != "__pycache__" and path.is_file():
-            state = path.stat()
-            digest.update(f"{path} {state.st_size} {state.st_mtime_ns}\n".encode())
+    for path in (*program_files(), *with_their_parts((*library.files(), *protocol.files_read()))):
+        # Python writes what it compiled under passing names, at any time; a file may name one that can't be.
+        if path.parent.name != "__pycache__":
+            with suppress(OSError, ValueError):
+                state = path.stat()
+                digest.update(f"{path} {state.st_size} {state.st_mtime_ns} {state.st_ctime_ns}\n".encode())
     return digest.hexdigest()
 
 

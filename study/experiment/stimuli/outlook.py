@@ -5,8 +5,8 @@ A protocol and a library come in; an `Outlook` goes out, for a person to look at
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.counting import counted
@@ -15,8 +15,10 @@ from study.experiment.protocol.whole import Protocol, StudySpec
 from study.experiment.stimuli.audit import PairAudit
 from study.experiment.stimuli.films import Film, Planned, Showing, plan_all
 from study.experiment.stimuli.flawed import flaw_notes
-from study.experiment.stimuli.prepare import made_of
+from study.experiment.stimuli.kept import kept
+from study.experiment.stimuli.making import made_of
 from study.experiment.stimuli.shortcuts import ShortcutShare, shortcuts_of, told_away
+from study.experiment.stimuli.stimulus import StimulusSet
 from study.experiment.stimuli.supply import Supply
 from study.experiment.stimuli.ways import Ways
 from study.experiment.wording import Films, FilmTimes, duration_s, minutes
@@ -85,8 +87,8 @@ class Outlook:
     `films` are different films of the whole protocol; `minutes` count films, gaps, answers, pauses, breaks, practice,
     attention checks, the form and reading; `minutes_at_most` with every answer and every film at its longest.
     `trials` are the most that there may be, `fewest_trials` the fewest. `film_times` are what they rest on, for the
-    texts that speak of minutes. `audits` say how the films of each pair differ in what is not judged, and `shortcuts`
-    what that alone could explain; both are empty where not all can be shown.
+    texts that speak of minutes. `stimuli` are all that is shown, None where not all can be; `audits` say how the films
+    of each pair differ in what is not judged, and `shortcuts` what that alone could explain.
     """
 
     rows: tuple[Row, ...]
@@ -98,21 +100,34 @@ class Outlook:
     minutes: int
     minutes_at_most: int
     film_times: Films
-    audits: tuple[PairAudit, ...] = ()
+    stimuli: StimulusSet | None = None
     shortcuts: tuple[ShortcutShare, ...] = ()
 
+    @property
+    def audits(self) -> tuple[PairAudit, ...]:
+        """How the films of each pair differ in what is not judged."""
+        return self.stimuli.audits if self.stimuli else ()
 
-def look_ahead(protocol: Protocol, library: Library) -> Outlook:
-    """Plan all films of a protocol and describe them."""
+
+def look_ahead(protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None = None) -> Outlook:
+    """Plan and make all films of a protocol and describe them, or take what an earlier call kept.
+
+    `progress` is called with transitions that are planned and the number of them, after each.
+    """
+    found = kept(protocol, library, lambda: _looked_ahead(protocol, library, progress), lambda made: not made.problems)
+    return replace(found, stimuli=replace(found.stimuli, protocol=protocol)) if found.stimuli else found
+
+
+def _looked_ahead(protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None) -> Outlook:
     ways = Ways(protocol, library)
-    planned, problems = plan_all(protocol, library, ways)
-    audits: tuple[PairAudit, ...] = ()
+    planned, problems = plan_all(protocol, library, ways, progress)
+    made: StimulusSet | None = None
     shortcuts: tuple[ShortcutShare, ...] = ()
     flaws: tuple[str, ...] = ()
     if not problems:
         try:
             made = made_of(protocol, library, planned, ways)
-            audits, shortcuts = made.audits, shortcuts_of(protocol, made.pairs, made.audits)
+            shortcuts = shortcuts_of(protocol, made.pairs, made.audits)
             flaws = tuple(flaw_notes(made.records))
         except StimulusError as error:
             problems = [str(error)]
@@ -129,7 +144,7 @@ def look_ahead(protocol: Protocol, library: Library) -> Outlook:
         usual,
         longest,
         times,
-        audits,
+        made,
         shortcuts,
     )
 

@@ -1,35 +1,21 @@
-"""Stimuli: from a protocol and a library to all that participants see.
-
-A protocol and a library come in; a `StimulusSet` goes out: each stimulus is a transition, cut to entry, blend and exit,
-as joint positions with a figure and a camera. What is seen is hashed, and the hash is the stimulus's name, so a
-stimulus is rendered once and reused after. Nothing is drawn here; see `rendering`.
-"""
+"""Stimuli: from a protocol and a library to all that participants see, as a `StimulusSet`."""
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from study.errors import StimulusError
-from study.experiment.protocol.whole import Protocol, StudySpec
-from study.experiment.stimuli.audit import audit
-from study.experiment.stimuli.drafts import Draft, add_drafts
-from study.experiment.stimuli.films import Film, Planned, Showing, plan_all
-from study.experiment.stimuli.look import LOOK_VERSION, with_cameras
-from study.experiment.stimuli.manifest import made_from
-from study.experiment.stimuli.stimulus import Stimulus, StimulusSet
-from study.experiment.stimuli.ways import Ways
-from study.tasks.trial import Pair
+from study.experiment.protocol.whole import Protocol
+from study.experiment.stimuli.outlook import look_ahead
+from study.experiment.stimuli.stimulus import StimulusSet
 
 if TYPE_CHECKING:
     from study.motion.library import Library
 
 
 def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int], None] | None = None) -> StimulusSet:
-    """Build all stimuli of a protocol.
+    """All stimuli of a protocol.
 
     Parameters
     ----------
@@ -43,76 +29,12 @@ def prepare(protocol: Protocol, library: Library, progress: Callable[[int, int],
     StimulusError
         With everything that can't be shown, one problem a line.
     """
-    ways = Ways(protocol, library)
-    planned, problems = plan_all(protocol, library, ways, progress)
-    if problems:
-        raise StimulusError("\n".join(problems))
-    return made_of(protocol, library, planned, ways)
-
-
-def made_of(protocol: Protocol, library: Library, planned: Sequence[Planned], ways: Ways) -> StimulusSet:
-    """Build all that was planned.
-
-    Raises
-    ------
-    StimulusError
-        Where two methods of a pair come to look the same, or a camera can't be found.
-    """
-    drafts: dict[Film, Draft] = {}
-    for each in planned:
-        add_drafts(protocol, each, drafts, ways)
-    stimuli = with_cameras(protocol, library, planned, drafts)
-    pairs = tuple(_pair(each.study, showing, stimuli) for each in planned for showing in each.showings)
-    moving = {one.id: (one.positions, one.figure, one.camera) for one in stimuli.values()}
-    return StimulusSet(
-        protocol,
-        library.name,
-        library.synthetic,
-        library.acknowledgement,
-        tuple({stimulus.id: stimulus for stimulus in stimuli.values()}.values()),
-        pairs,
-        versions(),
-        made_from(protocol, library),
-        audit(pairs, moving, protocol.fps),
-    )
+    found = look_ahead(protocol, library, progress)
+    if found.stimuli is None:
+        raise StimulusError("\n".join(found.problems))
+    return found.stimuli
 
 
 def check(protocol: Protocol, library: Library) -> list[str]:
     """Everything that can't be shown, one sentence each; empty where all can."""
-    return plan_all(protocol, library, Ways(protocol, library))[1]
-
-
-def versions() -> dict[str, str]:
-    """What made the stimuli, for manifests."""
-    import scipy
-
-    import study
-
-    return {
-        "segue": study.__version__,
-        "look": str(LOOK_VERSION),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-    }
-
-
-def _pair(study: StudySpec, showing: Showing, stimuli: dict[Film, Stimulus]) -> Pair:
-    transition, condition = showing.settled.transition, showing.condition
-    shown = tuple(stimuli[film].id for film in showing.films)
-    if len(set(shown)) < len(set(condition.methods)):
-        one, other = (repr(method) for method in condition.methods[:2])
-        raise StimulusError(
-            f"transition {transition.name!r}: expected two films by the methods {one} and {other} of the study "
-            f"{study.name!r}, found that they look the same; choose other motions, other points, or another method."
-        )
-    return Pair(
-        name="/".join(filter(None, (study.name, transition.name, condition.name))),
-        study=study.name,
-        task=study.task,
-        motion=transition.name,
-        category=transition.category,
-        stimuli=shown,
-        methods=condition.methods,
-        difference_frames=condition.difference_frames,
-    )
+    return list(look_ahead(protocol, library).problems)

@@ -44,6 +44,16 @@ def file_of(path: Path) -> Path:
     return path.parent if is_animation(path) else path
 
 
+def buffers_of(path: Path) -> list[Path]:
+    """The files that a glTF file has its numbers in, besides itself; none where it can't be read."""
+    try:
+        listed = read_document(path).items("buffers")
+    except MotionFileError:
+        return []
+    uris = [uri for one in listed if isinstance(one, dict) and isinstance(uri := one.get("uri"), str)]
+    return [path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
+
+
 def bare_name(path: Path) -> str:
     """The name of a motion file without its suffix; of an animation in a glTF file, its whole name."""
     return path.name if path.parent.suffix.lower() in GLTF_SUFFIXES else path.stem

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -11,7 +11,7 @@ from study.motion.clip import HIGHEST_FPS, LOWEST_FPS, Clip
 from study.motion.readers.amc import read_amc
 from study.motion.readers.bvh import read_bvh
 from study.motion.readers.gltf import read_gltf
-from study.motion.readers.gltf_file import file_of
+from study.motion.readers.gltf_file import buffers_of, file_of
 from study.motion.readers.other_formats import by_suffix
 from study.motion.upright import put_upright
 
@@ -32,6 +32,15 @@ class Reader(Protocol):
 
 READERS: dict[str, Reader] = {".bvh": read_bvh, ".amc": read_amc, ".glb": read_gltf, ".gltf": read_gltf}
 SUFFIXES = tuple(READERS)
+
+
+def with_their_parts(paths: Iterable[Path]) -> list[Path]:
+    """Motion files, and those that are read with them: skeletons beside AMC files, the buffers of glTF files."""
+    files = list(paths)
+    folders = dict.fromkeys(path.parent for path in files if path.suffix.lower() == ".amc")
+    skeletons = [one for folder in folders for one in sorted(folder.glob("*.[aA][sS][fF]"))]
+    buffers = [one for path in files if path.suffix.lower() == ".gltf" for one in buffers_of(path)]
+    return [*files, *skeletons, *buffers]
 
 
 def read_clip(
