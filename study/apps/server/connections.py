@@ -50,33 +50,6 @@ class _Bodies:
 _bodies = _Bodies()
 
 
-class _Joined:
-    """A transport that sends the head and the body of a reply together: one system call, one packet."""
-
-    def __init__(self, transport: asyncio.Transport, loop: asyncio.AbstractEventLoop) -> None:
-        self._transport, self._loop = transport, loop
-        self._parts: list[bytes] = []
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._transport, name)
-
-    def write(self, part: bytes) -> None:
-        """Bytes to be sent when what runs now has run."""
-        if not self._parts:
-            self._loop.call_soon(self._send)
-        self._parts.append(part)
-
-    def close(self) -> None:
-        """No more bytes will come."""
-        self._send()
-        self._transport.close()
-
-    def _send(self) -> None:
-        if self._parts:
-            self._transport.write(b"".join(self._parts))
-            self._parts.clear()
-
-
 class Connection(HttpToolsProtocol):
     """One connection; ended where a request or the taking of its reply lasts too long, or a request is too large.
 
@@ -92,7 +65,7 @@ class Connection(HttpToolsProtocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Somebody is there; a request has to follow."""
-        super().connection_made(_Joined(transport, self.loop))  # type: ignore[arg-type]
+        super().connection_made(transport)
         self._within(REQUEST_SECONDS)
 
     def connection_lost(self, exc: Exception | None) -> None:

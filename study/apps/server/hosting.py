@@ -212,10 +212,8 @@ class Host(LiveSessions):
 
     async def _at(self, live: LiveSession, fits: Callable[[Session], bool]) -> Session | None:
         """The state at the step that a message is about; None where another one is due."""
-        if (found := views.ahead(live.state, fits)) is None:
-            await self.take_up(live)
-            found = views.ahead(live.state, fits)
-        return found
+        # Who resumes reads the instructions again, so a session that was taken up may have pages that memory lacks.
+        return views.ahead(live.state, fits) or views.ahead(await self.take_up(live), fits)
 
     async def happened(self, live: LiveSession, message: Happened) -> None:
         """Another event, reported by the page."""

@@ -116,7 +116,7 @@ class LiveSessions:
         known = sum(happened.values()), "finished" in happened, "display" in happened
         return LiveSession(token, record, participant, state, answers, participant.page, *known)
 
-    async def take_up(self, live: LiveSession) -> None:
+    async def take_up(self, live: LiveSession) -> Session:
         """What the database has, in place of what is in memory, if another server stored something meanwhile."""
         known = await self._still_there(live)
         fresh = await asyncio.to_thread(self._load, live.token, known, live.record)
@@ -124,6 +124,7 @@ class LiveSessions:
         if fresh.answers != live.answers or fresh.events != live.events:
             live.state, live.answers = fresh.state, fresh.answers
             live.events, live.finished = fresh.events, fresh.finished
+        return fresh.state
 
     async def _still_there(self, live: LiveSession) -> Participant:
         known = await self.look_up(live.token)

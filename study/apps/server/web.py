@@ -11,17 +11,16 @@ import hashlib
 import html
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from study.apps.server.hosting import Host
-from study.apps.server.inbox import DATABASE_AWAY, Inbox, cookie
+from study.apps.server.inbox import message_routes
 from study.apps.server.limits import Limits
 from study.apps.server.memory import hand_back
 from study.apps.server.messages import RefusedError
@@ -45,47 +44,49 @@ Handler = Callable[[Request], Awaitable[Response]]
 
 
 def make_app(host: Host) -> Limits:
-    """The application, from the outside in: limits, messages, everything else."""
+    """The application, within the limits of every response."""
 
     async def study(_: Request) -> Response:
         return JSONResponse(_about(host))
 
     async def film(request: Request) -> Response:
-        live = await host.live_session(cookie(request.headers.get("cookie", "").encode("latin-1"), host.cookie))
+        live = await host.live_session(request.cookies.get(host.cookie, ""))
         found = None if live is None else await host.film(live, request.path_params["name"])
         if found is None:
             raise RefusedError(404, "Expected a film of the trial that is shown now.")
         return found
 
-    guarded = partial(_guarded, host)
     routes = [
+        *message_routes(host),
         Route("/api/study", study, methods=["GET"]),
-        Route("/films/{name:str}.mp4", guarded(film), methods=["GET"]),
-        *researcher_routes(host, guarded),
+        Route("/films/{name:str}.mp4", film, methods=["GET"]),
+        *researcher_routes(host),
         *_pages(host),
     ]
-    pages = Starlette(routes=routes, lifespan=_lifespan(host))
+    app = Starlette(routes=routes, lifespan=_lifespan(host), exception_handlers=_refusals(host))
     # It would send people to an address made from the request's Host header.
-    pages.router.redirect_slashes = False
-    return Limits(Inbox(pages, host))
+    app.router.redirect_slashes = False
+    return Limits(app)
 
 
-def _guarded(host: Host, handler: Handler) -> Handler:
+def _refusals(host: Host) -> dict[Any, Any]:
     """Refusals become JSON with one sentence; what went wrong on our side is logged, not shown."""
 
-    async def run(request: Request) -> Response:
-        try:
-            return await handler(request)
-        except RefusedError as refusal:
-            return JSONResponse({"error": refusal.why}, status_code=refusal.status)
-        except SegueError as refusal:
-            log.warning("%s %r: %r", request.method, request.url.path, str(refusal))
-            return JSONResponse({"error": str(refusal)}, status_code=422)
-        except AWAY as error:
-            host.database_away(error)
-            return JSONResponse({"error": DATABASE_AWAY}, status_code=503)
+    async def refused(_: Request, refusal: RefusedError) -> Response:
+        return JSONResponse({"error": refusal.why}, status_code=refusal.status)
 
-    return run
+    async def unfit(request: Request, refusal: SegueError) -> Response:
+        log.warning("%s %r: %r", request.method, request.url.path, str(refusal))
+        return JSONResponse({"error": str(refusal)}, status_code=422)
+
+    async def away(_: Request, error: Exception) -> Response:
+        host.database_away(error)
+        return JSONResponse({"error": "The database can't be reached now; send this again."}, status_code=503)
+
+    async def gone(_: Request, __: ClientDisconnect) -> Response:
+        return Response(status_code=400)
+
+    return {RefusedError: refused, SegueError: unfit, ClientDisconnect: gone, **dict.fromkeys(AWAY, away)}
 
 
 def _lifespan(host: Host) -> Callable[[Starlette], contextlib.AbstractAsyncContextManager[None]]:

@@ -280,16 +280,17 @@ def test_guesses_that_are_sent_together_are_counted_each(serve: Callable[..., Se
     serving = serve()
 
     async def together() -> Any:
-        from study.apps.server.inbox import Letter, RefusedError, withdraw
+        from study.apps.server.inbox import RefusedError, Request, withdraw
 
         async def one(number: int) -> Any:
             async def receive() -> dict[Any, Any]:
                 return {"type": "http.request", "body": json.dumps({"code": str(number)}).encode()}
 
-            headers = {b"x-segue-page": b"page-one", b"content-type": b"application/json"}
-            scope = {"client": (f"2001:db8::{number:x}", 1)}  # one machine, with all addresses of its network
+            headers = [(b"x-segue-page", b"page-one"), (b"content-type", b"application/json")]
+            client = f"2001:db8::{number:x}", 1  # one machine, with all addresses of its network
+            scope = {"type": "http", "headers": headers, "client": client}
             try:
-                await withdraw(serving.host, Letter(scope, headers, receive))
+                await withdraw(serving.host, Request(scope, receive))
             except RefusedError as refusal:
                 return refusal.status
             return 200
