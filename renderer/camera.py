@@ -146,12 +146,15 @@ def view_axes(yaw: FloatArray | float, elevation: FloatArray | float) -> FloatAr
     Both in radians, as numbers or of shape `(...)`.
     """
     sin_y, cos_y, sin_e, cos_e = np.sin(yaw), np.cos(yaw), np.sin(elevation), np.cos(elevation)
-    rows = [
-        [cos_y, np.zeros_like(cos_y), -sin_y],
-        [-sin_e * sin_y, cos_e, -sin_e * cos_y],
-        [cos_e * sin_y, sin_e, cos_e * cos_y],
-    ]
-    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+    rows: tuple[tuple[FloatArray | float, ...], ...] = (
+        (cos_y, 0.0, -sin_y),
+        (-sin_e * sin_y, cos_e, -sin_e * cos_y),
+        (cos_e * sin_y, sin_e, cos_e * cos_y),
+    )
+    axes = np.empty((*np.broadcast_shapes(np.shape(yaw), np.shape(elevation)), 3, 3))
+    for row, column in np.ndindex(3, 3):
+        axes[..., row, column] = rows[row][column]
+    return axes
 
 
 def smooth_path(positions: FloatArray, seconds: float, fps: float) -> FloatArray:

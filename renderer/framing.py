@@ -179,8 +179,9 @@ def _slopes(
     A ball of radius `r` at `x` aside and `z` ahead is seen up to the slope of the tangent to its circle.
     """
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    axes = camera_path(max(group, key=len), camera, fps).axes  # it turns alike during every clip
     for clip, radius in zip(group, radii, strict=True):
-        seen = turned(clip - camera.eye, camera_path(clip, camera, fps).axes)
+        seen = turned(clip - camera.eye, axes[: len(clip)])
         ahead2 = seen[..., 2] ** 2 - radius**2
         for axis in (0, 1):
             middle = -seen[..., axis] * seen[..., 2]
