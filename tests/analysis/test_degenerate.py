@@ -17,7 +17,7 @@ import pytest
 from study.analysis.psychometric.analyse import analyse_psychometric
 from study.analysis.psychometric.likelihood import fit_likelihood
 from study.analysis.psychometric.model import make_model
-from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric
+from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric, threshold_at
 from study.analysis.same_different.analyse import analyse_jnd
 from study.analysis.same_different.d_prime import d_prime
 from study.analysis.to_json import to_json
@@ -63,7 +63,7 @@ def test_psychometric_functions(seed: int) -> None:
         assert fit == best
         assert len(answered) < 2
         return
-    for estimate in (fit.threshold, fit.width, fit.lapse, fit.guess, fit.overdispersion):
+    for estimate in (fit.threshold, fit.width, fit.lapse, fit.guess, fit.overdispersion, threshold_at(fit, 0.8)):
         if estimate.value is None:
             assert estimate.note
         else:

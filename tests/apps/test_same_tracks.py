@@ -159,7 +159,7 @@ def test_the_same_responses_lead_to_the_same_trials_in_window_browser_and_simula
     for course in courses:
         tracked = own[own["study"] == course.study]
         assert list(tracked["trial"]) == list(range(course.first, course.first + len(tracked)))
-        assert len(set(tracked["difference_frames"])) > 3
+        assert len(set(tracked["difference_frames"])) > 2, "a track that rises and falls shows three levels at least"
     # The study after it has the numbers that were kept for it.
     assert list(own[own["study"] == "beside"]["trial"]) == [courses[-1].first + courses[-1].most]
 

@@ -178,6 +178,36 @@ def _positive(found: Estimate) -> Estimate:
     return Estimate(back(found.value), interval, found.status, found.note)
 
 
+def threshold_at(fit: PsychometricFit, share: float) -> Estimate:
+    """Return the level at which a share of the answers is "yes", guesses and lapses included.
+
+    Parameters
+    ----------
+    fit
+        From `fit_psychometric`.
+    share
+        Between 0 and 1; where part of the posterior never reaches it, the interval is open.
+    """
+    thresholds, widths, lapses, guesses = np.meshgrid(*fit.grid.nodes[:4], indexing="ij")
+    target = (share - guesses) / (1 - guesses - lapses)
+    check_share(share, "share")
+    sigmoid, mass = fit.model.sigmoid, fit.grid.density.sum(axis=4)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        place = thresholds + np.exp(widths) * (sigmoid.inverse(target) - sigmoid.half) / sigmoid.span
+    place = np.where(target <= 0, -np.inf, np.where(target >= 1, np.inf, place)).ravel()
+    order = np.argsort(place)
+    cumulated, ordered = np.cumsum(mass.ravel()[order]), place[order]
+    tails = ((1 - fit.confidence) / 2, 0.5, (1 + fit.confidence) / 2)
+    low, middle, high = ordered[np.minimum(np.searchsorted(cumulated, tails), len(ordered) - 1)]
+    ends = [None if edge or not np.isfinite(end) else float(sigmoid.levels(end))
+            for end, edge in zip((low, high), fit.grid.open_ends[0], strict=True)]  # fmt: skip
+    interval = Interval(ends[0], ends[1], fit.confidence)
+    axis = sigmoid.axis(fit.data.levels)
+    if fit.note or not axis.min() <= middle <= axis.max():
+        return Estimate(None, interval, "not reached", fit.note or f"{100 * share:g}% lies outside the levels shown")
+    return Estimate(float(sigmoid.levels(middle)), interval)
+
+
 def curve_of(fit: PsychometricFit, points: int = 101) -> tuple[tuple[float, float], ...]:
     """Return the posterior mean of the psychometric function over the levels, for drawing: level, share."""
     sigmoid = fit.model.sigmoid

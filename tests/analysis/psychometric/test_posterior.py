@@ -11,7 +11,7 @@ from scipy.stats import betabinom, gumbel_l, logistic, norm
 
 from study.analysis.psychometric.likelihood import LikelihoodFit, fit_likelihood
 from study.analysis.psychometric.model import make_model
-from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric
+from study.analysis.psychometric.posterior import PsychometricFit, curve_of, fit_psychometric, threshold_at
 from study.errors import AnalysisError
 from study.models import posterior_grid
 
@@ -150,13 +150,15 @@ def test_deviance_tells_a_curve_that_does_not_follow() -> None:
     assert bad.dispersion > 3
 
 
-def test_the_curve_passes_through_the_shares_that_were_drawn() -> None:
+def test_a_threshold_at_another_share() -> None:
     shown = np.full(7, 5000.0)
     fit = fitted(np.round(share("normal", 4, 3, 0.5, 0.0) * shown), shown)
     scale = 3 / (norm.ppf(0.95) - norm.ppf(0.05))
+    found = threshold_at(fit, 0.6)
+    assert found.value == pytest.approx(4 + scale * norm.ppf(0.2), abs=0.1)
+    assert threshold_at(fit, 0.999).value is None
     curve = np.array(curve_of(fit))
     assert np.interp(4, *curve.T) == pytest.approx(0.75, abs=0.02)
-    assert np.interp(4 + scale * norm.ppf(0.2), *curve.T) == pytest.approx(0.6, abs=0.02)
 
 
 @pytest.mark.parametrize(
@@ -215,6 +217,17 @@ def test_speed_is_of_the_right_order() -> None:
     for one in yes:
         fit_psychometric(LEVELS, one, np.full(7, 40))
     assert (time.perf_counter() - start) / 10 < 0.03
+
+
+def test_a_threshold_at_another_share_of_a_sigmoid_that_is_not_symmetric() -> None:
+    """Gumbel in closed form: 1 - exp(-exp(x)), by the place of one half and the width from 5% to 95%."""
+    shown = np.full(7, 5000.0)
+    fit = fitted(
+        np.round(share("gumbel", 4, 3, 0.0, 0.0) * shown), shown, make_model("yes-no", sigmoid="gumbel", guess=0.0)
+    )
+    at = {part: np.log(-np.log(1 - part)) for part in (0.05, 0.5, 0.75, 0.95)}
+    expected = 4 + 3 * (at[0.75] - at[0.5]) / (at[0.95] - at[0.05])
+    assert threshold_at(fit, 0.75).value == pytest.approx(expected, abs=0.1)
 
 
 @pytest.mark.parametrize(("task", "bound"), [("yes-no", ("guess",)), ("2afc", ())])
