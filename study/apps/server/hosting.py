@@ -64,7 +64,6 @@ class Host(LiveSessions):
         self.writer = Writer(responses.engine)
         self.cookie = f"segue-{protocol.sha256[:8]}"
         """Part of its name: browsers share cookies among all ports of a machine, which may serve several studies."""
-        self.frames = {record.id: record.frames for record in manifest.records}
         # The same at every start, whatever was rendered since: pages keep films over a restart.
         known = known_beforehand(protocol, manifest.pairs)
         room = 1 if known.issuperset(self.frames) else 2
