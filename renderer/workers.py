@@ -195,7 +195,7 @@ def _connected(address: str) -> Any:
         import distributed
         from distributed.comm.addressing import resolve_address
     except ImportError as error:
-        raise RendererError(f"{address}: expected Dask, found none here; pip install 'segue[cluster]'.") from error
+        raise RendererError(f"{address}: expected Dask, found none here; pip install dask distributed.") from error
     dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"})  # jobs carry all that they need
     connect: Any = distributed.Client  # untyped
     try:

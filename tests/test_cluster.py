@@ -44,7 +44,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     try:
         import distributed  # noqa: F401
     except ImportError:
-        unavailable("Dask", "pip install 'segue[cluster]'")
+        unavailable("Dask", "pip install dask distributed")
     folder = tmp_path_factory.mktemp("cluster")
     (folder / "cluster.py").write_text(PROGRAM)
     # By default results of a worker that was killed are asked for during half a minute.
