@@ -52,5 +52,5 @@ def test_a_killed_process_costs_its_job_a_second_try(tmp_path: Path) -> None:
 
 def test_a_wrong_address_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(RendererError, match=r"expected Dask, found none here; pip install 'segue\[cluster\]'"):
+    with pytest.raises(RendererError, match=r"expected Dask, found none here; pip install dask distributed"):
         Workers("tcp://127.0.0.1:9")
