@@ -18,6 +18,7 @@ and the same pose must land on the same pixels whatever batch it stands in.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -186,14 +187,21 @@ class CameraPath:
     axes: FloatArray
 
 
-def camera_path(positions: FloatArray, camera: Camera, fps: float) -> CameraPath:
-    """Where a camera is and looks in each frame of a film with these positions, which matter where it tracks."""
-    frames = len(positions)
+def camera_path(positions: FloatArray, camera: Camera, fps: float, shown: Sequence[int] | None = None) -> CameraPath:
+    """Where a camera is and looks in each frame of a film with these positions, which matter where it tracks.
+
+    With `shown`, in these frames alone.
+    """
+    frames = np.arange(len(positions)) if shown is None else np.asarray(shown)
     tracks = camera.track_seconds is not None
-    shift = smooth_path(positions, float(camera.track_seconds or 0.0), fps) if tracks else np.zeros((frames, 3))
+    shift = (
+        smooth_path(positions, float(camera.track_seconds or 0.0), fps)[frames]
+        if tracks
+        else np.zeros((len(frames), 3))
+    )
     if camera.turns is None:
-        return CameraPath(shift, np.broadcast_to(camera.axes, (frames, 3, 3)))
-    seconds = np.arange(frames) / fps
+        return CameraPath(shift, np.broadcast_to(camera.axes, (len(frames), 3, 3)))
+    seconds = frames / fps
     yaw, elevation = (sum(c * seconds**i for i, c in enumerate(row)) for row in camera.turns)
     return CameraPath(shift, view_axes(camera.yaw + yaw, camera.elevation + elevation))
 
@@ -219,7 +227,8 @@ def project(camera: Camera, points: FloatArray, axes: FloatArray | None = None) 
 
 
 def turned(points: FloatArray, axes: FloatArray) -> FloatArray:
-    """Points `(..., 3)` along axes `(3, 3)`, or along axes `(frames, 3, 3)` of their own for each frame."""
+    """Points `(..., 3)` along axes `(n, 3)`, or along axes `(frames, n, 3)` of their own for each frame: `(..., n)`."""
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    rows = axes.reshape(*axes.shape[:-2], *(1,) * (points.ndim - axes.ndim + 1), 3, 3) if axes.ndim > 2 else axes
-    return np.stack([x * rows[..., i, 0] + y * rows[..., i, 1] + z * rows[..., i, 2] for i in range(3)], axis=-1)
+    count = axes.shape[-2]
+    rows = axes.reshape(*axes.shape[:-2], *(1,) * (points.ndim - axes.ndim + 1), count, 3) if axes.ndim > 2 else axes
+    return np.stack([x * rows[..., i, 0] + y * rows[..., i, 1] + z * rows[..., i, 2] for i in range(count)], axis=-1)

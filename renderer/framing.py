@@ -160,45 +160,47 @@ def _panning(
     right, up, back = np.moveaxis(turned(every - eye, view_axes(yaw, 0.0)), -1, 0)
     bearing, height = np.arctan2(right, -back), np.arctan2(up, np.hypot(right, back))
     # Rounded well below what moves a pixel: a solver's last digits differ between machines.
-    turns = np.round([_polynomial(seconds, -bearing), _polynomial(seconds, -height - elevation)], 10)
+    turns = np.round(_polynomials(seconds, np.stack([-bearing, -height - elevation])), 10)
     camera = Camera(eye, axes, 1.0, size, turns=turns)
-    low, high = _slopes(camera, group, radii, fps)
     # As much room above as below: what reaches up for a moment would else leave some unused at the feet.
-    turns[1, 0] -= np.round(0.5 * (np.arctan(low[1]) + np.arctan(high[1])), 10)
+    angles = np.arctan(_slopes(camera, group, radii, fps, axis=1))
+    raised = np.round(angles.mean(), 10)
+    turns[1, 0] -= raised
     camera = replace(camera, turns=turns)
-    low, high = _slopes(camera, group, radii, fps)
-    focal = np.array(fills) * 0.5 * np.array(size) / np.maximum(np.maximum(high, -low), 1e-3)
+    slopes = np.stack([_slopes(camera, group, radii, fps, axis=0), np.tan(angles - raised)])
+    focal = np.array(fills) * 0.5 * np.array(size) / np.maximum(np.abs(slopes).max(axis=1), 1e-3)
     return replace(camera, focal_pixels=float(focal.min()))
 
 
 def _slopes(
-    camera: Camera, group: Sequence[FloatArray], radii: Sequence[FloatArray | float], fps: float
-) -> tuple[FloatArray, FloatArray]:
-    """The least and the largest slope to the right and upwards, `(2,)` each, at which anything of a group is seen.
+    camera: Camera, group: Sequence[FloatArray], radii: Sequence[FloatArray | float], fps: float, axis: int
+) -> FloatArray:
+    """The least and the largest slope, `(2,)`, at which anything of a group is seen: to the right (0) or upwards (1).
 
     A ball of radius `r` at `x` aside and `z` ahead is seen up to the slope of the tangent to its circle.
     """
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    axes = camera_path(max(group, key=len), camera, fps).axes  # it turns alike during every clip
+    low, high = np.inf, -np.inf
+    axes = camera_path(max(group, key=len), camera, fps).axes[:, [axis, 2]]  # it turns alike during every clip
     for clip, radius in zip(group, radii, strict=True):
-        seen = turned(clip - camera.eye, axes[: len(clip)])
-        ahead2 = seen[..., 2] ** 2 - radius**2
-        for axis in (0, 1):
-            middle = -seen[..., axis] * seen[..., 2]
-            around = radius * np.sqrt(seen[..., axis] ** 2 + ahead2)
-            low[axis] = min(low[axis], float(((middle - around) / ahead2).min()))
-            high[axis] = max(high[axis], float(((middle + around) / ahead2).max()))
-    return low, high
+        aside, ahead = np.moveaxis(turned(clip - camera.eye, axes[: len(clip)]), -1, 0)
+        ahead2 = ahead**2 - radius**2
+        middle, around = -aside * ahead, radius * np.sqrt(aside**2 + ahead2)
+        low = min(low, float(((middle - around) / ahead2).min()))
+        high = max(high, float(((middle + around) / ahead2).max()))
+    return np.array([low, high])
 
 
-def _polynomial(seconds: FloatArray, values: FloatArray) -> FloatArray:
-    """Coefficients of the polynomial of least squared error, constant first, always `PAN_ORDER + 1` of them."""
+def _polynomials(seconds: FloatArray, values: FloatArray) -> FloatArray:
+    """Polynomials of least squared error through values `(rows, n)`: `(rows, PAN_ORDER + 1)`, the constants first."""
     order = min(PAN_ORDER, len(np.unique(seconds)) - 1)
-    found = np.zeros(PAN_ORDER + 1)
-    fitted = (
-        np.polynomial.Polynomial.fit(seconds, values, order).convert().coef if order else values.mean(keepdims=True)
-    )
-    found[: len(fitted)] = fitted
+    middle, half = 0.5 * seconds.max(), 0.5 * seconds.max() or 1.0
+    basis = np.vander((seconds - middle) / half, order + 1, increasing=True)
+    found = np.zeros((len(values), PAN_ORDER + 1))
+    for power, factors in enumerate(np.linalg.lstsq(basis, values.T)[0]):
+        # ((s - middle) / half) ** power, by powers of s
+        found[:, : power + 1] += np.outer(
+            factors, np.polynomial.polynomial.polyfromroots([middle] * power) / half**power
+        )
     return found
 
 

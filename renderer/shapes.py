@@ -75,12 +75,12 @@ def on_picture(poses: Poses, camera: Camera, fps: float) -> tuple[FloatArray, Fl
         The points, `(frames, points, 2)`, and the edges of the figure as `lay_out` draws it, without smooth edges and
         shadows: `(frames, 4)`, left, top, right, bottom; not cut at the edges of the picture.
     """
-    path, shown = camera_path(poses.positions, camera, fps), poses.frames
-    shift, axes = path.shift[shown][:, None], path.axes[shown]
-    ends, nearness = project(camera, poses.placed - shift[:, None], axes)
+    path = camera_path(poses.positions, camera, fps, poses.frames)
+    shift = path.shift[:, None]
+    ends, nearness = project(camera, poses.placed - shift[:, None], path.axes)
     reach = (poses.figure.radii * camera.focal_pixels * nearness)[..., None]
     edges = np.concatenate([(ends - reach).min(axis=(1, 2)), (ends + reach).max(axis=(1, 2))], axis=1)
-    return project(camera, poses.positions[shown] - shift, axes)[0], edges
+    return project(camera, poses.positions[poses.frames] - shift, path.axes)[0], edges
 
 
 def lay_out(

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `segue` has it; read when numpy is loaded
-os.environ["SEGUE_CACHE"] = os.devnull  # a test takes nothing that another kept, under other circumstances
+os.environ["SEGUE_CACHE"] = os.devnull  # how stimuli are settled is tested anew each time; see `settled_once`
 
 # Tests are imported by path, without packages: this makes the modules beside this file importable.
 sys.path.append(str(Path(__file__).parent))
@@ -29,6 +29,18 @@ def mocap() -> Path:
     if not (MOCAP / "cmu_bvh").is_dir():
         unavailable("real motion capture", f"expected it in {MOCAP}, or in the folder that SEGUE_MOCAP names")
     return MOCAP
+
+
+@pytest.fixture(scope="module", autouse=True)
+def settled_once(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests of what is done with settled stimuli settle each protocol once in a run, whichever comes first."""
+    if request.path.relative_to(Path(__file__).parent).parts[0] not in ("apps", "power", "report"):
+        yield
+        return
+    own = tmp_path_factory.getbasetemp()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SEGUE_CACHE", str((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "settled"))
+        yield
 
 
 @pytest.fixture(scope="session")

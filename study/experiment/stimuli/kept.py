@@ -40,6 +40,8 @@ def kept(protocol: Protocol, library: Library, make: Callable[[], Made], worth: 
         return make()
     path = folder / f"{_key(protocol, library)}.outlook"
     if (content := _read(path)) is not None:
+        with suppress(OSError):
+            path.touch()  # the longest unused are dropped first
         found: Made = pickle.loads(content)
         return found
     made = make()
