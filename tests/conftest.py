@@ -31,10 +31,14 @@ def mocap() -> Path:
     return MOCAP
 
 
+# What these test is how stimuli, or parts of them, come to be: they make all anew.
+MAKING = ("experiment/stimuli", "experiment/test_given", "motion", "papers", "renderer", "test_cluster", "transitions")
+
+
 @pytest.fixture(scope="module", autouse=True)
 def settled_once(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Tests of what is done with settled stimuli settle each protocol once in a run, whichever comes first."""
-    if request.path.relative_to(Path(__file__).parent).parts[0] not in ("apps", "power", "report"):
+    if request.path.relative_to(Path(__file__).parent).as_posix().startswith(MAKING):
         yield
         return
     own = tmp_path_factory.getbasetemp()

@@ -14,6 +14,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from math import ceil
 from pathlib import Path
 
@@ -159,7 +160,7 @@ def open_library(spec: str | Path) -> Library:
         Where there is no such folder, it holds no motion files, or two of its files can't be distinguished.
     """
     if str(spec) == SYNTHETIC:
-        return SyntheticLibrary()
+        return _synthetic()
     folder = Path(spec).expanduser()
     try:
         is_file, is_folder = folder.is_file(), folder.is_dir()
@@ -197,6 +198,12 @@ class SyntheticLibrary(Library):
 
     def _make(self, entry: Entry, fps: float | None, min_seconds: float | None) -> Clip:
         return synthetic.synthesize(entry.name, seconds=min_seconds, fps=30.0 if fps is None else fps)
+
+
+@cache
+def _synthetic() -> SyntheticLibrary:
+    """One for the whole program: to make a motion up takes a third of a second, and nothing of it can change."""
+    return SyntheticLibrary()
 
 
 class FolderLibrary(Library):
