@@ -83,6 +83,26 @@ def test_single_precision_is_good_to_a_millionth(pair: Any) -> None:
     np.testing.assert_allclose(single, exact, atol=4e-6, rtol=2e-6)
 
 
+@pytest.mark.parametrize(("precision", "within"), [("double", 1e-12), ("single", 2e-6)])
+@pytest.mark.parametrize("spread", [0.1, 0.6, 5.0])
+def test_either_sign_of_a_quaternion_is_the_same_rotation(
+    pair: Any, precision: str, within: float, spread: float
+) -> None:
+    """Joints that turn little, further than a right angle, and anyhow; half of the quaternions with the other sign."""
+    rng = np.random.default_rng(3)
+    around = Rotation.from_rotvec(spread * rng.normal(size=(60 * pair[0].skeleton.joints, 3)))
+    every = (around * Rotation.from_rotvec([1.0, 2.0, -1.0])).as_quat(scalar_first=True)
+    every = (every * rng.choice([-1.0, 1.0], (len(every), 1))).reshape(60, -1, 4)
+    clips = [replace(pair[0], rotations=part, root_positions=np.zeros((30, 3))) for part in (every[:30], every[30:])]
+    found = cm.cost_matrix(*clips, nu=0.0, root="none", precision=precision)
+    apart = np.zeros((30, 30))
+    for k, weight in enumerate(joint_weights(clips[0].skeleton, "wang2003")):
+        one, other = (Rotation.from_quat(clip.rotations[:, k], scalar_first=True) for clip in clips)
+        for i in range(30):
+            apart[i] += weight * (0.5 * (one[i].inv() * other).magnitude()) ** 2
+    np.testing.assert_allclose(found, apart, atol=within * joint_weights(clips[0].skeleton, "wang2003").sum())
+
+
 def test_without_velocity_and_root_it_is_the_difference_of_2004(pair: Any) -> None:
     weights = joint_weights(pair[0].skeleton)
     np.testing.assert_allclose(
