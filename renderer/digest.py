@@ -52,20 +52,29 @@ class FramesHash:
         self.frames += 1
 
     def _plane(self, plane: NDArray[np.unsignedinteger], ground: int, within: Box) -> None:
-        left, top, right, bottom = within
-        differs = plane[top:bottom, left:right] != ground
-        rows = np.flatnonzero(differs.any(axis=1))
-        if not len(rows):
-            self._sha.update(np.zeros(4, dtype="<i8").tobytes())
-            return
-        columns = np.flatnonzero(differs.any(axis=0))
-        box = (left + columns[0], top + rows[0], left + columns[-1] + 1, top + rows[-1] + 1)
+        box = _drawn(plane, ground, within)
         self._sha.update(np.array(box, dtype="<i8").tobytes())
         self._sha.update(np.ascontiguousarray(plane[box[1] : box[3], box[0] : box[2]]).view(np.uint8).data)
 
     def hexdigest(self) -> str:
         """The hash of the frames so far."""
         return self._sha.hexdigest()
+
+
+def _drawn(plane: NDArray[np.unsignedinteger], ground: int, within: Box) -> Box:
+    """The smallest box outside which all is ground, sought from the edges; zeros where there is nothing else."""
+    left, top, right, bottom = within
+    while top < bottom and (plane[top, left:right] == ground).all():
+        top += 1
+    if top == bottom:
+        return 0, 0, 0, 0
+    while (plane[bottom - 1, left:right] == ground).all():
+        bottom -= 1
+    while (plane[top:bottom, left] == ground).all():
+        left += 1
+    while (plane[top:bottom, right - 1] == ground).all():
+        right -= 1
+    return left, top, right, bottom
 
 
 def hash_frames(frames: Iterable[Bytes], size: tuple[int, int]) -> str:
