@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.files import write_whole
+from study.files import check_place, write_whole
 from study.report import tables, words
 from study.report.material import gather
 
@@ -65,14 +65,15 @@ def write_report(
     from study.report.page import compose
 
     folder = Path(results_folder)
+    target = folder if out is None else Path(out)
+    path = target / "report.html"
     material = gather(folder, database)
+    check_place(path)
     with embedding(material.manifest) as pictures:
         analysis = analysis or analyse_folder(material.protocol, material.answers, material.checks, resamples=resamples)
         page = replace(compose(material, analysis), pictures=pictures())
-    target = folder if out is None else Path(out)
     _write_files(target, page, analysis)
     write_whole(target / "manuscript.md", as_markdown(page))
-    path = target / "report.html"
     write_whole(path, to_html(page))
     return path
 

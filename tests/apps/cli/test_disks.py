@@ -54,11 +54,12 @@ WRITES = {
     "bids": ["export", "STUDY", "--to", "bids", "--out", "OUT/x"],
 }  # fmt: skip
 
-FULL = """
+EACH = """
 import contextlib, io, json, resource, sys
 from study.apps.cli import run
 verbs = json.loads(sys.argv[1])
-resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+if sys.argv[2] == "full":
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
 found = {}
 for name, arguments in verbs.items():
     said = io.StringIO()
@@ -80,6 +81,16 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def each(verbs: dict[str, list[str]], disk: str, *before: str) -> dict[str, tuple[int, str]]:
+    """Exit status and errors of verbs, one after the other in one program, which `before` starts."""
+    child = subprocess.run(
+        [*before, sys.executable, "-c", EACH, json.dumps(verbs), disk],
+        cwd=ROOT, capture_output=True, text=True, timeout=600, check=True,
+    )  # fmt: skip
+    found: dict[str, tuple[int, str]] = json.loads(child.stdout)
+    return found
+
+
 def told(verbs: dict[str, list[str]], out: Path, study: Path) -> dict[str, list[str]]:
     places = {"OUT": str(out), "STUDY": str(study)}
     return {
@@ -99,11 +110,7 @@ def test_a_full_disk_is_said_by_every_verb_and_nothing_is_half_written(tmp_path:
     shutil.copytree(finished, study)
     out = tmp_path / "out"
     out.mkdir()
-    verbs = json.dumps(told(WRITES, out, study))
-    child = subprocess.run(
-        [sys.executable, "-c", FULL, verbs], cwd=ROOT, capture_output=True, text=True, timeout=600, check=True
-    )
-    for name, (status, said) in json.loads(child.stdout).items():
+    for name, (status, said) in each(told(WRITES, out, study), "full").items():
         assert status == 2, f"{name}: {said}"
         last = said.splitlines()[-1]
         assert last.startswith("segue: "), f"{name}: {said}"
@@ -154,24 +161,30 @@ def test_a_finished_study_on_a_read_only_disk_is_analysed_reported_and_exported_
     folder, out = tmp_path / "disk", tmp_path / "out"
     shutil.copytree(finished, folder)
 
-    def segue(*arguments: str) -> tuple[int, str]:
-        command = ["unshare", "-m", "sh", "-c", READ_ONLY, "sh", str(folder), sys.executable, "-m", "study.apps.cli"]
-        done = subprocess.run([*command, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
-        return done.returncode, done.stderr
-
-    study = str(folder)
-    assert segue("analyse", study)[0] == 0
-    assert segue("report", study, "--out", str(out))[0] == 0
+    study, new = str(folder), ["--port", "0", "--database", f"{folder}/new.sqlite"]
+    elsewhere = {
+        "analyse": ["analyse", study],
+        "report": ["report", study, "--out", str(out)],
+        "csv": ["export", study, "--out", str(out / "a.csv")],
+        "psych-ds": ["export", study, "--to", "psych-ds", "--out", str(out / "set")],
+        "bids": ["export", study, "--to", "bids", "--out", str(out / "bids")],
+    }
+    here = {
+        "report here": ["report", study],
+        "export here": ["export", study],
+        "bids here": ["export", study, "--to", "bids"],
+        "simulate here": ["simulate", f"{study}/protocol.toml", "--out", study, "--participants", "3"],
+        "serve here": ["serve", f"{study}/protocol.toml", "--out", study, *new],
+    }
+    found = each(elsewhere | here, "read-only", "unshare", "-m", "sh", "-c", READ_ONLY, "sh", study)
+    assert [(name, found[name]) for name in elsewhere if found[name][0] != 0] == []
+    assert [found[name][1] for name in ("csv", "psych-ds", "bids")] == ["", "", ""]
     assert (out / "report.html").stat().st_size > 10_000
-    for kind, place in (("csv", "a.csv"), ("psych-ds", "set"), ("bids", "bids")):
-        assert segue("export", study, "--to", kind, "--out", str(out / place)) == (0, "")
-    for verb in (["report", study], ["export", study], ["export", study, "--to", "bids"]):
-        status, said = segue(*verb)
-        assert (status, "the disk is read-only; write somewhere else" in said) == (2, True), said
-    for verb in ("simulate", "serve"):
-        extra = ["--participants", "3"] if verb == "simulate" else ["--port", "0", "--database", f"{study}/new.sqlite"]
-        status, said = segue(verb, f"{study}/protocol.toml", "--out", study, *extra)
+    for name in here:
+        status, said = found[name]
         assert (status, "read-only" in said or "may not be written to" in said) == (2, True), said
+        if here[name][0] in ("report", "export"):
+            assert "the disk is read-only; write somewhere else" in said
         assert "http" not in said, "an address is printed once answers can be stored"
     with_log = folder / "responses.sqlite-wal"
     assert not with_log.exists()
