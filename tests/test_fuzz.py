@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,8 +17,13 @@ FOUND_ONCE = {"table": (2603, 6312, 7638)}
 
 
 @pytest.fixture(scope="module")
-def fuzz() -> ModuleType:
-    return program("benchmarks/fuzz")
+def fuzz() -> Iterator[ModuleType]:
+    logs = {name: logging.getLogger(name) for name in ("segue.serve", "uvicorn.error")}
+    before = {name: (log.level, log.propagate, [*log.handlers]) for name, log in logs.items()}
+    yield program("benchmarks/fuzz")
+    for name, log in logs.items():  # its server silences them
+        log.setLevel(before[name][0])
+        log.propagate, log.handlers = before[name][1:]
 
 
 @pytest.mark.parametrize("chunk", range(CHUNKS))
