@@ -68,10 +68,12 @@ def by_speed(what: str, speed: ArrayLike, running: ArrayLike | None = None) -> F
     """
     speed = np.asarray(speed, dtype=np.float64)
     table = _TABLES[what]
-    walk = shape_preserving(speed, SPEEDS[:4], table[:4])
-    run = shape_preserving(speed, SPEEDS[4:], table[4:])
     run_share = running_share(speed) if running is None else np.asarray(running, dtype=np.float64)
-    value = (1.0 - run_share) * walk + run_share * run
+    value = np.zeros(np.broadcast_shapes(speed.shape, run_share.shape))
+    if (run_share < 1.0).any():
+        value += (1.0 - run_share) * shape_preserving(speed, SPEEDS[:4], table[:4])
+    if (run_share > 0.0).any():
+        value += run_share * shape_preserving(speed, SPEEDS[4:], table[4:])
     return np.asarray(np.radians(value) if what in _IN_DEGREES else value)
 
 
