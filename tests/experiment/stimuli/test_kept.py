@@ -191,13 +191,19 @@ def test_what_cannot_be_shown_and_what_another_kind_of_library_shows_is_not_kept
     assert place.files == []
 
 
-def test_the_oldest_give_way(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_longest_unused_give_way(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept, "MOST_KEPT", 2)
-    for seed, age in ((1, 300), (2, 200), (3, 0)):
+    first, second, third = (place.protocol.model_copy(update={"seed": seed}) for seed in (1, 2, 3))
+    files = []
+    for protocol, age in ((first, 300), (second, 200)):
         before = set(place.files)
-        place.look(place.protocol.model_copy(update={"seed": seed}))
+        place.look(protocol)
         (fresh,) = set(place.files) - before
         os.utime(fresh, (fresh.stat().st_mtime - age,) * 2)
-        newest = fresh if seed > 1 else None
+        files.append(fresh)
+    place.look(first)
+    place.look(third)
+    assert place.settled == 3
     assert len(place.files) == 2
-    assert newest in place.files
+    assert files[0] in place.files
+    assert files[1] not in place.files
