@@ -193,14 +193,11 @@ def _slopes(
 def _polynomials(seconds: FloatArray, values: FloatArray) -> FloatArray:
     """Polynomials of least squared error through values `(rows, n)`: `(rows, PAN_ORDER + 1)`, the constants first."""
     order = min(PAN_ORDER, len(np.unique(seconds)) - 1)
-    middle, half = 0.5 * seconds.max(), 0.5 * seconds.max() or 1.0
-    basis = np.vander((seconds - middle) / half, order + 1, increasing=True)
+    half = 0.5 * seconds.max() or 1.0
     found = np.zeros((len(values), PAN_ORDER + 1))
+    basis = np.vander(seconds / half - 1.0, order + 1, increasing=True)
     for power, factors in enumerate(np.linalg.lstsq(basis, values.T)[0]):
-        # ((s - middle) / half) ** power, by powers of s
-        found[:, : power + 1] += np.outer(
-            factors, np.polynomial.polynomial.polyfromroots([middle] * power) / half**power
-        )
+        found[:, : power + 1] += np.outer(factors, np.polynomial.polynomial.polypow([-1.0, 1.0 / half], power))
     return found
 
 

@@ -103,6 +103,16 @@ def test_either_sign_of_a_quaternion_is_the_same_rotation(
     np.testing.assert_allclose(found, apart, atol=within * joint_weights(clips[0].skeleton, "wang2003").sum())
 
 
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_quaternions_as_far_from_unit_length_as_clips_may_have_them_cost_what_unit_ones_cost(
+    pair: Any, precision: str
+) -> None:
+    long = [replace(clip, rotations=clip.rotations * (1 + 3e-7)) for clip in (pair[0], pair[0])]
+    found = cm.cost_matrix(*long, weights="lee2002", nu=0.0, precision=precision)
+    expected = cm.cost_matrix(pair[0], pair[0], weights="lee2002", nu=0.0, precision=precision)
+    np.testing.assert_allclose(found, expected, atol=1e-8 if precision == "double" else 4e-6)  # they are off by 3e-7
+
+
 def test_without_velocity_and_root_it_is_the_difference_of_2004(pair: Any) -> None:
     weights = joint_weights(pair[0].skeleton)
     np.testing.assert_allclose(
