@@ -6,8 +6,9 @@
 Every case is drawn from its kind, its seed and its number alone, so any of them can be run again by itself. A case is
 an input of one kind (below, KINDS) and the verbs that read it, which run in this process. What may come of it: exit
 status 0 and a result in which no number is missing without a sentence that says why, or exit status 2 and one
-refusal. All else is a find: a traceback, a warning that is not ours, more than 8 s of processor time, more than 1 GB of
-memory, a status of the server that means a fault of its own. Exit status of this script: 1 where there was a find.
+refusal. All else is a find: a traceback, a warning that is not ours, more than 8 s of an ordinary processor's time,
+more than 1 GB of memory, a status of the server that means a fault of its own. Exit status of this script: 1 where
+there was a find.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ import fuzz_inputs as inputs
 Generator = np.random.Generator
 
 SECONDS, STUCK_SECONDS = 8.0, 120.0
-"""Processor time that a case may take, and time by the clock, which counts waiting too."""
+"""Processor time that a case may take on an ordinary machine, and time by the clock, which counts waiting too."""
+ORDINARY = 0.010
+"""Seconds of processor time that `_some_work` takes there."""
 MEGABYTES = 1024
 """What a case may add to the address space of this process."""
 
@@ -79,13 +82,19 @@ class FaultError(Exception):
 
 @contextlib.contextmanager
 def limited() -> Iterator[None]:
-    """Limits of time and memory on what runs inside; put back afterwards."""
+    """Limits of time and memory on what runs inside; put back afterwards.
+
+    A machine half as fast as an ordinary one, or one that others slow down just then, gives twice the time.
+    """
+    started = time.process_time()
 
     def over(signal_number: int, _: object) -> None:
-        waited = signal_number == signal.SIGALRM
-        raise LimitError(
-            f"over {STUCK_SECONDS:g} s by the clock" if waited else f"over {SECONDS:g} s of processor time"
-        )
+        if signal_number == signal.SIGALRM:
+            raise LimitError(f"over {STUCK_SECONDS:g} s by the clock")
+        left = SECONDS * max(1.0, _some_work() / ORDINARY) - (time.process_time() - started)
+        if left <= 0.0:
+            raise LimitError(f"over {SECONDS:g} s of processor time")
+        signal.setitimer(signal.ITIMER_PROF, left)
 
     before = {number: signal.signal(number, over) for number in (signal.SIGALRM, signal.SIGPROF)}
     space = resource.getrlimit(resource.RLIMIT_AS)
@@ -104,6 +113,13 @@ def limited() -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_AS, space)
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _some_work() -> float:
+    """Seconds of processor time that a little work takes now."""
+    started = time.process_time()
+    sum(len(str(number * number)) for number in range(40_000))
+    return time.process_time() - started
 
 
 def _address_space() -> int:

@@ -66,6 +66,9 @@ def test_what_a_verb_may_not_do_is_found(fuzz: ModuleType, monkeypatch: pytest.M
     monkeypatch.setattr(fuzz, "SECONDS", 0.3)
     assert "ZeroDivisionError" in ends(lambda: 1 // 0).fault
     assert "over 0.3 s of processor time" in ends(lambda: [None for _ in iter(int, 1)]).fault
+    with monkeypatch.context() as slow:
+        slow.setattr(fuzz, "_some_work", lambda: 3 * fuzz.ORDINARY)
+        assert ends(lambda: [None for _ in iter(int, 1)]).seconds >= 0.9, "a slow machine gets more time"
     assert "MemoryError" in ends(lambda: fuzz.np.ones(2**40)).fault
     assert "Warning" in ends(lambda: fuzz.warnings.warn("overflow encountered in exp", stacklevel=1)).fault
     with pytest.raises(fuzz.FaultError, match=r"\.low says 'from nan to 3'"):

@@ -183,14 +183,22 @@ def joint_positions(clip: Clip, *, ends: bool = False) -> FloatArray:
 
 def rest_positions(skeleton: Skeleton, *, ends: bool = False) -> FloatArray:
     """The joints of the rest pose, root at the origin, `(joints, 3)`, metres; `ends` as `joint_positions` takes it."""
-    still = Clip(skeleton, np.zeros((1, 3)), np.tile(quat.IDENTITY, (1, skeleton.joints, 1)), 1.0)
-    return np.asarray(joint_positions(still, ends=ends)[0])
+    return np.asarray(joint_positions(at_rest(skeleton), ends=ends)[0])
+
+
+def at_rest(skeleton: Skeleton) -> Clip:
+    """One frame of the rest pose, the root at the origin."""
+    return Clip(skeleton, np.zeros((1, 3)), np.tile(quat.IDENTITY, (1, skeleton.joints, 1)), 1.0)
+
+
+def some_frames(frames: int, most: int = _POSES) -> IntArray:
+    """Up to `most` of so many frames, as far apart as can be."""
+    return np.unique(np.linspace(0, frames - 1, min(frames, most)).astype(np.int64))
 
 
 def with_roles(clip: Clip, mapping: Mapping[str, str] | None = None) -> Clip:
     """The clip with its joints' roles found again, also from its poses; `mapping` as `rigs.find_roles` takes it."""
-    some = np.unique(np.linspace(0, clip.frames - 1, min(clip.frames, _POSES)).astype(np.int64))
-    poses, rig = joint_positions(picked(clip, some), ends=True), clip.skeleton
+    poses, rig = joint_positions(picked(clip, some_frames(clip.frames)), ends=True), clip.skeleton
     known = find_roles(
         rig.names, rig.parents, rig.offsets, rig.end_parents, rig.end_offsets, poses=poses, mapping=mapping
     )

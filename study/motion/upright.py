@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.arrays import FloatArray
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, joint_positions, rest_positions
+from study.motion.clip import Clip, at_rest, joint_positions, picked, some_frames
 
 # Between legs that are straight in rest and those of somebody in a fighting stance.
 _WITHIN = np.cos(np.radians(35.0))
+# Frames looked at.
+_POSES = 1000
 # A turn to Y from each other axis that a body may stand along.
 _TURNS = {
     "X": ([0.0, 0.0, 1.0], np.pi / 2),
@@ -28,7 +29,7 @@ _TURNS = {
 
 def lying_axis(clip: Clip) -> str | None:
     """The axis other than Y that the legs stretch along, up, in nearly all frames: `"Z"`, `"-X"` ...; else None."""
-    return _axis_of_legs(clip, joint_positions(clip))
+    return _axis_of_legs(picked(clip, some_frames(clip.frames, _POSES)))
 
 
 def put_upright(clip: Clip) -> Clip:
@@ -38,7 +39,7 @@ def put_upright(clip: Clip) -> Clip:
     returned as it is; `study.motion.defects.find_defects` tells of one that lies.
     """
     axis = lying_axis(clip)
-    if axis is None or _axis_of_legs(clip, rest_positions(clip.skeleton)[None]) != axis:
+    if axis is None or _axis_of_legs(at_rest(clip.skeleton)) != axis:
         return clip
     turn = quat.from_axis_angle(*_TURNS[axis])
     skeleton = replace(
@@ -54,9 +55,10 @@ def put_upright(clip: Clip) -> Clip:
     ).noting(f"turned from {axis} up to Y up: the body stands along {axis} in rest and in motion")
 
 
-def _axis_of_legs(clip: Clip, positions: FloatArray) -> str | None:
+def _axis_of_legs(clip: Clip) -> str | None:
     if not clip.skeleton.has("hip", "ankle"):
         return None
+    positions = joint_positions(clip)
     hip_l, hip_r, ankle_l, ankle_r = (
         positions[:, clip.skeleton.role(f"{part}.{side}")] for part in ("hip", "ankle") for side in "LR"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from io import BytesIO
 
 import numpy as np
@@ -37,19 +38,29 @@ def parse_numbers(lines: bytes) -> FloatArray | None:
     Each is the nearest double, as `float` gives it: NumPy reads so, and pandas from 3.1 on, several times as fast.
     """
     lines = lines.replace(b"\r", b"\n")
-    if not lines.strip() or lines.translate(None, b"0123456789+-.eE \t\n"):
+    if not lines or lines.isspace() or lines.translate(None, b"0123456789+-.eE \t\n"):
         return None  # letters such as those of `inf`, which both take
     try:
         table = np.loadtxt(BytesIO(lines), ndmin=2) if len(lines) < _LARGE else _parse_many(lines)
     except ValueError:
         return None
-    return table if np.all(np.abs(table) <= LARGEST) else None
+    return table if table.min() >= -LARGEST and table.max() <= LARGEST else None
 
 
 def _parse_many(lines: bytes) -> FloatArray:
     import pandas as pd  # only here: it takes longer to load than most files to read
 
-    return pd.read_csv(BytesIO(lines), sep=r"\s+", header=None, dtype=np.float64, na_filter=False).to_numpy()
+    def parsed(separator: str) -> FloatArray:
+        table = pd.read_csv(BytesIO(lines), sep=separator, header=None, dtype=np.float64, na_filter=False)
+        return table.to_numpy()
+
+    first = lines.lstrip(b"\n").split(b"\n", 1)[0]
+    if first.endswith(b" "):
+        lines = lines.replace(b" \n", b"\n")
+    if first.split() == first.removesuffix(b" ").split(b" "):
+        with suppress(ValueError):  # where a later line has other blanks
+            return parsed(" ")  # in two thirds of the time
+    return parsed(r"\s+")
 
 
 def _parse_slowly(source: Source, offset: int, columns: int) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from study.arrays import FloatArray, IntArray
 from study.motion import quaternions as quat
-from study.motion.clip import Clip, with_roles
+from study.motion.clip import Clip, some_frames, with_roles
 from study.motion.readers.source import Source
 from study.motion.skeleton import Skeleton
 from study.motion.units import find_scale
@@ -64,20 +64,21 @@ def rigid_clip(
     The unit is `metres_per_unit` where that is told, else found from the legs of the body; where it has none, it is the
     one that the format has `stated`, or found from the whole body.
     """
-    offsets, paths, parents, rotations = body.offsets.copy(), dict(body.paths), body.parents, body.rotations.copy()
+    offsets, paths, parents, rotations = body.offsets.copy(), dict(body.paths), body.parents, body.rotations
     # Constant places first: on rigs with six channels everywhere the data say how long the bones are.
     for j, path in paths.items():
         if j > 0:
             offsets[j] = np.median(path, axis=0)
     whole = Skeleton(body.names, parents, offsets, body.end_parents, body.end_offsets)
-    found = with_roles(Clip(whole, paths[0], rotations, fps), mapping).skeleton
+    some = some_frames(len(rotations))
+    found = with_roles(Clip(whole, paths[0][some], rotations[some], fps), mapping).skeleton
     if metres_per_unit is None:
         metres_per_unit = _unit(source, found, stated, history)
     else:
         history.append(f"lengths x {metres_per_unit:.6g} m, as told")
     root = 0
     while _rides(root, parents, body.end_parents.tolist(), paths, metres_per_unit):
-        child = root + 1
+        child, rotations = root + 1, rotations.copy()
         paths[child] = paths[root] + quat.rotate(rotations[:, root], paths[child])
         rotations[:, child] = quat.multiply(rotations[:, root], rotations[:, child])
         history.append(f"joint {body.names[root]!r} folded into {body.names[child]!r}, which moves in it")
