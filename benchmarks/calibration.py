@@ -127,19 +127,30 @@ def done(run, cells, kept, options):
     return (found for _, found in run_jobs(run, todo, options.cluster or options.workers))
 
 
+def say_each(make, over, options):
+    """Print the line that each of several conditions gives, in their order."""
+    run = partial(make, studies=options.studies, seed=options.seed)
+    for _, line in run_jobs(run, over, options.cluster or options.workers, in_order=True):
+        print(line, flush=True)
+
+
 def run_preference(options):
     """Type I error at nominal .05 of the test over participants, and of the published pooled one."""
     print(f"{'correlation':>11} {'participants':>12} {'published':>9}")
-    for correlation in (0.0, 0.1, 0.2, 0.3):
-        rng, wrong = np.random.default_rng(options.seed), []
-        shape = 0.5 * (1 / correlation - 1) if correlation else None
-        for _ in range(options.studies):
-            own = beta.rvs(shape, shape, size=35, random_state=rng) if shape else np.full(35, 0.5)
-            chose = rng.binomial(8, own).astype(float)
-            tests = participant_tests(chose, np.full(35, 8.0))
-            wrong.append((tests.p_value, published_test(int(chose.sum()), 280).p_value))
-        rates = (np.array(wrong, dtype=float) < 0.05).mean(axis=0)
-        print(f"{correlation:11} {rates[0]:12.3f} {rates[1]:9.3f}", flush=True)
+    say_each(preference, (0.0, 0.1, 0.2, 0.3), options)
+
+
+def preference(correlation, studies, seed):
+    """The same for answers of one person that correlate so."""
+    rng, wrong = np.random.default_rng(seed), []
+    shape = 0.5 * (1 / correlation - 1) if correlation else None
+    for _ in range(studies):
+        own = beta.rvs(shape, shape, size=35, random_state=rng) if shape else np.full(35, 0.5)
+        chose = rng.binomial(8, own).astype(float)
+        tests = participant_tests(chose, np.full(35, 8.0))
+        wrong.append((tests.p_value, published_test(int(chose.sum()), 280).p_value))
+    rates = (np.array(wrong, dtype=float) < 0.05).mean(axis=0)
+    return f"{correlation:11} {rates[0]:12.3f} {rates[1]:9.3f}"
 
 
 def many_people(rng, people):
@@ -152,31 +163,39 @@ def many_people(rng, people):
 
 def run_mixed(options):
     """Coverage and time of the mixed model's threshold."""
-    for people in (8, 20):
-        rng, inside, values, spent = np.random.default_rng(options.seed), [], [], []
-        for _ in range(options.studies):
-            table = many_people(rng, people)
-            started = time.process_time()
-            found = psychometric_mixed(table, guess=0.5)
-            spent.append(time.process_time() - started)
-            if found.threshold is not None:
-                inside.append(found.low <= 3.0 <= found.high)
-                values.append(found.threshold)
-        print(f"mixed, {people} people: {len(inside)} of {options.studies} fitted, mean {np.mean(values):.3f} (true 3)"
-              f", covers {np.mean(inside):.3f}, {1000 * np.median(spent):.0f} ms", flush=True)  # fmt: skip
+    say_each(mixed, (8, 20), options)
+
+
+def mixed(people, studies, seed):
+    """The same for so many people."""
+    rng, inside, values, spent = np.random.default_rng(seed), [], [], []
+    for _ in range(studies):
+        table = many_people(rng, people)
+        started = time.process_time()
+        found = psychometric_mixed(table, guess=0.5)
+        spent.append(time.process_time() - started)
+        if found.threshold is not None:
+            inside.append(found.low <= 3.0 <= found.high)
+            values.append(found.threshold)
+    return (f"mixed, {people} people: {len(inside)} of {studies} fitted, mean {np.mean(values):.3f} (true 3)"
+            f", covers {np.mean(inside):.3f}, {1000 * np.median(spent):.0f} ms")  # fmt: skip
 
 
 def run_pooled(options):
     """How often intervals cover that take the answers of people who differ as one person's, or people as the unit."""
-    for people in (8, 20):
-        rng, inside = np.random.default_rng(options.seed + people), []
-        for _ in range(options.studies):
-            found = analyse_psychometric(many_people(rng, people))
-            pooled, group, mixed = found.pooled.threshold.interval, found.group, found.mixed
-            inside.append([holds(part.low, part.high, 3.0) for part in (pooled, group, mixed)])
-        shares = np.nanmean(inside, axis=0)
-        print(f"{people} people cover: all answers as one person's {shares[0]:.3f}, mean over participants "
-              f"{shares[1]:.3f}, mixed {shares[2]:.3f}", flush=True)  # fmt: skip
+    say_each(pooled, (8, 20), options)
+
+
+def pooled(people, studies, seed):
+    """The same for so many people."""
+    rng, inside = np.random.default_rng(seed + people), []
+    for _ in range(studies):
+        found = analyse_psychometric(many_people(rng, people))
+        parts = found.pooled.threshold.interval, found.group, found.mixed
+        inside.append([holds(part.low, part.high, 3.0) for part in parts])
+    shares = np.nanmean(inside, axis=0)
+    return (f"{people} people cover: all answers as one person's {shares[0]:.3f}, mean over participants "
+            f"{shares[1]:.3f}, mixed {shares[2]:.3f}")  # fmt: skip
 
 
 def holds(low, high, truth):
@@ -237,7 +256,7 @@ if __name__ == "__main__":
     parser.add_argument("--studies", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--profile", action="store_true", help="profile-likelihood intervals too (psychometric; slow)")
-    parser.add_argument("--workers", type=int, default=1, help="processes for cells")
+    parser.add_argument("--workers", type=int, default=1, help="processes for cells and conditions")
     parser.add_argument("--cluster", help="a Dask scheduler, whose workers have this folder on their PYTHONPATH")
     parser.add_argument("--out", help="a file of JSON lines to which rows are added")
     asked = parser.parse_args()
