@@ -1,7 +1,7 @@
 # ruff: noqa: E501, D102 (sentences of a page, and the steps that make them)
 """Every figure and table of the three papers in one page, each beside what the paper has.
 
-    python benchmarks/papers.py [--library FOLDER] [--out results/papers] [--only 2003,2004,2019]
+    python benchmarks/papers.py [--library FOLDER] [--out results/papers] [--only 2003,2004,2019] [--workers 2]
 
 With the CMU's motions where the library has them, else with synthetic ones. Each entry says what the paper has, what is
 found here, the command that makes it, and what differs and why. Where people answered, simulated observers do, who were
@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import argparse
 import base64
-import contextlib
 import html
-import io
 import json
+import subprocess
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from fit_weights import labelled
 from one_hop_robustness import WEIGHT, draw_path, floor_of, smoothness_of
 
 from renderer.strip import render_strip
-from study.apps.cli import run
+from renderer.workers import run_jobs
 from study.files import write_whole
 from study.motion.clip import Clip, joint_positions, retarget, trim
 from study.motion.drawing import figure_for
@@ -61,17 +62,8 @@ class Entry:
     found: str
     command: str
     differs: str = ""
-    pictures: tuple[Path, ...] = ()
-
-
-def segue(command: str) -> dict[str, Any]:
-    """What a command of Segue says in JSON."""
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        status = run([*command.split()[1:], "--json"])
-    assert status == 0, command
-    said: dict[str, Any] = json.loads(printed.getvalue())
-    return said
+    pictures: tuple[tuple[str, bytes], ...] = ()
+    """Files by their names."""
 
 
 def draw_played(played: Played, path: Path, first: int, height: int = 300) -> None:
@@ -106,7 +98,7 @@ def labelled_rows(rows: list[tuple[str, Path]], path: Path, key: str) -> None:
 
 
 class Papers:
-    """The figures, made from one library into one folder."""
+    """The figures, made from one library in a folder of their own."""
 
     def __init__(self, library: str, out: Path) -> None:
         self.library, self.out = library, out
@@ -116,12 +108,33 @@ class Papers:
     def clip(self, name: str, fps: float) -> Clip:
         return self.opened.clip(self.opened.find(name), fps=fps)
 
+    def segue(self, command: str) -> dict[str, Any]:
+        """What a command of Segue says in JSON; its files are in the folder."""
+        there = str(Path(self.library).resolve()) if Path(self.library).is_dir() else self.library
+        words = [there if word == self.library else word for word in command.split()[1:]]
+        done = subprocess.run(
+            [sys.executable, "-m", "study.apps.cli", *words, "--json"],
+            cwd=self.out,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode:
+            raise RuntimeError(f"{command}: {done.stderr}")
+        said: dict[str, Any] = json.loads(done.stdout)
+        return said
+
     def at(self, name: str) -> Path:
-        return self.out / "figures" / f"{name}.png"
+        return self.out / f"{name}.png"
+
+    def files(self, *names: str) -> tuple[tuple[str, bytes], ...]:
+        """Pictures that were made."""
+        return tuple((f"{name}.png", self.at(name).read_bytes()) for name in names)
 
     # 2003: which frames to join
 
-    def wang2003(self) -> Iterator[Entry]:
+    def cost_matrices(self) -> Iterator[Entry]:
+        """2003, Figures 1, 2 and 3."""
         pair = "dance dance_modern"
         same = "Other dances; ours are as long as they were recorded." if not self.synthetic else "Synthetic dances."
         for figure, words, options in (
@@ -130,8 +143,8 @@ class Papers:
             ("2b", "The same with nu = 10", "--weights lee2002 --nu 10"),
             ("3", "The same with the weights of Table 1", "--weights wang2003"),
         ):
-            command = f"segue cost-matrix {pair} --library {self.library} {options} --out {self.at(f'2003_{figure}')}"
-            said = segue(command)
+            command = f"segue cost-matrix {pair} --library {self.library} {options} --out 2003_{figure}.png"
+            said = self.segue(command)
             printed = {
                 "1": "a picture of the costs, darker is cheaper; the number of cheap frames is not given",
                 "2a": "the least cost is at the same frames for nu from 0 to 100",
@@ -139,7 +152,10 @@ class Papers:
                 "3": "fewer cheap frames than Figure 1: “more restrictive”",
             }[figure]
             found = f"least cost {said['min']:.3g} at frames {said['argmin'][0]} and {said['argmin'][1]} (30 fps), of at most {said['max']:.3g}"
-            yield Entry(f"2003, Figure {figure}: {words}", printed, found, command, same, (self.at(f"2003_{figure}"),))
+            yield Entry(f"2003, Figure {figure}: {words}", printed, found, command, same, self.files(f"2003_{figure}"))
+
+    def joint_weights(self) -> Iterator[Entry]:
+        """2003, Table 1."""
         names = ("dance", "dance_modern", "dance_turns", "walk", "run", "walk_slow", "jog", "walk_fast")
         clips = [self.clip(name, 30.0) for name in names]
         pairs = [(a, retarget(b, a.skeleton)) for a, b in zip(clips, clips[1:] + clips[:1], strict=True)]
@@ -153,15 +169,20 @@ class Papers:
             "segue label SRC DST --out labels.csv; segue fit-weights labels.csv",
             "The paper's labels were people's. Ours are made from its weights, so that least squares has them to find again.",
         )
-        figure = self.at("2003_4")
-        command = f"segue preview dance --library {self.library} --out {figure} --poses 5 --floor"
-        segue(command)
+
+    def character(self) -> Iterator[Entry]:
+        """2003, Figure 4."""
+        command = f"segue preview dance --library {self.library} --out 2003_4.png --poses 5 --floor"
+        self.segue(command)
         differs = "The paper's is a skinned character; ours is a mannequin of capsules."
         yield Entry("2003, Figure 4: the character of the user study", "one frame of a dance", "the same dance, five poses", command,
-                    differs, (figure,))  # fmt: skip
-        results = self.out / "transition_points"
-        segue(f"segue simulate transition_points --library {self.library} --participants 26 --out {results}")
-        ratings = segue(f"segue analyse {results}")["headline"]
+                    differs, self.files("2003_4"))  # fmt: skip
+
+    def ratings(self) -> Iterator[Entry]:
+        """2003, Table 2."""
+        results = "transition_points"
+        self.segue(f"segue simulate transition_points --library {self.library} --participants 26 --out {results}")
+        ratings = self.segue(f"segue analyse {results}")["headline"]
         yield Entry(
             "2003, Table 2: do optimized weights look better, more natural?",
             "better 2.73 (SD 1.00), more natural 2.69 (SD 0.84); F = 6.39, p = 0.01",
@@ -172,25 +193,30 @@ class Papers:
 
     # 2004: how long to blend
 
-    def wang2004(self) -> Iterator[Entry]:
-        points, other = (
-            f"--start 60 --end {min(80, self.clip(name, 30.0).frames - 5)}" for name in ("run", "walk_fast")
-        )
-        figure = self.at("2004_1")
-        command = f"segue transition walk run --library {self.library} {points} --method geodesic --out {figure}"
-        segue(command)
+    def walk_and(self, name: str) -> str:
+        """A walk and another motion, and where one is left for the other, for commands of two clips."""
+        end = min(80, self.clip(name, 30.0).frames - 5)
+        return f"walk {name} --library {self.library} --start 60 --end {end}"
+
+    def transition(self) -> Iterator[Entry]:
+        """2004, Figure 1."""
+        command = f"segue transition {self.walk_and('run')} --method geodesic --out 2004_1.png"
+        self.segue(command)
         yield Entry("2004, Figure 1: a transition", "an example of a transition",
-                    "source blue, blend purple, destination orange; the right side is darker", command, "Other motions.", (figure,))  # fmt: skip
-        figure = self.at("2004_3")
-        command = f"segue blend-length walk walk_fast --library {self.library} {other} --method geodesic --out {figure}"
-        said = segue(command)
+                    "source blue, blend purple, destination orange; the right side is darker", command, "Other motions.", self.files("2004_1"))  # fmt: skip
+
+    def blend_costs(self) -> Iterator[Entry]:
+        """2004, Figures 2, 3 and 5, and Table 1."""
+        walks = self.walk_and("walk_fast")
+        command = f"segue blend-length {walks} --method geodesic --out 2004_3.png"
+        said = self.segue(command)
         yield Entry(
             "2004, Figures 2, 3 and 5: cost by blend length, frame by frame and joint by joint",
             "the least cost is at 0.5 s; three joints have no minimum there",
             f"least at {said['blend_s']:.2f} s ({said['blend_frames']} frames at 30 fps), cost {said['cost']:.3g}",
             command,
             "Another walk, and other points.",
-            (figure,),
+            self.files("2004_3"),
         )
         most = max(said["differences"], key=said["differences"].get)
         yield Entry(
@@ -198,39 +224,44 @@ class Papers:
             "right shoulder 0.3029, left shoulder 0.1192, right knee 0.0481, ...",
             ", ".join(f"{role} {value:.4f}" for role, value in said["differences"].items())
             + f"; the largest is {most}",
-            f"segue blend-length walk walk_fast --library {self.library} {other} --method velocity",
+            f"segue blend-length {walks} --method velocity",
             "Other frames. The paper's own eight numbers are in tests/papers/test_transitions_2004.py.",
         )
-        figure = self.at("2004_4")
-        command = f"segue blend-length walk run --library {self.library} {points} --method timewarp --out {figure}"
-        said = segue(command)
+
+    def two_lengths(self) -> Iterator[Entry]:
+        """2004, Figure 4."""
+        command = f"segue blend-length {self.walk_and('run')} --method timewarp --out 2004_4.png"
+        said = self.segue(command)
         yield Entry(
             "2004, Figure 4: two lengths, one for each motion",
             "an illustration: fewer frames of the source than of the destination",
             f"{said['source_frames']} frames of the walk over {said['destination_frames']} of the run; ringed in the costs of all pairs of lengths",
             command,
             "The paper's figure is a drawing; ours shows the costs of Eqs. 5 and 6, white where one length is twice the other.",
-            (figure,),
+            self.files("2004_4"),
         )
-        results = self.out / "wang2004_session"
+
+    def session(self) -> Iterator[Entry]:
+        """2004, Figure 6 and Table 2."""
+        results = "wang2004_session"
         command = f"segue simulate wang2004_session --library {self.library} --participants 35 --out {results}"
-        segue(command)
-        said = segue(f"segue analyse {results}")
-        segue(f"segue report {results}")
+        self.segue(command)
+        said = self.segue(f"segue analyse {results}")
+        self.segue(f"segue report {results}")
         lengths = [
             one["statement"].partition(" At the first")[0]
             for one in said["headline"]
             if one["unit"].startswith("frames")
         ]
         others = [one["statement"] for one in said["headline"] if not one["unit"].startswith("frames")]
-        curves = sorted((results / "figures").glob("*curve.png"))
+        curves = sorted((self.out / results / "figures").glob("*curve.png"))
         yield Entry(
             "2004, Figure 6: the just noticeable difference of blend length",
             "75% “different” at k + 7 and k − 8 frames",
             " ".join(dict.fromkeys(lengths)),
             f"{command}; segue analyse RESULTS",
             GIVEN + " Below the published number stand those of a model, with and without the criterion.",
-            tuple(curves),
+            tuple((path.name, path.read_bytes()) for path in curves),
         )
         yield Entry(
             "2004, Table 2: which method people prefer",
@@ -243,23 +274,33 @@ class Papers:
 
     # 2019: through a third motion
 
-    def koyama2019(self) -> Iterator[Entry]:
+    def clips(self) -> list[Clip]:
+        """The clips that the paper's are stood in for by."""
         names = ["dance", "dance_modern", "dance_turns"]
         names += (
             ["box"] if self.synthetic else [one for one in ("49_14", "49_15", "49_18") if one in self.opened.names()]
         )
         clips = [replace(self.clip(name, 60.0), name=name) for name in dict.fromkeys(names)]
-        clips = [retarget(trim(clip, 0, min(clip.frames, 1500)), clips[0].skeleton) for clip in clips]
+        return [retarget(trim(clip, 0, min(clip.frames, 1500)), clips[0].skeleton) for clip in clips]
+
+    def problem(self, clips: list[Clip]) -> Problem:
+        """The robustness set of these clips."""
         settings, distance = Settings.at(60.0), PointCloudDistance()
         switches = robustness_set(clips, settings)
-        problem = Problem(tuple(clips), switches, settings, weight_in_counts(WEIGHT, distance), distance)
+        return Problem(tuple(clips), switches, settings, weight_in_counts(WEIGHT, distance), distance)
+
+    def one_hop(self) -> Iterator[Entry]:
+        """2019, Figures 1, 5 and 7 to 11."""
+        clips = self.clips()
+        problem = self.problem(clips)
+        switches = problem.switches
         tables = [build_table(replace(problem, switches=(switch,))) for switch in switches]
         costs = [costs_of(replace(problem, switches=(switch,)), table, 0, switch.first_trigger)
                  for switch, table in zip(switches, tables, strict=True)]  # fmt: skip
         gain = np.array([one.direct - one.total for one in costs])
         command = f"segue one-hop robustness {' '.join(clip.name for clip in clips)} --library {self.library}"
 
-        def pair(number: int, name: str) -> tuple[Path, ...]:
+        def pair(number: int, name: str) -> tuple[tuple[str, bytes], ...]:
             switch, table = switches[number], tables[number]
             paths = []
             for method in ("direct", "one-hop"):
@@ -270,7 +311,7 @@ class Papers:
             cost = costs[number]
             says = f"direct, {cost.direct:.3f} m²", f"one-hop, {cost.total:.3f} m²"
             labelled_rows(list(zip(says, paths, strict=True)), self.at(name), KEY)
-            return (self.at(name),)
+            return self.files(name)
 
         def words(number: int) -> str:
             switch, cost = switches[number], costs[number]
@@ -292,12 +333,11 @@ class Papers:
             yield Entry(f"2019, Figure {figure}: direct and optimal one-hop transition", printed, words(number),
                         f"segue one-hop play TABLE --first {clips[switches[number].source].name} --trigger {switches[number].first_trigger} "
                         f"{clips[switches[number].destination].name} --out X.png", f"{dances} {shown}", pair(number, f"2019_{figure}"))  # fmt: skip
-        figure = self.at("2019_5")
         best = int(ranked[0])
-        draw_path(clips, tables[best], switches[best], figure)
+        draw_path(clips, tables[best], switches[best], self.at("2019_5"))
         yield Entry("2019, Figure 5: distances between all frames of two clips", "a colour map, in units the paper does not state",
                     f"{words(best)}; a cross where each blend starts",
-                    "python benchmarks/one_hop_robustness.py FOLDER A.bvh B.bvh ...", dances, (figure,))  # fmt: skip
+                    "python benchmarks/one_hop_robustness.py FOLDER A.bvh B.bvh ...", dances, self.files("2019_5"))  # fmt: skip
         floor, skates = floor_of(clips), []
         for number, switch in enumerate(switches):
             slide = [smoothness_of(self.played(clips, tables[number], switch, method), switch.first_trigger, floor).slide_m
@@ -312,19 +352,17 @@ class Papers:
         alike = int(ranked[-1])
         yield Entry("2019, Figure 9: where both are alike", "the destination itself is the hop", words(alike), command,
                     f"{dances} The transition of the set that gains least.", pair(alike, "2019_9"))  # fmt: skip
-        figure = self.at("2019_10")
-        draw_costs(costs, figure)
+        draw_costs(costs, self.at("2019_10"))
         yield Entry(
             "2019, Figure 10 and the robustness set: 15 transitions by rule",
             "one-hop costs less in every one",
             f"one-hop costs less in {int((gain > 0).sum())} of {len(gain)}; mean {np.mean([one.total for one in costs]):.4g}, direct "
             f"{np.mean([one.direct for one in costs]):.4g} m²",
-            f"{command} --out {figure}",
+            f"{command} --out X.png",
             dances,
-            (figure,),
+            self.files("2019_10"),
         )
         yield self.weights(clips, problem, switches[best])
-        yield self.beats(clips, problem)
 
     def played(self, clips: list[Clip], table: Any, switch: Switch, method: str) -> Played:
         trigger = [Trigger(switch.first_trigger, switch.destination)]
@@ -332,7 +370,7 @@ class Papers:
 
     def weights(self, clips: list[Clip], problem: Problem, switch: Switch) -> Entry:
         """Figure 11: the same trigger with other weights."""
-        paths, found = [], []
+        names, found = [], []
         for times in (0.1, 1.0, 10.0):
             weighted = replace(problem, switches=(switch,), weight=round(problem.weight * times))
             table = build_table(weighted)
@@ -341,36 +379,50 @@ class Papers:
             smooth = costs_of(weighted, table, 0, switch.first_trigger)
             found.append(f"{times:g} w: stays {entry.stay_source + entry.stay_hop} frames, blends cost "
                          f"{smooth.total - weighted.weight * weighted.distance.unit * (entry.stay_source + entry.stay_hop):.4g} m²")  # fmt: skip
-            path = self.at(f"2019_11_{times:g}")
+            names.append(f"2019_11_{times:g}")
             played = self.played(clips, table, switch, "one-hop")
             first = max(switch.first_trigger - 24, 0)
-            draw_played(played, path, first, height=220)
-            paths.append(path)
+            draw_played(played, self.at(names[-1]), first, height=220)
         return Entry("2019, Figure 11: the weight trades smoothness for responsiveness", "0.1 w, w, 10 w: larger weights respond sooner, smaller ones are smoother",
                      "; ".join(found), "segue one-hop build CLIPS --times 3 --out X.npz", "Other dances; w is 0.00025 m² a frame. Rows are 0.1 w, w and 10 w, as in the paper.",
-                     tuple(paths))  # fmt: skip
+                     self.files(*names))  # fmt: skip
 
-    def beats(self, clips: list[Clip], problem: Problem) -> Entry:
-        """Figure 12: hops that share the beats."""
+    def beats(self) -> Iterator[Entry]:
+        """2019, Figure 12: hops that share the beats."""
+        clips = self.clips()
         beats = {number: find_beats(clip) for number, clip in enumerate(clips)}
         switch = Switch(0, 2, Alignment(0))
         offsets = all_beat_offsets(beats, [0], range(len(clips)))
-        table = build_table(replace(problem, switches=(switch,), offsets=offsets))
+        table = build_table(replace(self.problem(clips), switches=(switch,), offsets=offsets))
         usable = np.flatnonzero(table.entries[:, 0] >= 0)
         through = usable[~np.isin(table.entries[usable, 0], [0, 2])]  # a third clip, where one is the best
         at = through if len(through) else usable
         trigger = int(at[len(at) // 2]) + table.rows[0].first_trigger
         played = self.played(clips, table, replace(switch, first_trigger=trigger), "one-hop")
-        path = self.at("2019_12")
-        draw_played(played, path, max(trigger - 24, 0))
+        draw_played(played, self.at("2019_12"), max(trigger - 24, 0))
         entry = table.look_up(0, 2, trigger)
         assert entry is not None
         own = set((beats[entry.hop] + entry.offset).tolist())
         shared = sum(min((abs(beat - other) for other in own), default=99) <= 1 for beat in beats[0].tolist())
-        return Entry("2019, Figure 12: hops that keep the beat", "the hop has the beats of source and destination",
-                     f"hop {clips[entry.hop].name} at offset {entry.offset}: {shared} of {len(beats[0])} beats of the source lie on beats of the hop",
-                     "segue one-hop build CLIPS --on-beat --out X.npz",
-                     "Beats are estimated from the motions, which were danced to no common music as the paper's were: only the beat at which the clips are aligned is shared.", (path,))  # fmt: skip
+        yield Entry("2019, Figure 12: hops that keep the beat", "the hop has the beats of source and destination",
+                    f"hop {clips[entry.hop].name} at offset {entry.offset}: {shared} of {len(beats[0])} beats of the source lie on beats of the hop",
+                    "segue one-hop build CLIPS --on-beat --out X.npz",
+                    "Beats are estimated from the motions, which were danced to no common music as the paper's were: only the beat at which the clips are aligned is shared.", self.files("2019_12"))  # fmt: skip
+
+
+FIGURES = {
+    "2003": ("cost_matrices", "joint_weights", "character", "ratings"),
+    "2004": ("transition", "blend_costs", "two_lengths", "session"),
+    "2019": ("one_hop", "beats"),
+}
+"""The parts of each paper that are made without the others, methods of `Papers`."""
+
+
+def entries_of(part: str, library: str) -> list[Entry]:
+    """The entries of one part, made in a folder that is gone afterwards."""
+    warnings.simplefilter("ignore")
+    with tempfile.TemporaryDirectory() as folder:
+        return list(getattr(Papers(library, Path(folder)), part)())
 
 
 PAGE = """<!doctype html>
@@ -391,8 +443,8 @@ def as_html(entries: list[Entry], intro: str) -> str:
         cells = "".join(f"<tr><th>{name}</th><td>{html.escape(text)}</td></tr>" for name, text in rows.items() if text)
         cells += f"<tr><th>command</th><td><code>{html.escape(one.command)}</code></td></tr>"
         pictures = "".join(
-            f'<img alt="{html.escape(one.what)}" src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}">'
-            for path in one.pictures
+            f'<img alt="{html.escape(one.what)}" src="data:image/png;base64,{base64.b64encode(content).decode()}">'
+            for _, content in one.pictures
         )
         parts.append(f"<h2>{html.escape(one.what)}</h2><table>{cells}</table>{pictures}")
     return PAGE.format(intro=html.escape(intro), entries="".join(parts))
@@ -413,17 +465,22 @@ def main() -> None:
     parser.add_argument("--library", default="synthetic", help="a folder with the CMU's motions (default: synthetic)")
     parser.add_argument("--out", type=Path, default=Path("results/papers"))
     parser.add_argument("--only", default="2003,2004,2019", help="papers, with commas between")
+    parser.add_argument("--workers", type=int, default=1, help="processes")
+    parser.add_argument(
+        "--cluster", help="a Dask scheduler, whose workers have this folder on their PYTHONPATH, and the library"
+    )
     given = parser.parse_args()
-    warnings.simplefilter("ignore")
-    papers = Papers(given.library, given.out)
-    (given.out / "figures").mkdir(parents=True, exist_ok=True)
+    parts = [part for name, those in FIGURES.items() if name in given.only.split(",") for part in those]
     entries: list[Entry] = []
-    for name, make in (("2003", papers.wang2003), ("2004", papers.wang2004), ("2019", papers.koyama2019)):
-        if name in given.only.split(","):
-            for entry in make():
-                print(f"{entry.what}\n    paper: {entry.printed}\n    here:  {entry.found}", flush=True)
-                entries.append(entry)
-    intro = f"Motions: {'synthetic' if papers.synthetic else given.library}. {papers.opened.acknowledgement or ''} Made by benchmarks/papers.py."
+    make = partial(entries_of, library=given.library)
+    for _, those in run_jobs(make, parts, given.cluster or given.workers, in_order=True):
+        for entry in those:
+            print(f"{entry.what}\n    paper: {entry.printed}\n    here:  {entry.found}", flush=True)
+            for name, content in entry.pictures:
+                write_whole(given.out / "figures" / name, content)
+        entries += those
+    papers = open_library(given.library)
+    intro = f"Motions: {'synthetic' if papers.synthetic else given.library}. {papers.acknowledgement or ''} Made by benchmarks/papers.py."
     write_whole(given.out / "papers.html", as_html(entries, intro))
     write_whole(given.out / "papers.md", as_markdown(entries))
     print(given.out / "papers.html")

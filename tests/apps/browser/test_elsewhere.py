@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from devtools import Browser
 from serving import protocol_of
 from walking import RATED, SHORT
 
@@ -24,6 +25,13 @@ from study.experiment.store.responses import open_answers
 from study.experiment.store.sessions import find_session
 
 pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="session")
+def browser(whole_browser: Browser) -> Browser:
+    """What people have."""
+    return whole_browser
+
 
 MODULES = Path(__file__).parents[3] / "build" / "node_modules"
 BUTTON = "#jspsych-html-button-response-btngroup button"

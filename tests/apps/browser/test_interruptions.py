@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from devtools import Tab
+from devtools import Browser, Tab
 from serving import Site
 from walking import (
     HURRIED,
@@ -26,6 +26,13 @@ from walking import (
 )
 
 pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="session")
+def browser(whole_browser: Browser) -> Browser:
+    """What people have."""
+    return whole_browser
+
 
 TRIALS = 4  # of SHORT
 AWAY_S = 3.5  # longer than the page takes to give a film up that does not go on
