@@ -52,7 +52,7 @@ def one_size(count: int, alignment: str, memory_bytes: int, workers: int, build:
     """Plan, then build, in this process."""
     build_table(problem_of(2, alignment, frames=200), workers=1)
     before = held_bytes()
-    problem = problem_of(count, alignment, 80 if build else 5)
+    problem = problem_of(count, alignment)
     started = time.process_time()
     expected = plan(problem, memory_bytes, workers)
     row = {"predicted": {**asdict(expected), "peak_gb": expected.peak_bytes / 2**30}}

@@ -118,7 +118,7 @@ def test_what_is_held_stays_within_the_bound_and_the_plan() -> None:
 
 
 def test_a_large_library_is_planned_without_being_built(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study.transitions.one_hop.plan._trial", lambda _: np.array([0.0, 0.0, 1e-9]))
+    monkeypatch.setattr("study.transitions.one_hop.plan._trial", lambda *_: np.array([0.0, 1e-9]))
     drawn = walks(2, 1200)
     clips = tuple(replace(drawn[n % 2], name=str(n)) for n in range(160))
     small, large = (plan(all_pairs(clips[:count]), 2**28, 2) for count in (80, 160))

@@ -90,16 +90,12 @@ def prepared_for(problem: Problem, jobs: Iterable[Job]) -> dict[int, Any]:
     return {n: problem.distance.prepare(problem.clips[n], problem.settings.blend_frames) for n in sorted(needed)}
 
 
-def work_a_column(problem: Problem) -> tuple[int, int, int]:
-    """For each frame of a hop, at most: windows to compare it with, second legs, and sums of two legs."""
-    settings, blends = problem.settings, len(problem.settings.blends)
-    stays = {True: 1, False: settings.longest_stay_source + 1}
-    second = [
-        problem.clips[number].frames + settings.longest_stay_hop if alignment.offset is not None else stays[False]
-        for number, alignment in _by_destination(problem)
-    ]
-    sums = sum(len(problem.triggers(one)) * stays[one.alignment.offset is not None] for one in problem.switches)
-    return _windows(problem, _ends(problem)), blends * sum(second), blends * sums
+def work_a_column(problem: Problem) -> tuple[int, int]:
+    """For each frame of a hop, at most: windows to compare it with, and sums of two legs."""
+    settings = problem.settings
+    stays = settings.longest_stay_source + 1
+    sums = sum(len(problem.triggers(s)) * (stays if s.alignment.offset is None else 1) for s in problem.switches)
+    return _windows(problem, _ends(problem)), len(settings.blends) * sums
 
 
 def run_job(problem: Problem, prepared: Mapping[int, Any], job: Job, limits: Mapping[int, Best]) -> list[Found]:
@@ -114,9 +110,14 @@ def run_job(problem: Problem, prepared: Mapping[int, Any], job: Job, limits: Map
     limits
         The best known so far, by switch: only what may beat it needs to be found. Older knowledge does no harm.
     """
-    blends = problem.settings.blends
-    legs = {blend: legs_to_hop(problem, prepared, job, blend) for blend in blends}
-    groups = _by_destination(problem)
+    return searched(problem, job, legs_to_hop(problem, prepared, job), limits)
+
+
+def searched(
+    problem: Problem, job: Job, legs: Mapping[int, Mapping[int, Table]], limits: Mapping[int, Best]
+) -> list[Found]:
+    """The same by what `legs_to_hop` gives for it."""
+    blends, groups = problem.settings.blends, _by_destination(problem)
     to_hop = {clip: _to_hop(problem, {blend: legs[blend][clip] for blend in blends}) for clip, _ in groups}
     found: list[Found] = []
     for blend in blends:
@@ -129,8 +130,12 @@ def run_job(problem: Problem, prepared: Mapping[int, Any], job: Job, limits: Map
     return found
 
 
-def legs_to_hop(problem: Problem, prepared: Mapping[int, Any], job: Job, blend: int) -> dict[int, Table]:
-    """Costs of blends of one length between each clip in use (rows) and the hop (columns)."""
+def legs_to_hop(problem: Problem, prepared: Mapping[int, Any], job: Job) -> dict[int, dict[int, Table]]:
+    """For each length of blends, their costs between each clip in use (rows) and the hop (columns)."""
+    return {blend: _legs(problem, prepared, job, blend) for blend in problem.settings.blends}
+
+
+def _legs(problem: Problem, prepared: Mapping[int, Any], job: Job, blend: int) -> dict[int, Table]:
     settings, hop_windows = problem.settings, problem.clips[job.hop].frames - blend + 1
     last = min(job.stop + overhang(settings), hop_windows)
     columns = range(job.start, max(job.start, last))

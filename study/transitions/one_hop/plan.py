@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,15 +28,17 @@ from study.transitions.one_hop.jobs import (
     overhang,
     prepared_for,
     run_job,
+    searched,
     work_a_column,
 )
 from study.transitions.one_hop.problem import Problem
 from study.transitions.one_hop.search import Best
 from study.transitions.threads import one_blas_thread
 
-STATE_BYTES = 32
-"""For a triggered frame while its block is searched: `Best`, and the cost of the direct transition."""
-_TRIAL_SWITCHES, _TRIAL_SEARCHES = 8, 80
+STATE_BYTES, FOUND_BYTES = 32, 36
+"""For a triggered frame while its block is searched: `Best` and the cost of the direct transition; and for each worker
+what a job finds, which is most of them at the beginning: `Best` and where."""
+_TRIAL_SWITCHES, _TRIAL_HOPS, _TRIALS = 16, 3, 5
 
 
 @dataclass(frozen=True)
@@ -97,31 +100,32 @@ def make_blocks(problem: Problem, memory_bytes: int, workers: int) -> tuple[Bloc
     blocks = []
     for one in members:
         block = Block(tuple(one.tolist()), ())
-        left = (memory_bytes - STATE_BYTES * int(triggers[one].sum())) // workers
-        blocks.append(replace(block, jobs=make_jobs(block.part(problem), max(left, 2**20))))
+        left = memory_bytes - _state_bytes(int(triggers[one].sum()), workers)
+        blocks.append(replace(block, jobs=make_jobs(block.part(problem), max(left // workers, 2**20))))
     return tuple(blocks)
 
 
 def _fits(problem: Problem, ends: IntArray, triggers: IntArray, memory_bytes: int, workers: int) -> bool:
-    """Whether what is found takes a quarter of the memory, and hops need not be cut so that most is overhang."""
-    state = STATE_BYTES * int(triggers.sum())
+    """Whether what is found takes half of the memory, and hops need not be cut so that most is overhang."""
+    state = _state_bytes(int(triggers.sum()), workers)
     columns = (memory_bytes - state) // workers // bytes_a_column(problem, np.unique(ends).tolist())
     longest = max(clip.frames for clip in problem.clips)
-    return state <= memory_bytes // 4 and columns >= min(longest, 4 * overhang(problem.settings))
+    return state <= memory_bytes // 2 and columns >= min(longest, 4 * overhang(problem.settings))
 
 
 def plan(problem: Problem, memory_bytes: int, workers: int) -> Plan:
     """What `build_table` will take with this memory and so many workers of this machine; nothing is built."""
     blocks = make_blocks(problem, memory_bytes, workers)
-    counts, held, points, entries = np.zeros(3), 0, 0, 0
+    counts, held, points, entries = np.zeros(2), 0, 0, 0
     for block in blocks:
         part = block.part(problem)
         used = {number for switch in part.switches for number in (switch.source, switch.destination)}
         triggers = sum(len(part.triggers(switch)) for switch in part.switches)
         counts += _work(part, block.jobs)
         columns = max((job.stop - job.start for job in block.jobs), default=0) + overhang(problem.settings)
-        matrices = min(workers, len(block.jobs)) * columns * bytes_a_column(part, used)
-        held, entries = max(held, STATE_BYTES * triggers + matrices), entries + triggers
+        busy = min(workers, len(block.jobs))
+        matrices = busy * columns * bytes_a_column(part, used)
+        held, entries = max(held, _state_bytes(triggers, busy) + matrices), entries + triggers
         points = max(points, sum(_bytes_of(problem.clips[n]) for n in used))
     return Plan(
         clips=len(problem.clips),
@@ -130,12 +134,17 @@ def plan(problem: Problem, memory_bytes: int, workers: int) -> Plan:
         blocks=len(blocks),
         jobs=sum(len(block.jobs) for block in blocks),
         window_pairs=int(counts[0]),
-        sums=int(counts[2]),
+        sums=int(counts[1]),
         clips_bytes=sum(_bytes_of(clip) for clip in problem.clips) + points,
         block_bytes=held,
         table_bytes=entries * (40 if problem.settings.lengths else 32),
-        core_s=float(counts @ _trial(problem)) if entries else 0.0,
+        core_s=float(counts @ _trial(problem, blocks[len(blocks) // 2])) if entries else 0.0,
     )
+
+
+def _state_bytes(triggers: int, workers: int) -> int:
+    """What was found for so many triggered frames, and what each worker may just have found."""
+    return (STATE_BYTES + FOUND_BYTES * workers) * triggers
 
 
 def _bytes_of(clip: Clip) -> int:
@@ -144,47 +153,46 @@ def _bytes_of(clip: Clip) -> int:
 
 
 def _work(part: Problem, jobs: Sequence[Job]) -> FloatArray:
-    """Window pairs, second legs and sums of these jobs."""
+    """Window pairs and sums of these jobs."""
     shortest = part.settings.blends[0]
     wide = [min(job.stop + overhang(part.settings), part.clips[job.hop].frames - shortest + 1) for job in jobs]
-    narrow = sum(job.stop - job.start for job in jobs)
     columns = sum(stop - job.start for stop, job in zip(wide, jobs, strict=True))
-    return np.array(work_a_column(part), dtype=np.float64) * (columns, narrow, narrow)
+    return np.array(work_a_column(part), dtype=np.float64) * (columns, sum(job.stop - job.start for job in jobs))
 
 
-def _trial(problem: Problem) -> FloatArray:
-    """Processor seconds for a window pair, a second leg and a sum: one job for a few transitions, and for many.
+def _trial(problem: Problem, block: Block) -> FloatArray:
+    """Processor seconds for a window pair, and for a sum with what goes with it, by a job for a few transitions.
 
-    The few are into one clip, as they follow each other in a search, whose costs fill no cache; the many are the few
-    again and again, so that the difference is what sums take. What they are to beat was found through another hop.
+    They are into one clip, as they follow each other in a search, from as many others as no cache holds. Through the
+    n-th hop one trigger in n has its best so far: here as many have as do on average, and the others what was found
+    through some hops. Medians, as the machine may be at other work as well.
     """
-    blends = problem.settings.blends
-    middle = problem.switches[len(problem.switches) // 2]
-    into = [s for s in problem.switches if (s.destination, s.alignment) == (middle.destination, middle.alignment)]
+    blends, part = problem.settings.blends, block.part(problem)
+    middle = part.switches[len(part.switches) // 2]
+    into = [s for s in part.switches if (s.destination, s.alignment) == (middle.destination, middle.alignment)]
     few = replace(problem, switches=tuple(into[:: -(-len(into) * len(blends) // _TRIAL_SWITCHES)]))
-    repeats = 1 + _TRIAL_SEARCHES // len(few.switches)
-    hops = [job for job in make_jobs(few, 2**40) if job.stop > job.start]
-    if not hops:
-        return np.zeros(3)
-    before, job = hops[0], hops[-1]
-    prepared = prepared_for(few, (before, job))
+    if not block.jobs:
+        return np.zeros(2)
+    *others, job = block.jobs[:: -(-len(block.jobs) // _TRIAL_HOPS)]
+    prepared = prepared_for(few, (*others, job))
     limits = {number: Best.none(len(few.triggers(switch))) for number, switch in enumerate(few.switches)}
+    share = float(np.mean(1.0 / np.arange(1, len(block.jobs) + 1)))
     with one_blas_thread():
-        for found in run_job(few, prepared, before, limits):
-            limits[found.switch].offer(found.where, found.best)
-    many = replace(few, switches=few.switches * repeats)
-    limits = {number: limits[number % len(few.switches)] for number in range(len(many.switches))}
-    compared = _processor_s(lambda: [legs_to_hop(few, prepared, job, blend) for blend in blends])
-    once = _processor_s(lambda: run_job(few, prepared, job, limits))
-    often = _processor_s(lambda: run_job(many, prepared, job, limits))
-    pairs, second, sums = _work(few, (job,))
-    a_sum = max(often - once, 0.0) / (sums * (repeats - 1))
-    return np.array([compared / pairs, max(once - compared - sums * a_sum, 0.0) / second, a_sum])
+        for other in others:
+            for found in run_job(few, prepared, other, limits):
+                limits[found.switch].offer(found.where, found.best)
+        for found in run_job(few, prepared, job, limits):
+            cost = limits[found.switch].cost
+            beaten = np.arange(len(found.where)) % max(1, round(len(found.where) / (share * len(cost)))) == 0
+            cost[found.where[~beaten]] = found.best.cost[~beaten] - 1
+        seconds = [_timed(few, prepared, job, limits) for _ in range(_TRIALS)]
+    return np.asarray(np.median(seconds, axis=0) / _work(few, (job,)))
 
 
-def _processor_s(work: Callable[[], object]) -> float:
-    """Processor time of this process."""
-    with one_blas_thread():
-        started = time.process_time()
-        work()
-        return time.process_time() - started
+def _timed(few: Problem, prepared: Mapping[int, Any], job: Job, limits: Mapping[int, Best]) -> tuple[float, float]:
+    """Processor seconds of a job's costs and of its search."""
+    begun = time.process_time()
+    legs = legs_to_hop(few, prepared, job)
+    between = time.process_time()
+    searched(few, job, legs, limits)
+    return between - begun, time.process_time() - between
