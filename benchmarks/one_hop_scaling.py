@@ -40,7 +40,7 @@ def held_bytes() -> int:
 
 
 def problem_of(count: int, alignment: str, drawn: int = 80, frames: int = FRAMES) -> Problem:
-    """All pairs of so many dances; more than `drawn` are the same ones again, which changes nothing for a plan."""
+    """All pairs of so many dances; more than `drawn` are the same ones again: enough for the trial of a plan."""
     made = dances(min(count, drawn), frames)
     clips = tuple(replace(made[n % drawn], name=f"clip{n}") for n in range(count))
     pairs = (Switch(a, b, ALIGNMENTS[alignment]) for a in range(count) for b in range(count) if a != b)

@@ -167,12 +167,12 @@ def _trial(problem: Problem, block: Block) -> FloatArray:
     n-th hop one trigger in n has its best so far: here as many have as do on average, and the others what was found
     through some hops. Medians, as the machine may be at other work as well.
     """
-    blends, part = problem.settings.blends, block.part(problem)
-    middle = part.switches[len(part.switches) // 2]
-    into = [s for s in part.switches if (s.destination, s.alignment) == (middle.destination, middle.alignment)]
-    few = replace(problem, switches=tuple(into[:: -(-len(into) * len(blends) // _TRIAL_SWITCHES)]))
     if not block.jobs:
         return np.zeros(2)
+    switches = block.part(problem).switches
+    middle = switches[len(switches) // 2]
+    into = [s for s in switches if (s.destination, s.alignment) == (middle.destination, middle.alignment)]
+    few = replace(problem, switches=tuple(into[:: -(-len(into) * len(problem.settings.blends) // _TRIAL_SWITCHES)]))
     *others, job = block.jobs[:: -(-len(block.jobs) // _TRIAL_HOPS)]
     prepared = prepared_for(few, (*others, job))
     limits = {number: Best.none(len(few.triggers(switch))) for number, switch in enumerate(few.switches)}
@@ -186,7 +186,7 @@ def _trial(problem: Problem, block: Block) -> FloatArray:
             beaten = np.arange(len(found.where)) % max(1, round(len(found.where) / (share * len(cost)))) == 0
             cost[found.where[~beaten]] = found.best.cost[~beaten] - 1
         seconds = [_timed(few, prepared, job, limits) for _ in range(_TRIALS)]
-    return np.asarray(np.median(seconds, axis=0) / _work(few, (job,)))
+    return np.asarray(np.median(seconds, axis=0) / np.maximum(_work(few, (job,)), 1.0))
 
 
 def _timed(few: Problem, prepared: Mapping[int, Any], job: Job, limits: Mapping[int, Best]) -> tuple[float, float]:

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.gl
 
 @pytest.fixture(scope="session")
 def browser(whole_browser: Browser) -> Browser:
-    """What people have."""
+    """Chromium with its windows, as people have it."""
     return whole_browser
 
 
